@@ -1,0 +1,80 @@
+// What the CPU policies share: memory, transfers, and loops made from one primitive of the backend.
+#pragma once
+
+#include <wfpg/buffer.hpp>
+#include <wfpg/detail/cpu_block.hpp>
+#include <wfpg/exec/policy.hpp>
+
+#include <cstddef>
+#include <cstring>
+
+namespace wfpg::detail {
+
+/// Base of a CPU policy `Derived<W>`. Derived offers
+///   int concurrency() const;                          threads that may work at once
+///   void parallel(n, grain, f(first, last, worker)) const;  ranges of [0, n), 0 <= worker < concurrency()
+template <class Derived, int W>
+class cpu_policy {
+ public:
+  static constexpr int warp_width = W;
+  using block = cpu_block<W>;
+
+  explicit cpu_policy(memory_resource* resource)
+      : resource_(resource ? resource : std::pmr::get_default_resource()) {}
+
+  memory_resource* resource() const { return resource_; }
+
+  /// The same policy with its memory, and its temporaries, from elsewhere.
+  Derived with_resource(memory_resource* resource) const {
+    Derived other = self();
+    other.resource_ = resource ? resource : std::pmr::get_default_resource();
+    return other;
+  }
+
+  void copy_to_host(void* to, const void* from, std::size_t bytes) const {
+    if (bytes) std::memcpy(to, from, bytes);
+  }
+  void copy_from_host(void* to, const void* from, std::size_t bytes) const {
+    if (bytes) std::memcpy(to, from, bytes);
+  }
+
+  /// f(i) for each i in [0, n), in no order.
+  template <class F>
+  void for_each(std::size_t n, const F& f) const {
+    self().parallel(n, elements_per_task, [&f](std::size_t first, std::size_t last, int) {
+      for (std::size_t i = first; i < last; ++i) f(i);
+    });
+  }
+  template <class F>
+  void for_each(exec::device_count n, const F& f) const {
+    for_each(n.get(), f);
+  }
+
+  /// f(block, i) for each i in [0, n), in no order; each block has `scratch_bytes` of scratch memory.
+  template <class F>
+  void for_each_block(std::size_t n, std::size_t scratch_bytes, const F& f) const {
+    const std::size_t stride = (scratch_bytes + cache_line - 1) / cache_line * cache_line;
+    const buffer<std::byte, Derived> arena(self(), stride * static_cast<std::size_t>(self().concurrency()));
+    std::byte* const memory = arena.data();
+    self().parallel(n, 1, [=, &f](std::size_t first, std::size_t last, int worker) {
+      for (std::size_t i = first; i < last; ++i) {
+        block team(memory + stride * static_cast<std::size_t>(worker), scratch_bytes);
+        f(team, i);
+      }
+    });
+  }
+  template <class F>
+  void for_each_block(exec::device_count n, std::size_t scratch_bytes, const F& f) const {
+    for_each_block(n.get(), scratch_bytes, f);
+  }
+
+ private:
+  static constexpr std::size_t elements_per_task = 256;
+  static constexpr std::size_t cache_line = 64;
+
+  const Derived& self() const { return static_cast<const Derived&>(*this); }
+
+  memory_resource* resource_;
+};
+
+}  // namespace wfpg::detail

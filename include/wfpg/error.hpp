@@ -1,0 +1,48 @@
+// What the library throws from host calls. Nothing is printed and nothing ends the process.
+#pragma once
+
+#include <cstddef>
+#include <new>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+
+namespace wfpg {
+
+/// A memory resource could not give what was asked for. The message names the bytes.
+class out_of_memory : public std::runtime_error {
+ public:
+  explicit out_of_memory(std::size_t bytes)
+      : std::runtime_error("wfpg: out of memory: " + std::to_string(bytes) + " bytes were asked for"),
+        bytes_(bytes) {}
+  std::size_t bytes() const noexcept { return bytes_; }
+
+ private:
+  std::size_t bytes_;
+};
+
+/// A call of a device's runtime failed. The message names code, text and call.
+class device_error : public std::runtime_error {
+ public:
+  device_error(int code, const std::string& text, const std::string& call)
+      : std::runtime_error("wfpg: " + call + ": " + text + " (code " + std::to_string(code) + ")"),
+        code_(code) {}
+  int code() const noexcept { return code_; }
+
+ private:
+  int code_;
+};
+
+namespace detail {
+
+/// Throws std::invalid_argument "wfpg: NAME is VALUE, expected WHAT" unless `holds`.
+template <class T>
+void require(bool holds, const char* name, const T& value, const char* expected) {
+  if (holds) return;
+  std::ostringstream text;
+  text << "wfpg: " << name << " is " << value << ", expected " << expected;
+  throw std::invalid_argument(text.str());
+}
+
+}  // namespace detail
+}  // namespace wfpg

@@ -1,0 +1,33 @@
+// The serial policy: one thread, in order. For debugging and as the reference of the others.
+#pragma once
+
+#include <wfpg/detail/cpu_policy.hpp>
+#include <wfpg/detail/thrust.hpp>
+
+#include <thrust/system/cpp/execution_policy.h>
+
+namespace wfpg::exec {
+
+/// The serial policy with warps of W lanes.
+template <int W>
+class basic_seq : public wfpg::detail::cpu_policy<basic_seq<W>, W> {
+ public:
+  static constexpr const char* name = "seq";
+
+  /// Memory from `resource`, which must outlive what is allocated; null stands for the default resource.
+  explicit basic_seq(memory_resource* resource = nullptr)
+      : wfpg::detail::cpu_policy<basic_seq<W>, W>(resource) {}
+
+  auto thrust() const { return ::thrust::cpp::par(wfpg::detail::resource_allocator<char>(this->resource())); }
+
+  int concurrency() const { return 1; }
+
+  template <class F>
+  void parallel(std::size_t n, std::size_t, const F& f) const {
+    if (n) f(0, n, 0);
+  }
+};
+
+using seq = basic_seq<32>;
+
+}  // namespace wfpg::exec

@@ -1,0 +1,40 @@
+// The TBB policy. Link with TBB (target wfpg::tbb).
+#pragma once
+
+#include <wfpg/detail/cpu_policy.hpp>
+#include <wfpg/detail/thrust.hpp>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+#include <thrust/system/tbb/execution_policy.h>
+
+namespace wfpg::exec {
+
+/// The TBB policy with warps of W lanes. Runs in the calling thread's task arena, so that a host bounds the
+/// threads with tbb::task_arena or tbb::global_control.
+template <int W>
+class basic_tbb : public wfpg::detail::cpu_policy<basic_tbb<W>, W> {
+ public:
+  static constexpr const char* name = "tbb";
+
+  /// Memory from `resource`, which must outlive what is allocated; null stands for the default resource.
+  explicit basic_tbb(memory_resource* resource = nullptr)
+      : wfpg::detail::cpu_policy<basic_tbb<W>, W>(resource) {}
+
+  auto thrust() const { return ::thrust::tbb::par(wfpg::detail::resource_allocator<char>(this->resource())); }
+
+  int concurrency() const { return ::tbb::this_task_arena::max_concurrency(); }
+
+  template <class F>
+  void parallel(std::size_t n, std::size_t grain, const F& f) const {
+    ::tbb::parallel_for(::tbb::blocked_range<std::size_t>(0, n, grain),
+                        [&f](const ::tbb::blocked_range<std::size_t>& range) {
+                          f(range.begin(), range.end(), ::tbb::this_task_arena::current_thread_index());
+                        });
+  }
+};
+
+using tbb = basic_tbb<32>;
+
+}  // namespace wfpg::exec
