@@ -1,0 +1,119 @@
+// The two normals N and -N of each voxel: k-means, k = 2, over the normals of what lies in it (paper,
+// section 3.2, figure 2). Leaves cluster their fragments, inner nodes their children. Two bytes a node.
+#pragma once
+
+#include <wfpg/buffer.hpp>
+#include <wfpg/octahedral_map.hpp>
+#include <wfpg/sparse_voxel_octree.hpp>
+#include <wfpg/types.hpp>
+#include <wfpg/voxelizer.hpp>
+
+namespace wfpg::detail {
+
+/// A unit direction in 16 bits, at most 0.8 degrees away; the axes are exact.
+WFPG_HD inline std::uint16_t pack_voxel_normal(vec3 n) {
+  const vec2 uv = sphere_to_square(n);
+  const auto x = static_cast<std::uint32_t>(uv.x * 254.0f + 0.5f);
+  const auto y = static_cast<std::uint32_t>(uv.y * 254.0f + 0.5f);
+  return static_cast<std::uint16_t>(x | y << 8);
+}
+WFPG_HD inline vec3 unpack_voxel_normal(std::uint16_t packed) {
+  return square_to_sphere({static_cast<float>(packed & 0xffu) * (1.0f / 254.0f),
+                           static_cast<float>(packed >> 8) * (1.0f / 254.0f)});
+}
+
+/// A normal with the area that has it.
+struct weighted_normal {
+  vec3 normal;
+  float area;
+};
+
+/// Clusters normals around the first one and its opposite, by area, in at most 8 rounds; the mean of the
+/// larger cluster. `members(i)` gives the i-th of n > 0 weighted normals.
+template <class Members>
+WFPG_HD vec3 dominant_normal(const Members& members, std::uint32_t n) {
+  constexpr int rounds = 8;
+  vec3 means[2] = {members(0).normal, -members(0).normal};
+  float areas[2] = {0.0f, 0.0f};
+  for (int round = 0; round < rounds; ++round) {
+    vec3 sums[2] = {vec3(0.0f), vec3(0.0f)};
+    areas[0] = areas[1] = 0.0f;
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const weighted_normal m = members(i);
+      const int cluster = glm::dot(m.normal, means[0]) >= glm::dot(m.normal, means[1]) ? 0 : 1;
+      const float weight =
+          max(m.area, 1.0e-30f);  // a voxel that surfaces only touch has no area, but normals
+      sums[cluster] += m.normal * weight;
+      areas[cluster] += weight;
+    }
+    float moved = 0.0f;
+    for (int cluster = 0; cluster < 2; ++cluster) {
+      const float length = glm::length(sums[cluster] / max(areas[cluster], 1.0e-30f));
+      if (!(length > 1.0e-6f)) continue;
+      const vec3 mean = sums[cluster] / max(areas[cluster], 1.0e-30f) / length;
+      moved = max(moved, 1.0f - glm::dot(mean, means[cluster]));
+      means[cluster] = mean;
+    }
+    if (moved < 1.0e-6f) break;
+  }
+  return areas[1] > areas[0] ? means[1] : means[0];
+}
+
+struct leaf_normals {
+  array_view<const std::uint32_t> fragment_begin;  // a leaf
+  array_view<const std::uint32_t> fragment_normals;
+  array_view<const float> fragment_areas;
+  node_id first_leaf;
+  array_view<std::uint16_t> normals;
+  array_view<float> areas;
+
+  WFPG_HD void operator()(std::size_t leaf) const {
+    const std::size_t begin = fragment_begin[leaf];
+    const std::size_t end =
+        leaf + 1 < fragment_begin.size() ? fragment_begin[leaf + 1] : fragment_areas.size();
+    const auto member = [&](std::uint32_t i) {
+      return weighted_normal{unpack_direction(fragment_normals[begin + i]), fragment_areas[begin + i]};
+    };
+    float area = 0.0f;
+    for (std::size_t i = begin; i < end; ++i) area += fragment_areas[i];
+    normals[first_leaf + leaf] =
+        pack_voxel_normal(dominant_normal(member, static_cast<std::uint32_t>(end - begin)));
+    areas[first_leaf + leaf] = area;
+  }
+};
+
+struct inner_normals {
+  sparse_voxel_octree_view tree;
+  node_id level_begin;
+  array_view<std::uint16_t> normals;
+  array_view<float> areas;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const node_id node = level_begin + static_cast<node_id>(i);
+    const node_id first = tree.first_child(node);
+    const std::uint32_t n = tree.child_count(node);
+    const auto member = [&](std::uint32_t c) {
+      return weighted_normal{unpack_voxel_normal(normals[first + c]), areas[first + c]};
+    };
+    float area = 0.0f;
+    for (std::uint32_t c = 0; c < n; ++c) area += areas[first + c];
+    normals[node] = pack_voxel_normal(dominant_normal(member, n));
+    areas[node] = area;
+  }
+};
+
+/// Fills the normals of all nodes of a tree just built from sorted fragments.
+template <class Exec>
+void build_voxel_normals(const Exec& exec, const sparse_voxel_octree<Exec>& tree,
+                         const voxel_fragments<Exec>& fragments, array_view<std::uint16_t> normals) {
+  const sparse_voxel_octree_view view = tree.view();
+  const buffer<float, Exec> areas(exec, view.node_count());
+  exec.for_each(view.leaf_count(),
+                leaf_normals{tree.leaf_fragment_begin(), fragments.normals.view(), fragments.areas.view(),
+                             view.first_leaf(), normals, areas.view()});
+  for (std::uint32_t level = view.depth(); level-- > 0;)
+    exec.for_each(view.level_begin(level + 1) - view.level_begin(level),
+                  inner_normals{view, view.level_begin(level), normals, areas.view()});
+}
+
+}  // namespace wfpg::detail

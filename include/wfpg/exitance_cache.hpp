@@ -1,0 +1,243 @@
+// What light leaves each node of the octree: mean outgoing radiance (exitance / pi, luminance, W/(m² sr)) for
+// either side of a voxel (paper, section 3.2). Two normals a voxel by k-means; deposits through a queue that
+// update() sorts and folds into running means, so that any order of arrival gives the same bits; averages
+// bottom-up.
+//
+// Memory: 26 bytes a leaf, 10 an inner node, and 8 a deposit of the queue's capacity.
+#pragma once
+
+#include <wfpg/buffer.hpp>
+#include <wfpg/detail/atomic.hpp>
+#include <wfpg/detail/thrust.hpp>
+#include <wfpg/detail/voxel_normals.hpp>
+#include <wfpg/sparse_voxel_octree.hpp>
+#include <wfpg/types.hpp>
+
+#include <thrust/fill.h>
+#include <thrust/sort.h>
+
+namespace wfpg {
+
+/// Deposits that were not stored, since the cache was built.
+struct dropped_deposits {
+  std::uint32_t invalid = 0;   ///< NaN, infinite or negative radiance, or a non-finite position or direction
+  std::uint32_t outside = 0;   ///< no voxel at or next to the position
+  std::uint32_t overflow = 0;  ///< the queue was full
+
+  std::uint64_t total() const { return std::uint64_t(invalid) + outside + overflow; }
+};
+
+/// What a kernel sees of the cache.
+class exitance_cache_view {
+ public:
+  WFPG_HD const sparse_voxel_octree_view& octree() const { return tree_; }
+
+  /// N of a node; its other side faces -N.
+  WFPG_HD vec3 normal(node_id node) const { return detail::unpack_voxel_normal(normals_[node]); }
+
+  /// The side of a node that faces a direction: 0 where N does, 1 where -N does.
+  WFPG_HD std::uint32_t side_facing(node_id node, vec3 direction) const {
+    return glm::dot(normal(node), direction) >= 0.0f ? 0u : 1u;
+  }
+
+  /// Mean outgoing radiance of a node's side; negative where it has no data.
+  WFPG_HD float radiance(node_id node, std::uint32_t side) const {
+    if (!tree_.is_leaf(node)) return inner_radiance_[2 * std::size_t(node) + side];
+    const std::size_t slot = 2 * std::size_t(node - tree_.first_leaf()) + side;
+    return leaf_counts_[slot] ? static_cast<float>(leaf_means_[slot]) : -1.0f;
+  }
+
+  /// Outgoing radiance of the side that faces `toward`, of the node or else of its first ancestor with data
+  /// for that side; 0 where none has. No cosine: radiance is stored as independent of the view.
+  WFPG_HD float read(node_id node, vec3 toward) const {
+    while (node != invalid_node) {
+      const vec3 n = normal(node);
+      const bool front = glm::dot(n, toward) >= 0.0f;
+      const float value = radiance(node, front ? 0u : 1u);
+      if (value >= 0.0f) return value;
+      toward = front ? n : -n;  // an ancestor's N may be this node's -N
+      node = tree_.parent(node);
+    }
+    return 0.0f;
+  }
+
+  /// Queues the radiance that leaves `position` toward `direction` (unit length). Any number of threads at
+  /// once. Seen by reads after exitance_cache::update(). What is not finite or negative, lies outside every
+  /// voxel, or does not fit the queue is dropped and counted.
+  WFPG_HD void deposit(vec3 position, vec3 direction, float radiance) const {
+    if (!detail::is_finite(radiance) || radiance < 0.0f || !detail::is_finite(position) ||
+        !detail::is_finite(direction)) {
+      detail::atomic_add(counters_ + counter_invalid, 1);
+      return;
+    }
+    const node_id leaf = tree_.nearest_leaf(position);
+    if (leaf == invalid_node) {
+      detail::atomic_add(counters_ + counter_outside, 1);
+      return;
+    }
+    const std::uint32_t slot = detail::atomic_add(counters_ + counter_queued, 1);
+    if (slot >= capacity_) {
+      detail::atomic_add(counters_ + counter_overflow, 1);
+      return;
+    }
+    const std::uint64_t key = 2 * std::uint64_t(leaf - tree_.first_leaf()) + side_facing(leaf, direction);
+    queue_[slot] = key << 32 | detail::float_bits(radiance + 0.0f);  // + 0: no negative zero
+  }
+  WFPG_HD void deposit(vec3 position, vec3 direction, vec3 rgb) const {
+    deposit(position, direction, luminance(rgb));
+  }
+
+ private:
+  template <class Exec>
+  friend class exitance_cache;
+  enum : std::uint32_t { counter_invalid, counter_outside, counter_overflow, counter_queued, counters };
+
+  sparse_voxel_octree_view tree_;
+  const std::uint16_t* normals_ = nullptr;      // a node
+  const double* leaf_means_ = nullptr;          // a leaf and side
+  const std::uint32_t* leaf_counts_ = nullptr;  // a leaf and side
+  const float* inner_radiance_ = nullptr;       // an inner node and side; negative: no data
+  std::uint64_t* queue_ = nullptr;              // leaf and side above, bits of the radiance below
+  std::uint32_t* counters_ = nullptr;
+  std::uint32_t capacity_ = 0;
+};
+
+namespace detail {
+
+inline constexpr std::uint64_t no_deposit = ~0ull;
+
+/// Adds `n` values that sum to `sum` to a mean of `count` values. The count stays at its largest value when
+/// it is reached: from then on old values fade, and nothing overflows.
+WFPG_HD inline void add_to_mean(double& mean, std::uint32_t& count, double sum, std::uint64_t n) {
+  const std::uint64_t total = count + n;
+  mean += (sum - static_cast<double>(n) * mean) / static_cast<double>(total);
+  count = static_cast<std::uint32_t>(min<std::uint64_t>(total, 0xffffffffull));
+}
+
+/// The first of each run of equal leaf and side adds the run to the mean, in sorted order.
+struct fold_deposits {
+  array_view<const std::uint64_t> sorted;
+  double* means;
+  std::uint32_t* counts;
+  WFPG_HD void operator()(std::size_t i) const {
+    const std::uint64_t key = sorted[i] >> 32;
+    if (sorted[i] == no_deposit || (i > 0 && sorted[i - 1] >> 32 == key)) return;
+    double sum = 0.0;
+    std::size_t end = i;
+    for (; end < sorted.size() && sorted[end] >> 32 == key; ++end)
+      sum += static_cast<double>(bits_float(static_cast<std::uint32_t>(sorted[end])));
+    add_to_mean(means[key], counts[key], sum, end - i);
+  }
+};
+
+/// A level's nodes receive the mean of their children's matching sides, of those that have data.
+struct average_children {
+  exitance_cache_view cache;
+  node_id level_begin;
+  float* inner_radiance;
+  WFPG_HD void operator()(std::size_t i) const {
+    const node_id node = level_begin + static_cast<node_id>(i);
+    const node_id first = cache.octree().first_child(node);
+    const node_id end = first + cache.octree().child_count(node);
+    for (std::uint32_t side = 0; side < 2; ++side) {
+      const vec3 facing = side == 0 ? cache.normal(node) : -cache.normal(node);
+      float sum = 0.0f, n = 0.0f;
+      for (node_id child = first; child < end; ++child) {
+        const float value = cache.radiance(child, cache.side_facing(child, facing));
+        if (value < 0.0f) continue;
+        sum += value;
+        n += 1.0f;
+      }
+      inner_radiance[2 * std::size_t(node) + side] = n > 0.0f ? sum / n : -1.0f;
+    }
+  }
+};
+
+}  // namespace detail
+
+/// Owns the cache of an octree, in the memory of `Exec`. The octree must outlive it.
+template <class Exec>
+class exitance_cache {
+ public:
+  exitance_cache() = default;
+
+  /// An empty cache over an octree just built from `fragments` (which the octree sorted). `queue_capacity`
+  /// bounds the deposits between two updates. Throws out_of_memory, std::invalid_argument where the capacity
+  /// is 2³² or more.
+  exitance_cache(const Exec& exec, const sparse_voxel_octree<Exec>& tree,
+                 const voxel_fragments<Exec>& fragments, std::size_t queue_capacity)
+      : normals_(exec, tree.node_count()),
+        leaf_means_(exec, 2 * std::size_t(tree.leaf_count())),
+        leaf_counts_(exec, 2 * std::size_t(tree.leaf_count())),
+        inner_radiance_(exec, 2 * std::size_t(tree.node_count() - tree.leaf_count())),
+        queue_(exec, checked(queue_capacity)),
+        counters_(exec, exitance_cache_view::counters) {
+    view_.tree_ = tree.view();
+    view_.normals_ = normals_.data();
+    view_.leaf_means_ = leaf_means_.data();
+    view_.leaf_counts_ = leaf_counts_.data();
+    view_.inner_radiance_ = inner_radiance_.data();
+    view_.queue_ = queue_.data();
+    view_.counters_ = counters_.data();
+    view_.capacity_ = static_cast<std::uint32_t>(queue_capacity);
+    detail::build_voxel_normals(exec, tree, fragments, normals_.view());
+    ::thrust::fill_n(exec.thrust(), counters_.data(), counters_.size(), 0u);
+    clear(exec);
+  }
+
+  exitance_cache_view view() const { return view_; }
+  std::size_t persistent_bytes() const {
+    return normals_.bytes() + leaf_means_.bytes() + leaf_counts_.bytes() + inner_radiance_.bytes();
+  }
+  std::size_t transient_bytes() const { return queue_.bytes() + counters_.bytes(); }
+
+  /// Forgets all light, and what is queued.
+  void clear(const Exec& exec) {
+    ::thrust::fill_n(exec.thrust(), leaf_means_.data(), leaf_means_.size(), 0.0);
+    ::thrust::fill_n(exec.thrust(), leaf_counts_.data(), leaf_counts_.size(), 0u);
+    ::thrust::fill_n(exec.thrust(), inner_radiance_.data(), inner_radiance_.size(), -1.0f);
+    empty_queue(exec);
+  }
+
+  /// Folds queued deposits into the leaves and averages bottom-up. O(c log c + nodes), c the queue's
+  /// capacity.
+  void update(const Exec& exec) {
+    ::thrust::sort(exec.thrust(), queue_.data(), queue_.data() + queue_.size());
+    exec.for_each(queue_.size(),
+                  detail::fold_deposits{queue_.view(), leaf_means_.data(), leaf_counts_.data()});
+    for (std::uint32_t level = view_.tree_.depth(); level-- > 0;)
+      exec.for_each(view_.tree_.level_begin(level + 1) - view_.tree_.level_begin(level),
+                    detail::average_children{view_, view_.tree_.level_begin(level), inner_radiance_.data()});
+    empty_queue(exec);
+  }
+
+  /// Deposits dropped since the cache was built; waits for the work before it.
+  dropped_deposits dropped(const Exec& exec) const {
+    const auto host = counters_.to_host(exec);
+    return {host[exitance_cache_view::counter_invalid], host[exitance_cache_view::counter_outside],
+            host[exitance_cache_view::counter_overflow]};
+  }
+
+ private:
+  // Before memory is asked for.
+  static std::size_t checked(std::size_t queue_capacity) {
+    detail::require(queue_capacity <= 0xffffffffull, "deposit queue capacity", queue_capacity,
+                    "less than 2^32");
+    return queue_capacity;
+  }
+
+  void empty_queue(const Exec& exec) {
+    ::thrust::fill_n(exec.thrust(), queue_.data(), queue_.size(), detail::no_deposit);
+    ::thrust::fill_n(exec.thrust(), counters_.data() + exitance_cache_view::counter_queued, 1, 0u);
+  }
+
+  buffer<std::uint16_t, Exec> normals_;
+  buffer<double, Exec> leaf_means_;
+  buffer<std::uint32_t, Exec> leaf_counts_;
+  buffer<float, Exec> inner_radiance_;
+  buffer<std::uint64_t, Exec> queue_;
+  buffer<std::uint32_t, Exec> counters_;
+  exitance_cache_view view_;
+};
+
+}  // namespace wfpg

@@ -1,0 +1,92 @@
+// The equal-area concentric octahedral map (Clarberg 2008, "Fast Equal-Area Mapping of the (Hemi)Sphere using
+// SIMD"): the unit square to the sphere, or to the hemisphere z >= 0, preserving relative areas. Fields are
+// grids over these squares (paper, section 4, "Radiance field projection").
+#pragma once
+
+#include <wfpg/detail/math.hpp>
+#include <wfpg/types.hpp>
+
+#include <cmath>
+
+namespace wfpg {
+namespace detail {
+
+/// A point of the diamond |p.x| + |p.y| <= 1 to the direction above it, z >= 0.
+WFPG_HD inline vec3 diamond_to_hemisphere(vec2 p) {
+  const float ax = fabsf(p.x);
+  const float ay = fabsf(p.y);
+  const float r = min(ax + ay, 1.0f);
+  const float phi = r > 0.0f ? ay / (ax + ay) * (0.5f * pi) : 0.0f;
+  const float scale = r * sqrtf(2.0f - r * r);
+  return {copysignf(scale * cosf(phi), p.x), copysignf(scale * sinf(phi), p.y), 1.0f - r * r};
+}
+
+/// The inverse, for d.z >= 0.
+WFPG_HD inline vec2 hemisphere_to_diamond(vec3 d) {
+  const float ax = fabsf(d.x);
+  const float ay = fabsf(d.y);
+  const float r = min(sqrtf((ax * ax + ay * ay) / (1.0f + d.z)), 1.0f);
+  const float y = r > 0.0f ? atan2f(ay, ax) * (2.0f / pi) * r : 0.0f;
+  return {copysignf(r - y, d.x), copysignf(y, d.y)};
+}
+
+}  // namespace detail
+
+/// A point of [0,1]² to a unit direction. The inner diamond is the hemisphere z >= 0.
+WFPG_HD inline vec3 square_to_sphere(vec2 uv) {
+  vec2 p{2.0f * uv.x - 1.0f, 2.0f * uv.y - 1.0f};
+  const float ax = fabsf(p.x);
+  const float ay = fabsf(p.y);
+  if (ax + ay <= 1.0f) return detail::diamond_to_hemisphere(p);
+  p = {copysignf(1.0f - ay, p.x), copysignf(1.0f - ax, p.y)};
+  const vec3 d = detail::diamond_to_hemisphere(p);
+  return {d.x, d.y, -d.z};
+}
+
+/// The inverse of square_to_sphere, for unit directions.
+WFPG_HD inline vec2 sphere_to_square(vec3 d) {
+  vec2 p = detail::hemisphere_to_diamond({d.x, d.y, fabsf(d.z)});
+  if (d.z < 0.0f) p = {copysignf(1.0f - fabsf(p.y), p.x), copysignf(1.0f - fabsf(p.x), p.y)};
+  return {0.5f * p.x + 0.5f, 0.5f * p.y + 0.5f};
+}
+
+/// A point of [0,1]² to a unit direction with z >= 0.
+WFPG_HD inline vec3 square_to_hemisphere(vec2 uv) {
+  return detail::diamond_to_hemisphere({uv.x + uv.y - 1.0f, uv.x - uv.y});
+}
+
+/// The inverse of square_to_hemisphere, for unit directions with z >= 0.
+WFPG_HD inline vec2 hemisphere_to_square(vec3 d) {
+  const vec2 p = detail::hemisphere_to_diamond(d);
+  return {0.5f * (p.x + p.y) + 0.5f, 0.5f * (p.x - p.y) + 0.5f};
+}
+
+/// The cell (x, y) of a `size` x `size` grid over the sphere's square that lies where a neighbour step left
+/// the grid: steps over an edge come back on the same edge, mirrored, as they do on the sphere. One step at
+/// most `size` cells wide.
+WFPG_HD inline void wrap_octahedral(int& x, int& y, int size) {
+  if (x < 0 || x >= size) {
+    x = x < 0 ? -1 - x : 2 * size - 1 - x;
+    y = size - 1 - y;
+  }
+  if (y < 0 || y >= size) {
+    y = y < 0 ? -1 - y : 2 * size - 1 - y;
+    x = size - 1 - x;
+  }
+}
+
+/// A unit direction in 32 bits, at most 0.01 degrees away.
+WFPG_HD inline std::uint32_t pack_direction(vec3 d) {
+  const vec2 uv = sphere_to_square(d);
+  const auto x = static_cast<std::uint32_t>(uv.x * 65535.0f + 0.5f);
+  const auto y = static_cast<std::uint32_t>(uv.y * 65535.0f + 0.5f);
+  return x | y << 16;
+}
+
+/// The inverse of pack_direction.
+WFPG_HD inline vec3 unpack_direction(std::uint32_t packed) {
+  return square_to_sphere({static_cast<float>(packed & 0xffffu) * (1.0f / 65535.0f),
+                           static_cast<float>(packed >> 16) * (1.0f / 65535.0f)});
+}
+
+}  // namespace wfpg

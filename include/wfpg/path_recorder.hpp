@@ -1,0 +1,147 @@
+// The vertices of the paths in flight, and the radiance that leaves each of them, by back-propagation (paper,
+// Eq. 5): what arrives at a path's origin, divided by the throughput up to a vertex, left that vertex.
+//
+// Memory: 40 bytes a vertex, paths × depths of them, and 4 a path.
+#pragma once
+
+#include <wfpg/buffer.hpp>
+#include <wfpg/detail/atomic.hpp>
+#include <wfpg/detail/math.hpp>
+#include <wfpg/exitance_cache.hpp>
+#include <wfpg/octahedral_map.hpp>
+#include <wfpg/types.hpp>
+
+#include <thrust/fill.h>
+
+namespace wfpg {
+
+/// What a kernel sees of the recorder. Calls for one path come from one thread at a time, vertices in order
+/// of depth. A path or depth beyond the capacity, or a vertex that was not recorded, is dropped and counted.
+class path_recorder_view {
+ public:
+  WFPG_HD std::size_t paths() const { return paths_; }
+  WFPG_HD std::uint32_t max_depth() const { return max_depth_; }
+
+  /// Vertex `depth` (0: the first surface) of a path: where it is, the unit direction toward the vertex
+  /// before it, and the path's throughput before this vertex's BSDF (1 at the camera's first hit), linear
+  /// RGB.
+  WFPG_HD void vertex(std::size_t path, std::uint32_t depth, vec3 position, vec3 outgoing,
+                      vec3 throughput) const {
+    if (path >= paths_ || depth >= max_depth_ || depth != lengths_[path]) return drop();
+    const std::size_t slot = depth * paths_ + path;
+    positions_[slot] = position;
+    outgoing_[slot] = pack_direction(outgoing);
+    throughputs_[slot] = throughput;
+    contributions_[slot] = vec3(0.0f);
+    lengths_[path] = depth + 1;
+  }
+
+  /// Radiance that vertex `depth` scatters toward the path's origin, as it arrives there: throughput, BSDF
+  /// and MIS weight included, linear RGB. Next-event estimation reports with this.
+  WFPG_HD void radiance(std::size_t path, std::uint32_t depth, vec3 contribution) const {
+    if (path >= paths_ || depth >= lengths_[path]) return drop();
+    contributions_[depth * paths_ + path] += contribution;
+  }
+
+  /// Radiance of an emitter that the path hit as vertex `depth`, or of the environment that it left for after
+  /// vertex `depth` - 1, as it arrives at the path's origin. Counts as scattered by the vertices before, and
+  /// as leaving the emitter itself where emission is included and the emitter is a recorded vertex.
+  WFPG_HD void emission(std::size_t path, std::uint32_t depth, vec3 contribution) const {
+    if (path >= paths_ || depth > lengths_[path]) return drop();
+    if (include_emission_ && depth < lengths_[path])
+      radiance(path, depth, contribution);
+    else if (depth > 0)
+      radiance(path, depth - 1, contribution);
+  }
+
+ private:
+  template <class Exec>
+  friend class path_recorder;
+  friend struct deposit_paths;
+
+  WFPG_HD void drop() const { detail::atomic_add(dropped_, 1); }
+
+  std::size_t paths_ = 0;
+  std::uint32_t max_depth_ = 0;
+  bool include_emission_ = true;
+  std::uint32_t* lengths_ = nullptr;  // a path: vertices recorded
+  vec3* positions_ = nullptr;         // a vertex, all paths of a depth together
+  std::uint32_t* outgoing_ = nullptr;
+  vec3* throughputs_ = nullptr;
+  vec3* contributions_ = nullptr;
+  std::uint32_t* dropped_ = nullptr;
+};
+
+/// Deposits one path's vertices: L(k) = (sum of contributions at k and after) / throughput(k), Eq. 5.
+struct deposit_paths {
+  path_recorder_view paths;
+  exitance_cache_view cache;
+  WFPG_HD void operator()(std::size_t path) const {
+    vec3 arriving(0.0f);
+    for (std::uint32_t depth = paths.lengths_[path]; depth-- > 0;) {
+      const std::size_t slot = depth * paths.paths_ + path;
+      arriving += paths.contributions_[slot];
+      const vec3 t = paths.throughputs_[slot];
+      const vec3 leaving{t.x > 0.0f ? arriving.x / t.x : 0.0f, t.y > 0.0f ? arriving.y / t.y : 0.0f,
+                         t.z > 0.0f ? arriving.z / t.z : 0.0f};
+      cache.deposit(paths.positions_[slot], unpack_direction(paths.outgoing_[slot]), leaving);
+    }
+  }
+};
+
+/// Owns the vertices of `paths` paths of at most `max_depth` vertices.
+template <class Exec>
+class path_recorder {
+ public:
+  path_recorder() = default;
+  /// `include_emission`: emitters' own radiance is cached too, so that guiding looks for them; false where
+  /// next-event estimation does that. Throws out_of_memory.
+  path_recorder(const Exec& exec, std::size_t paths, std::uint32_t max_depth, bool include_emission)
+      : lengths_(exec, paths),
+        positions_(exec, paths * max_depth),
+        outgoing_(exec, paths * max_depth),
+        throughputs_(exec, paths * max_depth),
+        contributions_(exec, paths * max_depth),
+        dropped_(exec, 1) {
+    view_.paths_ = paths;
+    view_.max_depth_ = max_depth;
+    view_.include_emission_ = include_emission;
+    view_.lengths_ = lengths_.data();
+    view_.positions_ = positions_.data();
+    view_.outgoing_ = outgoing_.data();
+    view_.throughputs_ = throughputs_.data();
+    view_.contributions_ = contributions_.data();
+    view_.dropped_ = dropped_.data();
+    ::thrust::fill_n(exec.thrust(), dropped_.data(), 1, 0u);
+    clear(exec);
+  }
+
+  path_recorder_view view() const { return view_; }
+  std::size_t bytes() const {
+    return lengths_.bytes() + positions_.bytes() + outgoing_.bytes() + throughputs_.bytes() +
+           contributions_.bytes() + dropped_.bytes();
+  }
+
+  /// Forgets all paths.
+  void clear(const Exec& exec) { ::thrust::fill_n(exec.thrust(), lengths_.data(), lengths_.size(), 0u); }
+
+  /// Queues the radiance of every recorded vertex in the cache and forgets the paths. O(paths · depth).
+  void deposit(const Exec& exec, const exitance_cache_view& cache) {
+    exec.for_each(view_.paths_, deposit_paths{view_, cache});
+    clear(exec);
+  }
+
+  /// Calls dropped for a path, depth or order out of range, in all; waits for the work before it.
+  std::uint32_t dropped(const Exec& exec) const { return read_element(exec, dropped_.data()); }
+
+ private:
+  buffer<std::uint32_t, Exec> lengths_;
+  buffer<vec3, Exec> positions_;
+  buffer<std::uint32_t, Exec> outgoing_;
+  buffer<vec3, Exec> throughputs_;
+  buffer<vec3, Exec> contributions_;
+  buffer<std::uint32_t, Exec> dropped_;
+  path_recorder_view view_;
+};
+
+}  // namespace wfpg

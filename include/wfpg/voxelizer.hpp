@@ -1,0 +1,378 @@
+// Triangles, surface samples or points to voxel fragments: for each voxel that a piece of surface touches,
+// its Morton code, normal and area (paper, section 3.2; conservative as in Crassin & Green 2012). Fragments
+// are what the octree and its cache are built from.
+//
+// Cost: O(voxels touched + columns of the triangles' boxes) time; 16 bytes a fragment, 8 a triangle while it
+// runs.
+#pragma once
+
+#include <wfpg/buffer.hpp>
+#include <wfpg/detail/atomic.hpp>
+#include <wfpg/detail/thrust.hpp>
+#include <wfpg/detail/triangle_voxel.hpp>
+#include <wfpg/error.hpp>
+#include <wfpg/morton.hpp>
+#include <wfpg/octahedral_map.hpp>
+#include <wfpg/types.hpp>
+
+#include <thrust/binary_search.h>
+#include <thrust/iterator/counting_iterator.h>
+#include <thrust/scan.h>
+#include <thrust/transform_reduce.h>
+
+#include <cstdint>
+
+namespace wfpg {
+
+/// A host's triangles, in the policy's memory. Vertices in counter-clockwise order seen from the outside.
+struct triangle_mesh_view {
+  array_view<const vec3> positions;   ///< world space; |coordinate| <= 1e15
+  array_view<const uvec3> triangles;  ///< indices into positions
+};
+
+/// A piece of surface that is no triangle, ready for voxelization.
+struct surface_fragment {
+  vec3 position{0.0f};            ///< world space
+  vec3 normal{0.0f, 0.0f, 1.0f};  ///< unit length
+  float area = 1.0f;              ///< positive; only its ratio to others in a voxel matters
+};
+
+/// The cube of the octree: `resolution`³ voxels from `origin`.
+struct voxel_grid {
+  vec3 origin{0.0f};
+  float side = 1.0f;             ///< of the whole cube, scene units
+  std::uint32_t resolution = 1;  ///< voxels along a side, a power of two
+
+  WFPG_HD float voxel_size() const { return side / static_cast<float>(resolution); }
+  WFPG_HD vec3 to_grid(vec3 p) const { return (p - origin) * (static_cast<float>(resolution) / side); }
+
+  /// The voxel that holds p; false where p is outside the cube.
+  WFPG_HD bool voxel_of(vec3 p, uvec3& voxel) const {
+    const vec3 g = to_grid(p);
+    const auto last = static_cast<float>(resolution);
+    if (!(g.x >= 0.0f && g.x < last && g.y >= 0.0f && g.y < last && g.z >= 0.0f && g.z < last)) return false;
+    voxel = uvec3(g);
+    return true;
+  }
+};
+
+/// What was left out of a build, and why.
+struct build_report {
+  std::uint32_t non_finite = 0;  ///< triangles or samples with NaN, infinite or too large coordinates
+  std::uint32_t out_of_range =
+      0;  ///< triangles with an index beyond the vertices; samples outside given bounds
+  std::uint32_t degenerate = 0;  ///< triangles without area, samples without normal or positive area
+
+  std::uint32_t skipped() const { return non_finite + out_of_range + degenerate; }
+};
+
+/// Voxel fragments in the policy's memory, one for each pair of a voxel and a piece of surface that touches
+/// it.
+template <class Exec>
+struct voxel_fragments {
+  buffer<morton_code, Exec> codes;
+  buffer<std::uint32_t, Exec> normals;  ///< pack_direction
+  buffer<float, Exec> areas;            ///< inside the voxel, square scene units
+  voxel_grid grid;
+  build_report report;
+
+  voxel_fragments() = default;
+  voxel_fragments(const Exec& exec, std::size_t n) : codes(exec, n), normals(exec, n), areas(exec, n) {}
+  std::size_t size() const { return codes.size(); }
+  std::size_t bytes() const { return codes.bytes() + normals.bytes() + areas.bytes(); }
+};
+
+namespace detail {
+
+inline constexpr float largest_coordinate = 1.0e15f;
+inline constexpr std::uint32_t largest_resolution = 1u << 12;
+
+inline void require_resolution(std::uint32_t resolution) {
+  require(resolution >= 1 && resolution <= largest_resolution && (resolution & (resolution - 1)) == 0,
+          "octree resolution", resolution, "a power of two in [1, 4096]");
+}
+
+WFPG_HD inline bool is_usable(vec3 p) {
+  return is_finite(p) && fabsf(p.x) <= largest_coordinate && fabsf(p.y) <= largest_coordinate &&
+         fabsf(p.z) <= largest_coordinate;
+}
+
+/// Counters of a build report in device memory.
+enum report_counter : std::uint32_t {
+  counter_non_finite,
+  counter_out_of_range,
+  counter_degenerate,
+  counters
+};
+
+struct bounds_union {
+  WFPG_HD bounds3 operator()(const bounds3& a, const bounds3& b) const {
+    return {{min(a.lower.x, b.lower.x), min(a.lower.y, b.lower.y), min(a.lower.z, b.lower.z)},
+            {max(a.upper.x, b.upper.x), max(a.upper.y, b.upper.y), max(a.upper.z, b.upper.z)}};
+  }
+};
+
+/// The cube around a box, half a voxel wider on each side so that axis-aligned walls at the box's faces lie
+/// in the middle of their voxels. A point gets a cube that floats can divide.
+inline voxel_grid grid_around(const bounds3& box, std::uint32_t resolution) {
+  voxel_grid grid;
+  grid.resolution = resolution;
+  if (box.empty()) return grid;
+  const vec3 e = box.extent();
+  const vec3 c = box.centre();
+  const float magnitude = max(fabsf(c.x), max(fabsf(c.y), fabsf(c.z)));
+  const float extent = max(max(e.x, max(e.y, e.z)), max(magnitude * 1.0e-4f, 1.0e-12f));
+  grid.side = extent * (1.0f + 1.0f / static_cast<float>(resolution));
+  grid.origin = c - 0.5f * grid.side;
+  return grid;
+}
+
+/// The validated triangle i in grid units; false, with the reason, where it is left out.
+struct triangle_reader {
+  triangle_mesh_view mesh;
+  voxel_grid grid;
+
+  WFPG_HD bool vertices(std::size_t i, grid_triangle& t, report_counter& reason) const {
+    const uvec3 index = mesh.triangles[i];
+    const std::size_t n = mesh.positions.size();
+    reason = counter_out_of_range;
+    if (index.x >= n || index.y >= n || index.z >= n) return false;
+    t = {mesh.positions[index.x], mesh.positions[index.y], mesh.positions[index.z]};
+    reason = counter_non_finite;
+    if (!is_usable(t.a) || !is_usable(t.b) || !is_usable(t.c)) return false;
+    reason = counter_degenerate;
+    const vec3 n_unit = unit_normal(t.a, t.b, t.c);
+    return n_unit.x != 0.0f || n_unit.y != 0.0f || n_unit.z != 0.0f;
+  }
+
+  WFPG_HD grid_triangle in_grid(const grid_triangle& t) const {
+    return {grid.to_grid(t.a), grid.to_grid(t.b), grid.to_grid(t.c)};
+  }
+};
+
+struct triangle_bounds {
+  triangle_reader reader;
+  WFPG_HD bounds3 operator()(std::size_t i) const {
+    grid_triangle t{};
+    report_counter reason;
+    if (!reader.vertices(i, t, reason)) return {};
+    return bounds_union()(bounds_union()({t.a, t.a}, {t.b, t.b}), {t.c, t.c});
+  }
+};
+
+/// A triangle's columns in items of work of equal size, so that a wall and a sliver weigh alike.
+inline constexpr std::uint64_t columns_per_item = 64;
+
+struct count_items {
+  triangle_reader reader;
+  array_view<std::uint64_t> items;
+  std::uint32_t* counters;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    grid_triangle t{};
+    report_counter reason;
+    items[i] = 0;
+    if (!reader.vertices(i, t, reason)) {
+      atomic_add(counters + reason, 1);
+      return;
+    }
+    t = reader.in_grid(t);
+    items[i] =
+        (triangle_columns(t, reader.grid.resolution).count() + columns_per_item - 1) / columns_per_item;
+  }
+};
+
+/// Visits the voxels of one item of work. `items_through`: for each triangle the items up to and with its
+/// own.
+struct item_voxels {
+  triangle_reader reader;
+  array_view<const std::uint64_t> items_through;
+
+  template <class F>
+  WFPG_HD void for_each(std::uint64_t item, F f) const {
+    std::size_t low = 0, high = items_through.size();
+    while (low < high) {
+      const std::size_t middle = (low + high) / 2;
+      if (items_through[middle] <= item)
+        low = middle + 1;
+      else
+        high = middle;
+    }
+    grid_triangle t{};
+    report_counter reason;
+    if (!reader.vertices(low, t, reason)) return;
+    const vec3 normal = unit_normal(t.a, t.b, t.c);
+    const triangle_columns columns(reader.in_grid(t), reader.grid.resolution);
+    const std::uint64_t first = (item - (low ? items_through[low - 1] : 0)) * columns_per_item;
+    const std::uint64_t last = min(first + columns_per_item, columns.count());
+    for (std::uint64_t c = first; c < last; ++c)
+      columns.for_each_voxel(c, [&](uvec3 voxel, const grid_triangle& local) { f(normal, voxel, local); });
+  }
+};
+
+struct count_fragments {
+  item_voxels voxels;
+  array_view<std::uint64_t> counts;
+  WFPG_HD void operator()(std::size_t item) const {
+    std::uint64_t n = 0;
+    voxels.for_each(item, [&](vec3, uvec3, const grid_triangle&) { ++n; });
+    counts[item] = n;
+  }
+};
+
+struct emit_fragments {
+  item_voxels voxels;
+  array_view<const std::uint64_t> fragments_through;
+  array_view<morton_code> codes;
+  array_view<std::uint32_t> normals;
+  array_view<float> areas;
+
+  WFPG_HD void operator()(std::size_t item) const {
+    std::uint64_t at = item ? fragments_through[item - 1] : 0;
+    const float voxel = voxels.reader.grid.voxel_size();
+    voxels.for_each(item, [&](vec3 normal, uvec3 coordinates, const grid_triangle& local) {
+      codes[at] = morton_encode(coordinates);
+      normals[at] = pack_direction(normal);
+      areas[at] = area_inside(local) * voxel * voxel;
+      ++at;
+    });
+  }
+};
+
+/// In-place inclusive sums; returns the last one, which is read back to the host.
+template <class Exec>
+std::uint64_t sum_through(const Exec& exec, buffer<std::uint64_t, Exec>& counts) {
+  if (counts.size() == 0) return 0;
+  ::thrust::inclusive_scan(exec.thrust(), counts.data(), counts.data() + counts.size(), counts.data());
+  return read_element(exec, counts.data() + counts.size() - 1);
+}
+
+template <class Exec>
+build_report read_report(const Exec& exec, const buffer<std::uint32_t, Exec>& counters) {
+  const auto host = counters.to_host(exec);
+  return {host[counter_non_finite], host[counter_out_of_range], host[counter_degenerate]};
+}
+
+inline void require_fragment_count(std::uint64_t n) {
+  require(n < 0xffffffffull, "number of voxel fragments", n,
+          "less than 2^32 - 1: lower the octree resolution");
+}
+
+}  // namespace detail
+
+/// Voxelizes triangles at `resolution`³ over the cube around them, conservatively: no voxel that a triangle
+/// touches is missed, none is added that no triangle comes within 2⁻¹⁰ voxels of. Triangles with bad
+/// vertices, indices or no area are skipped and counted. Throws std::invalid_argument for a resolution that
+/// is no power of two in [1, 4096] and where 2³² - 1 fragments are exceeded; out_of_memory.
+template <class Exec>
+voxel_fragments<Exec> voxelize(const Exec& exec, triangle_mesh_view mesh, std::uint32_t resolution) {
+  detail::require_resolution(resolution);
+  const std::size_t n = mesh.triangles.size();
+  detail::triangle_reader reader{mesh, {}};
+  const ::thrust::counting_iterator<std::size_t> first(0);
+  const bounds3 box = ::thrust::transform_reduce(
+      exec.thrust(), first, first + n, detail::triangle_bounds{reader}, bounds3{}, detail::bounds_union());
+  reader.grid = detail::grid_around(box, resolution);
+
+  const buffer<std::uint32_t, Exec> counters(exec, std::vector<std::uint32_t>(detail::counters, 0));
+  buffer<std::uint64_t, Exec> items(exec, n);
+  exec.for_each(n, detail::count_items{reader, items.view(), counters.data()});
+  const std::uint64_t item_count = detail::sum_through(exec, items);
+  const detail::item_voxels voxels{reader, items.view()};
+
+  buffer<std::uint64_t, Exec> counts(exec, item_count);
+  exec.for_each(item_count, detail::count_fragments{voxels, counts.view()});
+  const std::uint64_t fragment_count = detail::sum_through(exec, counts);
+  detail::require_fragment_count(fragment_count);
+
+  voxel_fragments<Exec> result(exec, fragment_count);
+  exec.for_each(item_count, detail::emit_fragments{voxels, counts.view(), result.codes.view(),
+                                                   result.normals.view(), result.areas.view()});
+  result.grid = reader.grid;
+  result.report = detail::read_report(exec, counters);
+  return result;
+}
+
+namespace detail {
+
+struct sample_bounds {
+  array_view<const surface_fragment> samples;
+  WFPG_HD bounds3 operator()(std::size_t i) const {
+    const vec3 p = samples[i].position;
+    return is_usable(p) ? bounds3{p, p} : bounds3{};
+  }
+};
+
+/// Flags the samples that are used (1) and counts the others by reason.
+struct check_samples {
+  array_view<const surface_fragment> samples;
+  voxel_grid grid;
+  array_view<std::uint64_t> used;
+  std::uint32_t* counters;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const surface_fragment s = samples[i];
+    const float length = is_finite(s.normal) ? glm::length(s.normal) : 0.0f;
+    uvec3 voxel;
+    used[i] = 0;
+    if (!is_usable(s.position))
+      atomic_add(counters + counter_non_finite, 1);
+    else if (!grid.voxel_of(s.position, voxel))
+      atomic_add(counters + counter_out_of_range, 1);
+    else if (!is_finite(s.area) || s.area <= 0.0f || !(fabsf(length - 1.0f) < 1.0e-2f))
+      atomic_add(counters + counter_degenerate, 1);
+    else
+      used[i] = 1;
+  }
+};
+
+struct emit_samples {
+  array_view<const surface_fragment> samples;
+  voxel_grid grid;
+  array_view<const std::uint64_t> used_through;
+  array_view<morton_code> codes;
+  array_view<std::uint32_t> normals;
+  array_view<float> areas;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const std::uint64_t at = i ? used_through[i - 1] : 0;
+    if (used_through[i] == at) return;
+    uvec3 voxel;
+    grid.voxel_of(samples[i].position, voxel);
+    codes[at] = morton_encode(voxel);
+    normals[at] = pack_direction(glm::normalize(samples[i].normal));
+    areas[at] = samples[i].area;
+  }
+};
+
+}  // namespace detail
+
+/// Fragments from surface samples: pieces of geometry that is not triangles, or hit points of a renderer that
+/// cannot hand over its mesh. The cube is the one around `bounds`, or around the samples where `bounds` is
+/// empty. Samples outside, with bad coordinates, no unit normal or no positive area are skipped and counted.
+/// Throws as voxelize does.
+template <class Exec>
+voxel_fragments<Exec> fragments_from_samples(const Exec& exec, array_view<const surface_fragment> samples,
+                                             std::uint32_t resolution, const bounds3& bounds = {}) {
+  detail::require_resolution(resolution);
+  const std::size_t n = samples.size();
+  detail::require_fragment_count(n);
+  const ::thrust::counting_iterator<std::size_t> first(0);
+  const bounds3 box = bounds.empty() ? ::thrust::transform_reduce(exec.thrust(), first, first + n,
+                                                                  detail::sample_bounds{samples}, bounds3{},
+                                                                  detail::bounds_union())
+                                     : bounds;
+  const voxel_grid grid = detail::grid_around(box, resolution);
+
+  const buffer<std::uint32_t, Exec> counters(exec, std::vector<std::uint32_t>(detail::counters, 0));
+  buffer<std::uint64_t, Exec> used(exec, n);
+  exec.for_each(n, detail::check_samples{samples, grid, used.view(), counters.data()});
+  voxel_fragments<Exec> result(exec, detail::sum_through(exec, used));
+  exec.for_each(n, detail::emit_samples{samples, grid, used.view(), result.codes.view(),
+                                        result.normals.view(), result.areas.view()});
+  result.grid = grid;
+  result.report = detail::read_report(exec, counters);
+  return result;
+}
+
+}  // namespace wfpg
