@@ -1,0 +1,215 @@
+// Implementation of path_guider.hpp.
+#pragma once
+
+#include <wfpg/path_guider.hpp>
+
+namespace wfpg {
+namespace detail {
+
+/// Adds a wave's bins to its depth's sums.
+struct add_counts {
+  bins_view bins;
+  const std::uint32_t* unbinned;
+  std::uint32_t cells;
+  depth_statistics* sums;
+  WFPG_HD void operator()(std::size_t) const {
+    const std::uint32_t n = *bins.count;
+    sums->bins += n;
+    sums->rays += bins.offsets[n];
+    sums->unbinned += *unbinned;
+    sums->cones += std::uint64_t(n) * cells;
+  }
+};
+
+}  // namespace detail
+
+template <class Exec>
+const guider_options& path_guider<Exec>::checked(const guider_options& o) {
+  using detail::require;
+  detail::require_resolution(o.octree_resolution);
+  require(o.rays_per_bin >= 1, "rays_per_bin", o.rays_per_bin, "at least 1");
+  require(o.field_resolution >= 2 && o.field_resolution <= 128, "field_resolution", o.field_resolution,
+          "in [2, 128]");
+  require(o.min_field_resolution >= 2 && o.min_field_resolution <= 128, "min_field_resolution",
+          o.min_field_resolution, "in [2, 128]");
+  require(o.guide_fraction >= 0.0f && o.guide_fraction <= 1.0f, "guide_fraction", o.guide_fraction,
+          "in [0, 1]");
+  require(detail::is_finite(o.field.filter_alpha) && o.field.filter_alpha >= 0.0f, "field.filter_alpha",
+          o.field.filter_alpha, "finite, at least 0");
+  require(detail::is_finite(o.field.floor) && o.field.floor >= 0.0f, "field.floor", o.field.floor,
+          "finite, at least 0");
+  require(o.max_depth >= 1 && o.max_depth <= 1024, "max_depth", o.max_depth, "in [1, 1024]");
+  require(o.max_paths < 0xffffffffull, "max_paths", o.max_paths, "less than 2^32 - 1");
+  require(o.max_rays < 0xffffffffull, "max_rays", o.max_rays, "less than 2^32 - 1");
+  const guider_options full = with_capacities(o);
+  require(full.deposit_capacity < 0xffffffffull, "max_paths times max_depth, the deposits of a sample,",
+          full.deposit_capacity, "less than 2^32 - 1");
+  return o;
+}
+
+template <class Exec>
+guider_options path_guider<Exec>::with_capacities(guider_options o) {
+  if (o.max_rays == 0) o.max_rays = o.max_paths;
+  if (o.deposit_capacity == 0) o.deposit_capacity = o.max_paths * o.max_depth;
+  return o;
+}
+
+template <class Exec>
+path_guider<Exec>::path_guider(const Exec& exec, voxel_fragments<Exec> fragments,
+                               const guider_options& options)
+    : options_(with_capacities(checked(options))),
+      build_(fragments.report),
+      octree_(exec, fragments),
+      cache_(exec, octree_, fragments, options_.deposit_capacity),
+      working_memory_(std::make_unique<retaining_resource>(exec.resource())),
+      exec_(exec.with_resource(working_memory_.get())),
+      recorder_(exec_, options_.max_paths, options_.max_depth, options_.include_emission),
+      binner_(exec_, octree_.view(), {options_.min_bin_level, options_.rays_per_bin}, options_.max_rays),
+      counts_(exec_, options_.max_depth) {
+  octree_.release_build_data();
+  ::thrust::fill_n(exec_.thrust(), counts_.data(), counts_.size(), depth_statistics{});
+}
+
+template <class Exec>
+void path_guider<Exec>::begin_sample() {
+  ++samples_;
+  recorder_.clear(exec_);
+}
+
+template <class Exec>
+void path_guider<Exec>::end_sample() {
+  {
+    const auto timed = clock_.time(detail::stage::record);
+    recorder_.deposit(exec_, cache_.view());
+  }
+  const auto timed = clock_.time(detail::stage::cache);
+  cache_.update(exec_);
+}
+
+template <class Exec>
+std::uint32_t path_guider<Exec>::field_resolution(std::uint32_t depth) const {
+  const std::uint32_t least = detail::min(options_.min_field_resolution, options_.field_resolution);
+  return depth < 32 ? detail::max(options_.field_resolution >> depth, least) : least;
+}
+
+template <class Exec>
+detail::mixture_fraction path_guider<Exec>::fraction() const {
+  if (options_.guide_fraction > 0.0f) return {options_.guide_fraction, options_.guide_fraction, 0};
+  if (options_.mode == guiding_mode::plain) return {0.5f, 0.5f, 0};
+  return {0.7f, 0.5f, options_.rays_per_bin};
+}
+
+template <class Exec>
+template <class Surfaces, class Random>
+detail::bin_fields<Surfaces> path_guider<Exec>::bin_wave(const wave<Surfaces, Random>& w) {
+  const auto timed = clock_.time(detail::stage::bin);
+  const bins_view bins =
+      binner_.bin(exec_, w.ray_count, detail::wave_rays<Surfaces>{w.surfaces, options_.mode});
+  count_bins(w.depth, bins);
+  return {bins,
+          w.surfaces,
+          cache_.view(),
+          options_.field,
+          options_.mode,
+          field_resolution(w.depth),
+          wave_seed(w.depth)};
+}
+
+template <class Exec>
+void path_guider<Exec>::count_bins(std::uint32_t depth, const bins_view& bins) {
+  const std::uint32_t slot = detail::min(depth, options_.max_depth - 1);
+  const std::uint32_t size = field_resolution(depth);
+  exec_.for_each(1, detail::add_counts{bins, binner_.unbinned(), size * size, counts_.data() + slot});
+}
+
+template <class Exec>
+template <class Surfaces, class Random, class Caster, class Queries>
+void path_guider<Exec>::sample_directions(const wave<Surfaces, Random>& w, const Caster& caster,
+                                          array_view<sampled_direction> directions, const Queries& queries) {
+  static_assert(is_surfaces_v<Surfaces>,
+                "surfaces: needs wfpg::surface<Bsdf> operator()(std::uint32_t) const");
+  static_assert(is_bsdf_v<bsdf_of_t<Surfaces>>,
+                "the BSDF needs eval, pdf, sample, is_delta and transmits, all const");
+  static_assert(is_random_v<Random>, "random: needs vec2 operator()(std::uint32_t, std::uint32_t) const");
+  static_assert(is_ray_caster_v<Caster, Exec>,
+                "caster: needs ray_hit operator()(const ray&) const, or cast(exec, rays, hits) const");
+  detail::require(w.ray_count <= options_.max_rays, "ray_count", w.ray_count, "at most max_rays");
+  detail::require(directions.size() >= w.ray_count, "size of directions", directions.size(),
+                  "ray_count or more");
+  if constexpr (!std::is_same_v<Queries, no_queries>)
+    detail::require(queries.densities.size() >= w.ray_count, "size of densities", queries.densities.size(),
+                    "ray_count or more");
+
+  using serve_type = detail::serve_ray<Surfaces, Random, Queries>;
+  const serve_type serve{w.surfaces, w.random, queries, directions};
+  detail::serve_unbinned<serve_type> rest{serve, {}};
+  if (guided()) {
+    const auto fields = bin_wave(w);
+    rest.ray_keys = fields.bins.ray_keys;
+    const auto timed = clock_.time(detail::stage::fields);
+    const detail::transient_sink<serve_type> sink{fields.bins, serve, fraction(), fields.resolution};
+    detail::for_each_field(exec_, fields, caster, sink,
+                           4 * detail::distribution_words(fields.resolution) + 16,
+                           options_.caster_buffer_bytes);
+  }
+  const auto timed = clock_.time(detail::stage::unbinned);
+  exec_.for_each(w.ray_count, rest);
+}
+
+template <class Exec>
+template <class Surfaces, class Random, class Caster>
+guide_view path_guider<Exec>::prepare(const wave<Surfaces, Random>& w, const Caster& caster) {
+  static_assert(is_surfaces_v<Surfaces>,
+                "surfaces: needs wfpg::surface<Bsdf> operator()(std::uint32_t) const");
+  static_assert(is_ray_caster_v<Caster, Exec>,
+                "caster: needs ray_hit operator()(const ray&) const, or cast(exec, rays, hits) const");
+  detail::require(w.ray_count <= options_.max_rays, "ray_count", w.ray_count, "at most max_rays");
+  if (!guided()) return {};
+  const auto fields = bin_wave(w);
+  const auto timed = clock_.time(detail::stage::fields);
+  const std::size_t bins = read_element(exec_, fields.bins.count);
+  const std::size_t words = bins * detail::distribution_words(fields.resolution);
+  if (resident_fields_.size() < bins) resident_fields_ = buffer<resident_field, Exec>(exec_, bins);
+  if (resident_words_.size() < words) resident_words_ = buffer<std::uint32_t, Exec>(exec_, words);
+  if (field_of_ray_.size() < options_.max_rays)
+    field_of_ray_ = buffer<std::uint32_t, Exec>(exec_, options_.max_rays);
+  ::thrust::fill_n(exec_.thrust(), field_of_ray_.data(), w.ray_count, guide_view::no_field);
+  detail::for_each_field(exec_, fields, caster,
+                         detail::resident_sink{fields.bins, resident_words_.data(), resident_fields_.data(),
+                                               field_of_ray_.data(), fraction(), fields.resolution},
+                         0, options_.caster_buffer_bytes);
+  return {{field_of_ray_.data(), w.ray_count},
+          resident_fields_.data(),
+          resident_words_.data(),
+          fields.resolution};
+}
+
+template <class Exec>
+guider_statistics path_guider<Exec>::statistics() const {
+  guider_statistics result;
+  result.samples = samples_;
+  result.guided_samples = samples_ > options_.unguided_samples && !octree_.view().empty()
+                              ? samples_ - options_.unguided_samples
+                              : 0;
+  result.depths = counts_.to_host(exec_);
+  result.deposits = cache_.dropped(exec_);
+  result.dropped_vertices = recorder_.dropped(exec_);
+  result.build = build_;
+  result.seconds = clock_.report();
+  return result;
+}
+
+template <class Exec>
+memory_report path_guider<Exec>::memory() const {
+  const std::size_t resident = resident_words_.bytes() + resident_fields_.bytes() + field_of_ray_.bytes();
+  const std::size_t named = recorder_.bytes() + binner_.bytes() + resident + counts_.bytes();
+  return {{{"octree", octree_.bytes(), true},
+           {"cache", cache_.persistent_bytes(), true},
+           {"deposits", cache_.transient_bytes(), false},
+           {"paths", recorder_.bytes(), false},
+           {"binning", binner_.bytes(), false},
+           {"fields", resident, false},
+           {"scratch", working_memory_->bytes() - detail::min(named, working_memory_->bytes()), false}}};
+}
+
+}  // namespace wfpg

@@ -1,0 +1,123 @@
+// What happens to a field once it is made: the rays of its bin are served from scratch, or it is kept for one
+// depth.
+#pragma once
+
+#include <wfpg/guide_view.hpp>
+#include <wfpg/radiance_field.hpp>
+#include <wfpg/spatial_binner.hpp>
+#include <wfpg/wave.hpp>
+
+namespace wfpg::detail {
+
+/// The share of guided samples of a bin (DESIGN: more where a field fits its rays well).
+struct mixture_fraction {
+  float with_enough_rays;
+  float with_few_rays;
+  std::uint32_t enough;
+  WFPG_HD float operator()(std::uint32_t rays) const {
+    return rays >= enough ? with_enough_rays : with_few_rays;
+  }
+};
+
+/// Writes one ray's direction, and the density that was asked for.
+template <class Surfaces, class Random, class Queries>
+struct serve_ray {
+  Surfaces surfaces;
+  Random random;
+  Queries queries;
+  array_view<sampled_direction> directions;
+
+  WFPG_HD void operator()(std::uint32_t ray, const guide_mixture& mixture) const {
+    const auto s = surfaces(ray);
+    if (!s.active) {
+      directions[ray] = {};
+      answer(ray, 0.0f);
+      return;
+    }
+    directions[ray] = mixture.sample(s, random(ray, 0).x, random(ray, 1));
+    if constexpr (!std::is_same_v<Queries, no_queries>) {
+      const vec3 d = queries.query(ray);
+      answer(ray, d.x != 0.0f || d.y != 0.0f || d.z != 0.0f ? mixture.pdf(s, d) : 0.0f);
+    }
+  }
+
+ private:
+  WFPG_HD void answer(std::uint32_t ray, float density) const {
+    if constexpr (!std::is_same_v<Queries, no_queries>) queries.densities[ray] = density;
+  }
+};
+
+/// Rays without a bin: their BSDF alone.
+template <class Serve>
+struct serve_unbinned {
+  Serve serve;
+  array_view<const std::uint32_t> ray_keys;  // empty: no ray has a bin
+  WFPG_HD void operator()(std::size_t ray) const {
+    if (!ray_keys.empty() && ray_keys[ray] != 0xffffffffu) return;
+    serve(static_cast<std::uint32_t>(ray), guide_mixture{});
+  }
+};
+
+/// Fields in scratch memory, gone when their rays are served.
+template <class Serve>
+struct transient_sink {
+  bins_view bins;
+  Serve serve;
+  mixture_fraction fraction;
+  std::uint32_t resolution;
+
+  template <class Block>
+  WFPG_HD std::uint32_t* words(Block& block, std::size_t) const {
+    return block.template scratch<std::uint32_t>(distribution_words(resolution));
+  }
+  template <class Block>
+  WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field) const {
+    const guide_mixture mixture{field, fraction(bins.size(bin))};
+    const std::uint32_t begin = bins.begin(bin);
+    block.for_each(static_cast<int>(bins.size(bin)),
+                   [&](int i) { serve(bins.permutation[begin + static_cast<std::uint32_t>(i)], mixture); });
+  }
+};
+
+/// Fields in memory of their own, and for each ray which is its.
+struct resident_sink {
+  bins_view bins;
+  std::uint32_t* storage;
+  resident_field* fields;
+  std::uint32_t* field_of_ray;
+  mixture_fraction fraction;
+  std::uint32_t resolution;
+
+  template <class Block>
+  WFPG_HD std::uint32_t* words(Block&, std::size_t bin) const {
+    return storage + bin * distribution_words(resolution);
+  }
+  template <class Block>
+  WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field) const {
+    const std::uint32_t begin = bins.begin(bin);
+    block.for_each(static_cast<int>(bins.size(bin)), [&](int i) {
+      if (i == 0) fields[bin] = {field.normal(), fraction(bins.size(bin)), field.hemisphere()};
+      field_of_ray[bins.permutation[begin + static_cast<std::uint32_t>(i)]] = static_cast<std::uint32_t>(bin);
+    });
+  }
+};
+
+/// A wave's rays as the binner wants them. Delta surfaces are sampled alone and need no bin.
+template <class Surfaces>
+struct wave_rays {
+  Surfaces surfaces;
+  guiding_mode mode;
+  WFPG_HD ray_to_bin operator()(std::size_t i) const {
+    const auto s = surfaces(static_cast<std::uint32_t>(i));
+    ray_to_bin result;
+    result.active = s.active && !s.bsdf.is_delta();
+    if (!result.active) return result;
+    result.position = s.position;
+    if (mode == guiding_mode::oriented)
+      result.orientation = s.bsdf.transmits() ? static_cast<std::uint32_t>(orientation_transmits)
+                                              : dominant_axis(bin_fields<Surfaces>::facing_normal(s));
+    return result;
+  }
+};
+
+}  // namespace wfpg::detail

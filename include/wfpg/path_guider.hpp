@@ -1,0 +1,136 @@
+// The facade: what a wavefront path tracer needs to guide its paths, and with an exec/ header all it
+// includes. Paper, Algorithm 1. A sample, from the renderer's side:
+//
+//   guider.begin_sample();
+//   for (std::uint32_t depth = 0; depth < max_depth; ++depth) {
+//     trace(...);                                              // the renderer's; records vertices in
+//     guider.recorder() guider.sample_directions(wfpg::wave{depth, n, surfaces, random}, caster, directions);
+//     shade(...);                                              // the renderer's; records radiance
+//   }
+//   guider.end_sample();
+#pragma once
+
+#include <wfpg/buffer.hpp>
+#include <wfpg/detail/serve_rays.hpp>
+#include <wfpg/exec/policy.hpp>
+#include <wfpg/exitance_cache.hpp>
+#include <wfpg/guide_view.hpp>
+#include <wfpg/path_recorder.hpp>
+#include <wfpg/radiance_field.hpp>
+#include <wfpg/sparse_voxel_octree.hpp>
+#include <wfpg/spatial_binner.hpp>
+#include <wfpg/statistics.hpp>
+#include <wfpg/voxelizer.hpp>
+#include <wfpg/wave.hpp>
+
+#include <memory>
+
+namespace wfpg {
+
+/// What a guider can be told. Every field has a default; ranges are checked when a guider is made.
+struct guider_options {
+  std::uint32_t octree_resolution =
+      128;  ///< voxels along the scene's longest side; a power of two in [1, 4096]
+  guiding_mode mode = guiding_mode::oriented;
+  std::uint32_t min_bin_level = 3;  ///< l_min: no bin is larger than a node of this level (root 0)
+  std::uint32_t rays_per_bin = 64;  ///< c_ray: rays that make a node a bin, at least 1
+  std::uint32_t field_resolution =
+      32;  ///< cells along a field's side at depth 0, in [2, 128]; halves at each depth
+  std::uint32_t min_field_resolution = 16;  ///< down to this, in [2, 128]
+  field_options field;                      ///< filter and floor
+  float guide_fraction =
+      0.0f;  ///< share of guided samples, (0, 1]; 0: 0.5 in plain mode, 0.7 in oriented bins of c_ray rays
+  bool include_emission =
+      true;  ///< guide toward emitters themselves; false where next-event estimation finds them
+  std::uint32_t unguided_samples =
+      1;  ///< samples at the beginning that only record ("PT first", section 3.7)
+  std::uint64_t seed = 0;
+  std::size_t max_paths = 0;  ///< paths in flight that the recorder holds; 0: the renderer deposits by itself
+  std::uint32_t max_depth =
+      8;                     ///< vertices of a path that the recorder holds, and depths that statistics tell
+  std::size_t max_rays = 0;  ///< of a wave; 0: max_paths
+  std::size_t deposit_capacity = 0;  ///< deposits of a sample; 0: max_paths · max_depth
+  std::size_t caster_buffer_bytes = std::size_t(16) << 20;  ///< for the cones of a batch caster in flight
+};
+
+/// Guides the paths of a wavefront path tracer over one scene. Movable, not copyable; calls come from one
+/// thread at a time. A throw leaves it usable. After the first sample of the largest wave nothing is
+/// allocated from the policy.
+template <class Exec>
+class path_guider {
+ public:
+  static_assert(exec::is_execution_policy_v<Exec>,
+                "Exec needs resource, with_resource, thrust and warp_width");
+
+  /// A guider over triangles, read only here. Throws std::invalid_argument for options out of range,
+  /// out_of_memory.
+  path_guider(const Exec& exec, triangle_mesh_view mesh, const guider_options& options = {})
+      : path_guider(exec, voxelize(exec, mesh, checked(options).octree_resolution), options) {}
+
+  /// A guider over fragments: of geometry that is not triangles, or of hit points (fragments_from_samples).
+  path_guider(const Exec& exec, voxel_fragments<Exec> fragments, const guider_options& options = {});
+
+  /// Begins a sample: one wave of paths, or several. Forgets recorded paths that were not deposited.
+  void begin_sample();
+
+  /// Draws the next directions of a wave's rays, fields and all, in one call: directions[ray] for each ray.
+  /// `caster` is the host's ray caster, inline or batch. `queries`: directions whose densities the same
+  /// fields answer. Throws std::invalid_argument where the wave exceeds max_rays or an output is smaller than
+  /// the wave; what a caster throws.
+  template <class Surfaces, class Random, class Caster, class Queries = no_queries>
+  void sample_directions(const wave<Surfaces, Random>& w, const Caster& caster,
+                         array_view<sampled_direction> directions, const Queries& queries = {});
+
+  /// The same in two steps: makes the wave's fields resident and returns what the renderer's kernels sample
+  /// from. `w.random` is not read. Holds until the next call. Memory: 4 (F² + F) bytes a bin.
+  template <class Surfaces, class Random, class Caster>
+  guide_view prepare(const wave<Surfaces, Random>& w, const Caster& caster);
+
+  /// Deposits what was recorded and updates the cache.
+  void end_sample();
+
+  /// Where the renderer's kernels record their paths.
+  path_recorder_view recorder() const { return recorder_.view(); }
+  /// Where they deposit, and what they read, without it.
+  exitance_cache_view cache() const { return cache_.view(); }
+  const sparse_voxel_octree<Exec>& octree() const { return octree_; }
+  const guider_options& options() const { return options_; }
+  /// Whether the sample that has begun is guided, and how many cells its fields have at a depth.
+  bool guided() const { return samples_ > options_.unguided_samples && !octree_.view().empty(); }
+  std::uint32_t field_resolution(std::uint32_t depth) const;
+
+  /// Wait for the work before them.
+  guider_statistics statistics() const;
+  memory_report memory() const;
+
+ private:
+  static const guider_options& checked(const guider_options& options);
+  static guider_options with_capacities(guider_options options);
+
+  template <class Surfaces, class Random>
+  detail::bin_fields<Surfaces> bin_wave(const wave<Surfaces, Random>& w);
+  detail::mixture_fraction fraction() const;
+  void count_bins(std::uint32_t depth, const bins_view& bins);
+  std::uint64_t wave_seed(std::uint32_t depth) const {
+    return detail::hash(detail::hash(options_.seed, samples_), depth);
+  }
+
+  guider_options options_;
+  detail::stage_clock clock_;
+  build_report build_;
+  sparse_voxel_octree<Exec> octree_;
+  exitance_cache<Exec> cache_;
+  std::unique_ptr<retaining_resource> working_memory_;  // of everything below
+  Exec exec_;                                           // allocates there
+  path_recorder<Exec> recorder_;
+  spatial_binner<Exec> binner_;
+  buffer<depth_statistics, Exec> counts_;
+  buffer<std::uint32_t, Exec> resident_words_;
+  buffer<resident_field, Exec> resident_fields_;
+  buffer<std::uint32_t, Exec> field_of_ray_;
+  std::uint32_t samples_ = 0;
+};
+
+}  // namespace wfpg
+
+#include <wfpg/detail/path_guider_impl.hpp>

@@ -1,0 +1,281 @@
+// Incident radiance fields of spatial bins, made on the fly (paper, section 3.3 and section 4; thesis,
+// section 4.4.2): a ray of the bin is drawn as origin, each cell of an equal-area grid casts a jittered cone,
+// reads the exitance cache where it lands, and the filtered grid becomes a distribution. Fields live in
+// scratch while their bin's rays are served, or in memory that the caller gives; the work on cells does not
+// know which.
+//
+// Cost: F² cones and O(F²) a bin; 8 F² + 4 F bytes of scratch a block.
+#pragma once
+
+#include <wfpg/bsdf.hpp>
+#include <wfpg/buffer.hpp>
+#include <wfpg/exitance_cache.hpp>
+#include <wfpg/field_sampler.hpp>
+#include <wfpg/ray_caster.hpp>
+#include <wfpg/spatial_binner.hpp>
+#include <wfpg/types.hpp>
+
+namespace wfpg {
+
+/// How a field is made from what its cones found.
+struct field_options {
+  float filter_alpha = 0.8f;  ///< width of the Gaussian exp(-x²/alpha²), cells; 0: none (thesis, Eq. 5.1)
+  float floor = 1.0e-2f;  ///< epsilon added to each cell: times the field's mean, or as it is where absolute
+  bool absolute_floor = false;
+};
+
+/// Where a field's cones start, and what it covers.
+struct field_origin {
+  vec3 position{0.0f};      ///< world space, off the surface
+  vec3 normal{0.0f};        ///< shading normal on the outgoing side, unit length
+  bool cosine = false;      ///< cells carry the clamped cosine at `normal`
+  bool hemisphere = false;  ///< over the hemisphere above `normal`; else over the sphere
+  std::uint64_t seed = 0;   ///< of the jitter inside cells
+};
+
+namespace detail {
+
+/// One field's cells: which direction they look, what they see.
+struct field_cells {
+  field_origin origin;
+  directional_field domain;  // maps directions; its distribution is not there yet
+  std::uint32_t resolution;
+
+  WFPG_HD field_cells(const field_origin& from, std::uint32_t size) : origin(from), resolution(size) {
+    const grid_distribution grid(nullptr, nullptr, size);
+    domain = from.hemisphere ? directional_field(grid, from.normal) : directional_field(grid);
+  }
+
+  WFPG_HD ray cone(std::uint32_t cell) const {
+    const vec2 jitter = unit_vec2(hash(origin.seed, cell));
+    const vec2 corner(static_cast<float>(cell % resolution), static_cast<float>(cell / resolution));
+    ray result;
+    result.origin = origin.position;
+    result.direction = domain.direction((corner + jitter) / static_cast<float>(resolution));
+    return result;
+  }
+
+  WFPG_HD float value(const exitance_cache_view& cache, const ray& cone, const ray_hit& hit) const {
+    const float radiance = hit.is_hit() ? read(cache, cone, hit.distance) : hit.radiance;
+    const float cosine = origin.cosine ? max(glm::dot(cone.direction, origin.normal), 0.0f) : 1.0f;
+    const float value = radiance * cosine;
+    return is_finite(value) ? clamp(value, 0.0f, 1.0e30f) : 0.0f;
+  }
+
+ private:
+  WFPG_HD float read(const exitance_cache_view& cache, const ray& cone, float distance) const {
+    const node_id leaf = cache.octree().nearest_leaf(cone.origin + distance * cone.direction);
+    if (leaf == invalid_node) return 0.0f;
+    const float solid_angle = domain.cell_solid_angle();
+    return cache.read(cache.octree().node_for_cone(leaf, distance, solid_angle), -cone.direction);
+  }
+};
+
+/// A normalised Gaussian of a few taps on either side.
+struct gaussian_taps {
+  static constexpr int radius = 2;
+  float weights[radius + 1];
+
+  WFPG_HD explicit gaussian_taps(float alpha) {
+    float sum = 0.0f;
+    for (int i = 0; i <= radius; ++i) {
+      const float x = static_cast<float>(i) / alpha;
+      weights[i] = expf(-x * x);
+      sum += i ? 2.0f * weights[i] : weights[i];
+    }
+    for (float& w : weights) w /= sum;
+  }
+};
+
+/// The cell that a tap reads: across the sphere's edges as the sphere goes on, mirrored at the hemisphere's
+/// horizon.
+WFPG_HD inline int tap_index(int x, int y, int resolution, bool hemisphere) {
+  if (hemisphere) {
+    x = x < 0 ? -1 - x : (x >= resolution ? 2 * resolution - 1 - x : x);
+    y = y < 0 ? -1 - y : (y >= resolution ? 2 * resolution - 1 - y : y);
+  } else {
+    wrap_octahedral(x, y, resolution);
+  }
+  return y * resolution + x;
+}
+
+/// One direction of the separable filter: `step` (1,0) or (0,1).
+template <class Block, class Get, class Set>
+WFPG_HD void filter_along(const Block& block, int resolution, bool hemisphere, const gaussian_taps& taps,
+                          bool along_x, const Get& get, const Set& set) {
+  block.for_each(resolution * resolution, [&](int i) {
+    const int x = i % resolution, y = i / resolution;
+    const int position = along_x ? x : y;
+    const int stride = along_x ? 1 : resolution;
+    const bool inside = position >= gaussian_taps::radius && position < resolution - gaussian_taps::radius;
+    float sum = taps.weights[0] * get(i);
+    for (int d = 1; d <= gaussian_taps::radius; ++d) {
+      const int before = inside ? i - d * stride
+                                : tap_index(along_x ? x - d : x, along_x ? y : y - d, resolution, hemisphere);
+      const int after = inside ? i + d * stride
+                               : tap_index(along_x ? x + d : x, along_x ? y : y + d, resolution, hemisphere);
+      sum += taps.weights[d] * (get(before) + get(after));
+    }
+    set(i, sum);
+  });
+  block.sync();
+}
+
+/// Filters, floors and scans F² cell values in place; `scratch` holds F² floats.
+template <class Block>
+WFPG_HD grid_distribution finish_field(const Block& block, const cell_words& cells, float* scratch,
+                                       int resolution, bool hemisphere, const field_options& options) {
+  if (options.filter_alpha > 0.0f && resolution > gaussian_taps::radius) {
+    const gaussian_taps taps(options.filter_alpha);
+    filter_along(
+        block, resolution, hemisphere, taps, true, [&](int i) { return cells.get(i); },
+        [&](int i, float value) { scratch[i] = value; });
+    filter_along(
+        block, resolution, hemisphere, taps, false, [&](int i) { return scratch[i]; },
+        [&](int i, float value) { cells.set(i, value); });
+  }
+  float floor = options.floor;
+  if (!options.absolute_floor) {
+    const int n = resolution * resolution;
+    floor *= block.sum(n, [&](int i) { return cells.get(i); }) / static_cast<float>(n);
+  }
+  return build_distribution(block, cells, resolution, floor);
+}
+
+/// The fields of a wave's bins: a functor of blocks that fills each bin's field and hands it to `sink`.
+///   Surfaces  (std::uint32_t ray) -> surface<Bsdf>
+///   Hits      (std::size_t bin, std::uint32_t cell, const ray&) -> ray_hit
+///   Sink      words(block&, bin) -> std::uint32_t*, room for distribution_words(resolution);
+///             finish(block&, bin, directional_field), by the whole block
+template <class Surfaces>
+struct bin_fields {
+  bins_view bins;
+  Surfaces surfaces;
+  exitance_cache_view cache;
+  field_options options;
+  guiding_mode mode;
+  std::uint32_t resolution;
+  std::uint64_t seed;  // of the sample and depth
+
+  /// The bin's origin: one of its rays, drawn anew in each sample, off its surface on the outgoing side.
+  WFPG_HD field_origin origin(std::size_t bin) const {
+    const std::uint64_t bits = hash(seed, bins.key(bin));
+    const std::uint64_t rank = (bits >> 32) * bins.size(bin) >> 32;
+    const auto s = surfaces(bins.permutation[bins.begin(bin) + rank]);
+    const vec3 off =
+        glm::dot(s.geometric_normal, s.outgoing) >= 0.0f ? s.geometric_normal : -s.geometric_normal;
+    const float magnitude = max(fabsf(s.position.x), max(fabsf(s.position.y), fabsf(s.position.z)));
+    field_origin result;
+    result.position =
+        s.position + off * max(1.0e-4f * magnitude, 1.0e-3f * cache.octree().grid().voxel_size());
+    result.normal = facing_normal(s);
+    result.hemisphere = mode == guiding_mode::oriented && bins.orientation(bin) < orientation_transmits;
+    result.cosine = result.hemisphere;
+    result.seed = hash(bits, 1);
+    return result;
+  }
+
+  template <class S>
+  WFPG_HD static vec3 facing_normal(const S& s) {
+    return glm::dot(s.normal, s.outgoing) >= 0.0f ? s.normal : -s.normal;
+  }
+
+  template <class Block, class Hits, class Sink>
+  WFPG_HD void make(Block& block, std::size_t bin, const Hits& hits, const Sink& sink) const {
+    const auto size = static_cast<int>(resolution);
+    const field_cells cells(origin(bin), resolution);
+    const cell_words words{sink.words(block, bin)};
+    float* const scratch = block.template scratch<float>(std::size_t(resolution) * resolution);
+    block.for_each(size * size, [&](int i) {
+      const auto cell = static_cast<std::uint32_t>(i);
+      const ray cone = cells.cone(cell);
+      words.set(i, cells.value(cache, cone, hits(bin, cell, cone)));
+    });
+    block.sync();
+    const bool hemisphere = cells.origin.hemisphere;
+    const grid_distribution grid = finish_field(block, words, scratch, size, hemisphere, options);
+    sink.finish(block, bin,
+                hemisphere ? directional_field(grid, cells.origin.normal) : directional_field(grid));
+  }
+};
+
+/// Hits of a caster called in place.
+template <class Caster>
+struct inline_hits {
+  Caster caster;
+  WFPG_HD ray_hit operator()(std::size_t, std::uint32_t, const ray& cone) const { return caster(cone); }
+};
+
+/// Hits that a batch caster wrote for bins from `first_bin`.
+struct stored_hits {
+  array_view<const ray_hit> hits;
+  std::size_t first_bin;
+  std::uint32_t cells;
+  WFPG_HD ray_hit operator()(std::size_t bin, std::uint32_t cell, const ray&) const {
+    return hits[(bin - first_bin) * cells + cell];
+  }
+};
+
+template <class Surfaces, class Hits, class Sink>
+struct make_fields {
+  bin_fields<Surfaces> fields;
+  Hits hits;
+  Sink sink;
+  std::size_t first_bin;
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t i) const {
+    fields.make(block, first_bin + i, hits, sink);
+  }
+};
+
+template <class Surfaces>
+struct write_cones {
+  bin_fields<Surfaces> fields;
+  array_view<ray> cones;
+  std::size_t first_bin;
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t i) const {
+    const field_cells cells(fields.origin(first_bin + i), fields.resolution);
+    const std::uint32_t n = fields.resolution * fields.resolution;
+    block.for_each(static_cast<int>(n), [&](int cell) {
+      cones[i * n + static_cast<std::size_t>(cell)] = cells.cone(static_cast<std::uint32_t>(cell));
+    });
+  }
+};
+
+/// Scratch that make_fields needs beside what its sink takes.
+inline std::size_t field_scratch_bytes(std::uint32_t resolution) {
+  return sizeof(float) * resolution * resolution + 16;
+}
+
+/// Makes the field of every bin and hands it to the sink. An inline caster is called in place; a batch caster
+/// gets the cones of as many bins at once as `buffer_bytes` holds, at least one, and the host reads the
+/// number of bins.
+template <class Exec, class Surfaces, class Caster, class Sink>
+void for_each_field(const Exec& exec, const bin_fields<Surfaces>& fields, const Caster& caster,
+                    const Sink& sink, std::size_t sink_scratch, std::size_t buffer_bytes) {
+  const std::size_t scratch = field_scratch_bytes(fields.resolution) + sink_scratch;
+  if constexpr (is_inline_caster_v<Caster>) {
+    const exec::device_count bins{fields.bins.count, fields.bins.permutation.size()};
+    exec.for_each_block(bins, scratch,
+                        make_fields<Surfaces, inline_hits<Caster>, Sink>{fields, {caster}, sink, 0});
+  } else {
+    const std::uint32_t cells = fields.resolution * fields.resolution;
+    const std::size_t bins = read_element(exec, fields.bins.count);
+    const std::size_t at_once = max<std::size_t>(1, buffer_bytes / (cells * (sizeof(ray) + sizeof(ray_hit))));
+    const buffer<ray, Exec> cones(exec, cells * min(bins, at_once));
+    const buffer<ray_hit, Exec> hits(exec, cones.size());
+    for (std::size_t first = 0; first < bins; first += at_once) {
+      const std::size_t n = min(bins - first, at_once);
+      exec.for_each_block(n, 0, write_cones<Surfaces>{fields, cones.view(), first});
+      caster.cast(exec, array_view<const ray>(cones.data(), n * cells),
+                  array_view<ray_hit>(hits.data(), n * cells));
+      exec.for_each_block(
+          n, scratch,
+          make_fields<Surfaces, stored_hits, Sink>{fields, {hits.view(), first, cells}, sink, first});
+    }
+  }
+}
+
+}  // namespace detail
+}  // namespace wfpg

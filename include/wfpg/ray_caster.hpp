@@ -1,0 +1,118 @@
+// What a host's ray caster looks like to the library, in either of two forms:
+//
+//   inline   ray_hit operator()(const ray&) const;                 called inside a kernel, by value
+//   batch    void cast(const Exec&, array_view<const ray>, array_view<ray_hit>) const;
+//                                                                   launched by the host over a span
+//
+// A hit carries the distance or, on a miss, the environment's radiance; where next-event estimation samples
+// the environment, a caster answers 0 for it so that guiding looks for what that does not find. Hits may be
+// ignored outside (t_min, t_max).
+#pragma once
+
+#include <wfpg/sparse_voxel_octree.hpp>
+#include <wfpg/types.hpp>
+
+#include <type_traits>
+#include <utility>
+
+namespace wfpg {
+namespace detail {
+
+template <class C, class = void>
+struct is_inline_caster : std::false_type {};
+template <class C>
+struct is_inline_caster<C,
+                        std::void_t<decltype(ray_hit(std::declval<const C&>()(std::declval<const ray&>())))>>
+    : std::true_type {};
+
+template <class C, class Exec, class = void>
+struct is_batch_caster : std::false_type {};
+template <class C, class Exec>
+struct is_batch_caster<C, Exec,
+                       std::void_t<decltype(std::declval<const C&>().cast(
+                           std::declval<const Exec&>(), array_view<const ray>(), array_view<ray_hit>()))>>
+    : std::true_type {};
+
+}  // namespace detail
+
+/// True where C can be called inside a kernel for one ray.
+template <class C>
+inline constexpr bool is_inline_caster_v = detail::is_inline_caster<C>::value;
+
+/// True where C casts a span of rays when the host asks.
+template <class C, class Exec>
+inline constexpr bool is_batch_caster_v = detail::is_batch_caster<C, Exec>::value;
+
+/// True where C is a ray caster in one of its forms.
+template <class C, class Exec>
+inline constexpr bool is_ray_caster_v = is_inline_caster_v<C> || is_batch_caster_v<C, Exec>;
+
+/// An inline caster that needs no host: marches through the octree, over empty nodes in one step, to the
+/// first leaf (the paper's alternative in section 3.3, after Laine & Karras 2010). Leaves nearer than
+/// `clearance` voxels are passed, since a ray starts in a voxel of its own surface. Cost: O(nodes passed ·
+/// depth).
+class svo_ray_caster {
+ public:
+  /// `environment`: radiance where a ray leaves the octree, luminance, W/(m² sr).
+  WFPG_HD explicit svo_ray_caster(const sparse_voxel_octree_view& tree, float environment = 0.0f,
+                                  float clearance = 2.0f)
+      : tree_(tree), environment_(environment), clearance_(clearance) {}
+
+  WFPG_HD ray_hit operator()(const ray& r) const {
+    const vec3 origin = tree_.grid().to_grid(r.origin);
+    const float per_unit = static_cast<float>(tree_.grid().resolution) / tree_.grid().side;
+    const auto extent = static_cast<float>(tree_.grid().resolution);
+    const float start = detail::max(r.t_min * per_unit, clearance_);
+    float t = detail::max(start, distance_to_exit(origin, r.direction, extent, true));
+    const float end = detail::min(distance_to_exit(origin, r.direction, extent, false), r.t_max * per_unit);
+    constexpr float nudge = 1.0e-3f;  // voxels: past the face, whatever the rounding
+    for (t += nudge; t < end && !tree_.empty(); t += nudge) {
+      const vec3 p = origin + t * r.direction;
+      const vec3 cell = glm::clamp(p, vec3(0.0f), vec3(extent - 0.5f));
+      vec3 lower;
+      float size;
+      if (deepest_cell(uvec3(cell), lower, size)) return {t / per_unit, 0.0f};
+      t = detail::max(distance_to_exit(origin - lower, r.direction, size, false), t);
+    }
+    return {-1.0f, environment_};
+  }
+
+ private:
+  /// Where a ray leaves the cube [0, size]³, or enters it; in units of the cube.
+  WFPG_HD static float distance_to_exit(vec3 origin, vec3 direction, float size, bool enter) {
+    float result = enter ? 0.0f : 3.0e38f;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (fabsf(direction[axis]) < 1.0e-12f) {
+        const bool beside = origin[axis] < 0.0f || origin[axis] > size;
+        if (beside) return enter ? 3.0e38f : 0.0f;
+        continue;
+      }
+      const bool positive = direction[axis] > 0.0f;
+      const float face = positive != enter ? size : 0.0f;
+      const float t = (face - origin[axis]) / direction[axis];
+      result = enter ? detail::max(result, t) : detail::min(result, t);
+    }
+    return result;
+  }
+
+  /// The leaf, or else the largest empty node, that holds a voxel: its lower corner and size in voxels.
+  WFPG_HD bool deepest_cell(uvec3 voxel, vec3& lower, float& size) const {
+    node_id node = 0;
+    std::uint32_t level = tree_.depth();
+    while (level > 0 && node != invalid_node) {
+      --level;
+      const std::uint32_t octant =
+          (voxel.x >> level & 1u) | (voxel.y >> level & 1u) << 1 | (voxel.z >> level & 1u) << 2;
+      node = tree_.child(node, octant);
+    }
+    size = static_cast<float>(1u << level);
+    lower = vec3((voxel >> level) << level);
+    return node != invalid_node;
+  }
+
+  sparse_voxel_octree_view tree_;
+  float environment_;
+  float clearance_;
+};
+
+}  // namespace wfpg

@@ -1,0 +1,99 @@
+// What a guider tells of itself: bins, cones, dropped deposits, time by stage, memory by part.
+#pragma once
+
+#include <wfpg/exitance_cache.hpp>
+#include <wfpg/voxelizer.hpp>
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace wfpg {
+
+/// Sums over the guided samples so far, of one depth.
+struct depth_statistics {
+  std::uint64_t bins = 0;
+  std::uint64_t rays = 0;      ///< in bins
+  std::uint64_t unbinned = 0;  ///< active rays outside every voxel, sampled by their BSDF alone
+  std::uint64_t cones = 0;
+};
+
+/// Time of one stage, in all.
+struct stage_time {
+  const char* name;
+  double seconds;
+};
+
+struct guider_statistics {
+  std::uint32_t samples = 0;         ///< begun
+  std::uint32_t guided_samples = 0;  ///< of them, with fields
+  std::vector<depth_statistics> depths;
+  dropped_deposits deposits;           ///< that the cache dropped
+  std::uint32_t dropped_vertices = 0;  ///< recorder calls with a path, depth or order out of range
+  build_report build;
+  std::vector<stage_time> seconds;
+};
+
+/// Bytes of one part of a guider.
+struct memory_part {
+  const char* name;
+  std::size_t bytes;
+  bool persistent;  ///< kept across samples for guiding; else needed while a sample is in flight
+};
+
+struct memory_report {
+  std::vector<memory_part> parts;
+
+  std::size_t persistent() const { return sum(true); }
+  std::size_t transient() const { return sum(false); }
+
+ private:
+  std::size_t sum(bool persistent) const {
+    std::size_t bytes = 0;
+    for (const memory_part& part : parts)
+      if (part.persistent == persistent) bytes += part.bytes;
+    return bytes;
+  }
+};
+
+namespace detail {
+
+/// The stages that a guider times.
+enum class stage : std::uint32_t { bin, fields, unbinned, record, cache, count };
+
+/// Accumulates the host's time by stage.
+class stage_clock {
+ public:
+  /// Adds the time until it goes out of scope to a stage.
+  class scope {
+   public:
+    scope(stage_clock& clock, stage s) : clock_(clock), stage_(s), begin_(now()) {}
+    scope(const scope&) = delete;
+    ~scope() { clock_.seconds_[static_cast<int>(stage_)] += now() - begin_; }
+
+   private:
+    stage_clock& clock_;
+    stage stage_;
+    double begin_;
+  };
+
+  scope time(stage s) { return scope(*this, s); }
+
+  std::vector<stage_time> report() const {
+    static constexpr const char* names[] = {"bin", "fields", "unbinned", "record", "cache"};
+    std::vector<stage_time> result;
+    for (int i = 0; i < static_cast<int>(stage::count); ++i) result.push_back({names[i], seconds_[i]});
+    return result;
+  }
+
+ private:
+  static double now() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  }
+
+  double seconds_[static_cast<int>(stage::count)] = {};
+};
+
+}  // namespace detail
+}  // namespace wfpg
