@@ -82,7 +82,8 @@ class path_guider {
                          array_view<sampled_direction> directions, const Queries& queries = {});
 
   /// The same in two steps: makes the wave's fields resident and returns what the renderer's kernels sample
-  /// from. `w.random` is not read. Holds until the next call. Memory: 4 (F² + F) bytes a bin.
+  /// from. `w.random` is not read. Holds until the next call. Memory: 4 (F² + F) bytes a bin of
+  /// the wave with most bins, and half more.
   template <class Surfaces, class Random, class Caster>
   guide_view prepare(const wave<Surfaces, Random>& w, const Caster& caster);
 
@@ -111,6 +112,12 @@ class path_guider {
   detail::bin_fields<Surfaces> bin_wave(const wave<Surfaces, Random>& w);
   detail::mixture_fraction fraction() const;
   void count_bins(std::uint32_t depth, const bins_view& bins);
+  /// New memory, whose old content is lost.
+  template <class T>
+  void reallocate(buffer<T, Exec>& memory, std::size_t size) {
+    memory = {};
+    memory = buffer<T, Exec>(exec_, size);
+  }
   std::uint64_t wave_seed(std::uint32_t depth) const {
     return detail::hash(detail::hash(options_.seed, samples_), depth);
   }

@@ -19,7 +19,9 @@ namespace wfpg {
 
 /// How a field is made from what its cones found.
 struct field_options {
-  float filter_alpha = 0.8f;  ///< width of the Gaussian exp(-x²/alpha²), cells; 0: none (thesis, Eq. 5.1)
+  /// Width of the Gaussian exp(-x²/alpha²), in cells of a field over the sphere; 0: none (thesis, Eq. 5.1).
+  /// Over a hemisphere cells are narrower, and it spans √2 as many: the same angle.
+  float filter_alpha = 0.8f;
   float floor = 1.0e-2f;  ///< epsilon added to each cell: times the field's mean, or as it is where absolute
   bool absolute_floor = false;
 };
@@ -126,7 +128,7 @@ template <class Block>
 WFPG_HD grid_distribution finish_field(const Block& block, const cell_words& cells, float* scratch,
                                        int resolution, bool hemisphere, const field_options& options) {
   if (options.filter_alpha > 0.0f && resolution > gaussian_taps::radius) {
-    const gaussian_taps taps(options.filter_alpha);
+    const gaussian_taps taps(hemisphere ? options.filter_alpha * 1.41421356f : options.filter_alpha);
     filter_along(
         block, resolution, hemisphere, taps, true, [&](int i) { return cells.get(i); },
         [&](int i, float value) { scratch[i] = value; });
@@ -262,8 +264,10 @@ void for_each_field(const Exec& exec, const bin_fields<Surfaces>& fields, const 
   } else {
     const std::uint32_t cells = fields.resolution * fields.resolution;
     const std::size_t bins = read_element(exec, fields.bins.count);
-    const std::size_t at_once = max<std::size_t>(1, buffer_bytes / (cells * (sizeof(ray) + sizeof(ray_hit))));
-    const buffer<ray, Exec> cones(exec, cells * min(bins, at_once));
+    const std::size_t rays = fields.bins.permutation.size();  // and no more bins: the same memory every time
+    const std::size_t at_once =
+        min(rays, max<std::size_t>(1, buffer_bytes / (cells * (sizeof(ray) + sizeof(ray_hit)))));
+    const buffer<ray, Exec> cones(exec, cells * at_once);
     const buffer<ray_hit, Exec> hits(exec, cones.size());
     for (std::size_t first = 0; first < bins; first += at_once) {
       const std::size_t n = min(bins - first, at_once);

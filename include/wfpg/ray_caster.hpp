@@ -65,8 +65,7 @@ class svo_ray_caster {
     const float start = detail::max(r.t_min * per_unit, clearance_);
     float t = detail::max(start, distance_to_exit(origin, r.direction, extent, true));
     const float end = detail::min(distance_to_exit(origin, r.direction, extent, false), r.t_max * per_unit);
-    constexpr float nudge = 1.0e-3f;  // voxels: past the face, whatever the rounding
-    for (t += nudge; t < end && !tree_.empty(); t += nudge) {
+    for (t = past_face(t); t < end && !tree_.empty(); t = past_face(t)) {
       const vec3 p = origin + t * r.direction;
       const vec3 cell = glm::clamp(p, vec3(0.0f), vec3(extent - 0.5f));
       vec3 lower;
@@ -78,6 +77,9 @@ class svo_ray_caster {
   }
 
  private:
+  /// A little further along a ray, in voxels: past a face whatever the rounding, however far its origin is.
+  WFPG_HD static float past_face(float t) { return t + detail::max(1.0e-3f, t * 0x1p-22f); }
+
   /// Where a ray leaves the cube [0, size]³, or enters it; in units of the cube.
   WFPG_HD static float distance_to_exit(vec3 origin, vec3 direction, float size, bool enter) {
     float result = enter ? 0.0f : 3.0e38f;

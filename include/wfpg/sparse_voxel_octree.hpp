@@ -48,14 +48,12 @@ class sparse_voxel_octree_view {
   WFPG_HD node_id parent(node_id node) const { return parents_[node]; }
   /// The children of an inner node are `child_count` nodes from `first_child`, in the order of their octants.
   WFPG_HD node_id first_child(node_id node) const { return first_children_[node]; }
-  WFPG_HD std::uint32_t child_count(node_id node) const {
-    return static_cast<std::uint32_t>(detail::popcount(child_masks_[node]));
-  }
+  WFPG_HD std::uint32_t child_count(node_id node) const { return detail::popcount8(child_masks_[node]); }
   /// The child of an inner node in an octant (bit 0: upper x, 1: y, 2: z), or invalid_node.
   WFPG_HD node_id child(node_id node, std::uint32_t octant) const {
     const std::uint32_t mask = child_masks_[node];
     if (!(mask >> octant & 1u)) return invalid_node;
-    return first_children_[node] + static_cast<node_id>(detail::popcount(mask & ((1u << octant) - 1u)));
+    return first_children_[node] + detail::popcount8(mask & ((1u << octant) - 1u));
   }
 
   /// The ancestor at a level no deeper than the node's own; the node itself at its own level. O(levels).

@@ -337,7 +337,7 @@ struct emit_samples {
   WFPG_HD void operator()(std::size_t i) const {
     const std::uint64_t at = i ? used_through[i - 1] : 0;
     if (used_through[i] == at) return;
-    uvec3 voxel;
+    uvec3 voxel(0u);
     grid.voxel_of(samples[i].position, voxel);
     codes[at] = morton_encode(voxel);
     normals[at] = pack_direction(glm::normalize(samples[i].normal));

@@ -29,12 +29,12 @@ WFPG_HD inline bool is_finite(vec3 v) {
   return is_finite(v.x) && is_finite(v.y) && is_finite(v.z);
 }
 
-WFPG_HD inline int popcount(std::uint32_t bits) {
-#if defined(__CUDA_ARCH__)
-  return __popc(bits);
-#else
-  return __builtin_popcount(bits);
-#endif
+/// Bits set among the lower 8; without the processor's own instruction, which portable builds call a function
+/// for.
+WFPG_HD constexpr std::uint32_t popcount8(std::uint32_t bits) {
+  bits = bits - (bits >> 1 & 0x55u);
+  bits = (bits & 0x33u) + (bits >> 2 & 0x33u);
+  return (bits + (bits >> 4)) & 0x0fu;
 }
 
 template <class T>

@@ -169,10 +169,10 @@ guide_view path_guider<Exec>::prepare(const wave<Surfaces, Random>& w, const Cas
   const auto timed = clock_.time(detail::stage::fields);
   const std::size_t bins = read_element(exec_, fields.bins.count);
   const std::size_t words = bins * detail::distribution_words(fields.resolution);
-  if (resident_fields_.size() < bins) resident_fields_ = buffer<resident_field, Exec>(exec_, bins);
-  if (resident_words_.size() < words) resident_words_ = buffer<std::uint32_t, Exec>(exec_, words);
-  if (field_of_ray_.size() < options_.max_rays)
-    field_of_ray_ = buffer<std::uint32_t, Exec>(exec_, options_.max_rays);
+  // Half more than is needed: the next waves have a few bins more or less, and are not to allocate.
+  if (resident_fields_.size() < bins) reallocate(resident_fields_, bins + bins / 2);
+  if (resident_words_.size() < words) reallocate(resident_words_, words + words / 2);
+  if (field_of_ray_.size() < options_.max_rays) reallocate(field_of_ray_, options_.max_rays);
   ::thrust::fill_n(exec_.thrust(), field_of_ray_.data(), w.ray_count, guide_view::no_field);
   detail::for_each_field(exec_, fields, caster,
                          detail::resident_sink{fields.bins, resident_words_.data(), resident_fields_.data(),
@@ -202,12 +202,13 @@ guider_statistics path_guider<Exec>::statistics() const {
 template <class Exec>
 memory_report path_guider<Exec>::memory() const {
   const std::size_t resident = resident_words_.bytes() + resident_fields_.bytes() + field_of_ray_.bytes();
-  const std::size_t named = recorder_.bytes() + binner_.bytes() + resident + counts_.bytes();
+  const std::size_t binning = binner_.bytes() + counts_.bytes();
+  const std::size_t named = recorder_.bytes() + binning + resident;
   return {{{"octree", octree_.bytes(), true},
            {"cache", cache_.persistent_bytes(), true},
            {"deposits", cache_.transient_bytes(), false},
            {"paths", recorder_.bytes(), false},
-           {"binning", binner_.bytes(), false},
+           {"binning", binning, false},
            {"fields", resident, false},
            {"scratch", working_memory_->bytes() - detail::min(named, working_memory_->bytes()), false}}};
 }

@@ -20,6 +20,15 @@ struct grid_triangle {
   WFPG_HD grid_triangle relative_to(vec3 p) const { return {a - p, b - p, c - p}; }
 };
 
+/// The cross product with exact products: floats cancel in it, and would tilt the normal of a long sliver by
+/// more than the tolerance is worth at its ends.
+WFPG_HD inline vec3 accurate_cross(vec3 a, vec3 b) {
+  const auto difference = [](float p, float q, float r, float s) {
+    return static_cast<float>(static_cast<double>(p) * q - static_cast<double>(r) * s);
+  };
+  return {difference(a.y, b.z, a.z, b.y), difference(a.z, b.x, a.x, b.z), difference(a.x, b.y, a.y, b.x)};
+}
+
 /// Whether the triangle's projections on `axis` stay apart from those of the cube of half side `half`.
 WFPG_HD inline bool separates(vec3 axis, const grid_triangle& t, float half) {
   const float a = glm::dot(axis, t.a);
@@ -35,7 +44,7 @@ WFPG_HD inline bool overlaps_cube(const grid_triangle& t, float half) {
   const vec3 edges[3] = {t.b - t.a, t.c - t.b, t.a - t.c};
   if (separates({1, 0, 0}, t, half) || separates({0, 1, 0}, t, half) || separates({0, 0, 1}, t, half))
     return false;
-  if (separates(glm::cross(edges[0], edges[1]), t, half)) return false;
+  if (separates(accurate_cross(edges[0], edges[1]), t, half)) return false;
   for (const vec3& e : edges)
     if (separates({0, -e.z, e.y}, t, half) || separates({e.z, 0, -e.x}, t, half) ||
         separates({-e.y, e.x, 0}, t, half))

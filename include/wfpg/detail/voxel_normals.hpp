@@ -10,7 +10,7 @@
 
 namespace wfpg::detail {
 
-/// A unit direction in 16 bits, at most 0.8 degrees away; the axes are exact.
+/// A unit direction in 16 bits, at most 1 degree away; the axes are exact.
 WFPG_HD inline std::uint16_t pack_voxel_normal(vec3 n) {
   const vec2 uv = sphere_to_square(n);
   const auto x = static_cast<std::uint32_t>(uv.x * 254.0f + 0.5f);
