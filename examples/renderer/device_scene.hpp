@@ -1,0 +1,210 @@
+// The scene as kernels read it: a trivially copyable view, the owner of its arrays on a policy, and the
+// surface that a ray hits.
+#pragma once
+
+#include "materials.hpp"
+
+#include <wfpg/buffer.hpp>
+#include <wfpg/error.hpp>
+
+namespace render {
+
+inline constexpr std::uint32_t no_triangle = 0xffffffffu;
+
+/// A ray's first triangle, with barycentric weights u and v of its second and third corner.
+struct triangle_hit {
+  std::uint32_t triangle = no_triangle;
+  float u = 0.0f;
+  float v = 0.0f;
+
+  WFPG_HD bool is_hit() const { return triangle != no_triangle; }
+};
+
+/// Texels of a texture inside scene_view::texels.
+struct texture_span {
+  std::uint32_t first, width, height;
+};
+
+/// A point of the scene's geometry, before it is known from where it is seen.
+struct surface_point {
+  vec3 position{0.0f};
+  vec3 geometric_normal{0.0f};  ///< unit length, counter-clockwise side
+  vec3 normal{0.0f};            ///< shading normal, unit length, on the same side
+  vec2 uv{0.0f};
+  float offset = 0.0f;  ///< how far off the surface a ray has to begin, scene units
+  std::uint32_t material = 0;
+};
+
+/// What a path needs of a hit: how the surface scatters, how it emits, where rays may begin.
+struct hit_surface {
+  wfpg::surface<bsdf> surface;
+  vec3 emission{0.0f};  ///< toward the viewer, W/(m² sr)
+  float offset = 0.0f;  ///< as in surface_point
+};
+
+/// A point from which a ray toward `direction` does not hit the surface it leaves.
+WFPG_HD inline vec3 leave_surface(vec3 position, vec3 geometric_normal, vec3 direction, float offset) {
+  return position + (glm::dot(geometric_normal, direction) < 0.0f ? -offset : offset) * geometric_normal;
+}
+
+/// See scene.hpp for what the arrays hold.
+struct scene_view {
+  wfpg::array_view<const vec3> positions, normals;
+  wfpg::array_view<const vec2> uvs;
+  wfpg::array_view<const uvec3> triangles;
+  wfpg::array_view<const std::uint32_t> triangle_materials;
+  wfpg::array_view<const material> materials;
+  wfpg::array_view<const texture_span> textures;
+  wfpg::array_view<const vec3> texels;
+  vec3 environment{0.0f};
+
+  WFPG_HD const material& material_of(std::uint32_t triangle) const {
+    return materials[triangle_materials[triangle]];
+  }
+
+  WFPG_HD surface_point point(triangle_hit hit) const {
+    const uvec3 corners = triangles[hit.triangle];
+    const vec3 a = positions[corners.x], b = positions[corners.y], c = positions[corners.z];
+    const float w = 1.0f - hit.u - hit.v;
+    surface_point point;
+    point.material = triangle_materials[hit.triangle];
+    point.position = w * a + hit.u * b + hit.v * c;
+    // Rounding errs relative to the corners' coordinates, not to the point's own.
+    const vec3 largest = glm::max(glm::abs(a), glm::max(glm::abs(b), glm::abs(c)));
+    point.offset = 1e-5f * glm::max(largest.x, glm::max(largest.y, largest.z));
+    point.geometric_normal = glm::normalize(glm::cross(b - a, c - a));
+    point.normal = point.geometric_normal;
+    if (!normals.empty()) {
+      const vec3 n = w * normals[corners.x] + hit.u * normals[corners.y] + hit.v * normals[corners.z];
+      const float length = glm::length(n);
+      if (length > 1e-6f) point.normal = n / length;
+      if (glm::dot(point.normal, point.geometric_normal) < 0.0f) point.normal = -point.normal;
+    }
+    if (!uvs.empty()) point.uv = w * uvs[corners.x] + hit.u * uvs[corners.y] + hit.v * uvs[corners.z];
+    return point;
+  }
+
+  /// Texture `index` at `uv`, v down; bilinear and repeated.
+  WFPG_HD vec3 texel(std::int32_t index, vec2 uv) const {
+    const texture_span span = textures[index];
+    const float x = (uv.x - std::floor(uv.x)) * static_cast<float>(span.width) - 0.5f;
+    const float y = (uv.y - std::floor(uv.y)) * static_cast<float>(span.height) - 0.5f;
+    const float fx = x - std::floor(x), fy = y - std::floor(y);
+    // x and y are at least -1/2: one width more keeps the index from being negative.
+    const auto column = static_cast<std::uint32_t>(std::floor(x) + static_cast<float>(span.width));
+    const auto row = static_cast<std::uint32_t>(std::floor(y) + static_cast<float>(span.height));
+    const auto at = [&](std::uint32_t c, std::uint32_t r) {
+      return texels[span.first + (r % span.height) * span.width + c % span.width];
+    };
+    return (1.0f - fy) * ((1.0f - fx) * at(column, row) + fx * at(column + 1, row)) +
+           fy * ((1.0f - fx) * at(column, row + 1) + fx * at(column + 1, row + 1));
+  }
+
+  /// The surface at `hit` seen along `outgoing` (unit length, away from the surface).
+  WFPG_HD hit_surface surface(triangle_hit hit, vec3 outgoing) const {
+    const surface_point at = point(hit);
+    const material& scatters = materials[at.material];
+    const bool front = glm::dot(at.geometric_normal, outgoing) >= 0.0f;
+    const float side = front ? 1.0f : -1.0f;
+    // Where an interpolated normal faces away from the viewer it is bent until it just does not.
+    vec3 facing = side * at.normal;
+    const float seen = glm::dot(facing, outgoing);
+    if (seen < least_cosine) facing = glm::normalize(facing + (least_cosine - seen) * outgoing);
+
+    hit_surface result;
+    result.offset = at.offset;
+    if (front) result.emission = scatters.emission;
+    bsdf& f = result.surface.bsdf;
+    f.kind = scatters.kind;
+    // A dielectric has to know inside from outside; the others reflect on either side.
+    const float outward = scatters.kind == material_kind::dielectric ? side : 1.0f;
+    f.normal = outward * facing;
+    f.geometric_normal = outward * side * at.geometric_normal;
+    f.colour = scatters.base_color;
+    if (scatters.base_texture >= 0) f.colour *= texel(scatters.base_texture, at.uv);
+    f.alpha = glm::max(least_alpha, scatters.alpha);
+    f.ior = scatters.ior;
+    result.surface.position = at.position;
+    result.surface.geometric_normal = f.geometric_normal;
+    result.surface.normal = f.normal;
+    result.surface.outgoing = outgoing;
+    return result;
+  }
+
+ private:
+  static constexpr float least_cosine = 1e-2f;
+  static constexpr float least_alpha = 1e-3f;
+};
+
+/// The arrays of a scene in the memory of a policy.
+template <class Exec>
+class device_scene {
+ public:
+  /// Throws std::invalid_argument where an index of the scene points nowhere.
+  device_scene(const Exec& exec, const scene& host)
+      : positions_(exec, host.positions),
+        normals_(exec, host.normals),
+        uvs_(exec, host.uvs),
+        triangles_(exec, host.triangles),
+        triangle_materials_(exec, host.triangle_materials),
+        materials_(exec, host.materials),
+        environment_(host.environment) {
+    check(host);
+    std::vector<texture_span> spans;
+    std::vector<vec3> texels;
+    for (const texture& t : host.textures) {
+      spans.push_back({static_cast<std::uint32_t>(texels.size()), static_cast<std::uint32_t>(t.width),
+                       static_cast<std::uint32_t>(t.height)});
+      texels.insert(texels.end(), t.texels.begin(), t.texels.end());
+    }
+    textures_ = wfpg::buffer<texture_span, Exec>(exec, spans);
+    texels_ = wfpg::buffer<vec3, Exec>(exec, texels);
+  }
+
+  scene_view view() const {
+    scene_view v;
+    v.positions = positions_.view();
+    v.normals = normals_.view();
+    v.uvs = uvs_.view();
+    v.triangles = triangles_.view();
+    v.triangle_materials = triangle_materials_.view();
+    v.materials = materials_.view();
+    v.textures = textures_.view();
+    v.texels = texels_.view();
+    v.environment = environment_;
+    return v;
+  }
+
+ private:
+  static void check(const scene& host) {
+    using wfpg::detail::require;
+    const std::size_t vertices = host.positions.size();
+    require(host.normals.empty() || host.normals.size() == vertices, "scene.normals.size()",
+            host.normals.size(), "0 or the number of positions");
+    require(host.uvs.empty() || host.uvs.size() == vertices, "scene.uvs.size()", host.uvs.size(),
+            "0 or the number of positions");
+    require(host.triangle_materials.size() == host.triangles.size(), "scene.triangle_materials.size()",
+            host.triangle_materials.size(), "the number of triangles");
+    for (const uvec3& t : host.triangles)
+      require(t.x < vertices && t.y < vertices && t.z < vertices, "a corner of scene.triangles",
+              glm::max(t.x, glm::max(t.y, t.z)), "below the number of positions");
+    for (const std::uint32_t m : host.triangle_materials)
+      require(m < host.materials.size(), "an element of scene.triangle_materials", m,
+              "below the number of materials");
+    const auto textures = static_cast<std::int32_t>(host.textures.size());
+    for (const material& m : host.materials)
+      require(m.base_texture < textures, "material.base_texture", m.base_texture,
+              "below the number of textures");
+  }
+
+  wfpg::buffer<vec3, Exec> positions_, normals_;
+  wfpg::buffer<vec2, Exec> uvs_;
+  wfpg::buffer<uvec3, Exec> triangles_;
+  wfpg::buffer<std::uint32_t, Exec> triangle_materials_;
+  wfpg::buffer<material, Exec> materials_;
+  wfpg::buffer<texture_span, Exec> textures_;
+  wfpg::buffer<vec3, Exec> texels_;
+  vec3 environment_;
+};
+
+}  // namespace render

@@ -1,0 +1,42 @@
+// What a guider says of itself, put into a render_report.
+#pragma once
+
+#include "render.hpp"
+
+#include <wfpg/path_guider.hpp>
+
+#include <algorithm>
+#include <string>
+
+namespace render {
+
+/// `segments`: rays that paths were extended by in all samples.
+template <class Exec>
+void report_guider(const wfpg::path_guider<Exec>& guider, std::uint64_t segments, render_report& report) {
+  const wfpg::memory_report memory = guider.memory();
+  report.persistent_bytes = memory.persistent();
+  report.transient_bytes = memory.transient();
+  for (const wfpg::memory_part& part : memory.parts) report.memory.emplace_back(part.name, part.bytes);
+
+  const wfpg::sparse_voxel_octree<Exec>& octree = guider.octree();
+  report.octree.resolution = octree.resolution();
+  report.octree.nodes = octree.node_count();
+  report.octree.leaves = octree.leaf_count();
+  if (octree.node_count() > 0)
+    report.octree.bytes_per_node =
+        static_cast<double>(memory.persistent()) / static_cast<double>(octree.node_count());
+
+  const wfpg::guider_statistics statistics = guider.statistics();
+  const double samples = std::max(1.0, static_cast<double>(statistics.guided_samples));
+  double cones = 0.0;
+  for (const wfpg::depth_statistics& depth : statistics.depths) {
+    cones += static_cast<double>(depth.cones);
+    const double bins = static_cast<double>(depth.bins);
+    report.bins.push_back({bins / samples, bins > 0.0 ? static_cast<double>(depth.rays) / bins : 0.0});
+  }
+  if (segments > 0) report.cones_per_segment = cones / static_cast<double>(segments);
+  for (const auto& [stage, seconds] : statistics.seconds)
+    report.seconds.emplace_back("guide " + std::string(stage), seconds);
+}
+
+}  // namespace render

@@ -1,0 +1,144 @@
+// OpenEXR through the C++ library, PNG through stb_image_write; errors of both become std::runtime_error with
+// the path in front.
+#include "image_io.hpp"
+
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
+#include <ImfOutputFile.h>
+#include <stb_image_write.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <stdexcept>
+
+namespace render {
+namespace {
+
+static_assert(sizeof(vec3) == 3 * sizeof(float), "pixels are handed to OpenEXR as three packed floats");
+
+constexpr const char* channel_names[3] = {"R", "G", "B"};
+
+/// Beyond this many pixels a header is taken for damaged rather than obeyed.
+constexpr std::int64_t max_pixels = std::int64_t(1) << 28;
+
+void require_consistent(const image& picture) {
+  const bool positive = picture.width > 0 && picture.height > 0;
+  if (!positive || picture.pixels.size() != std::size_t(picture.width) * std::size_t(picture.height))
+    throw std::runtime_error("the picture is empty or its size does not match its pixels");
+}
+
+void require_channels(const Imf::ChannelList& channels) {
+  for (const char* name : channel_names) {
+    const Imf::Channel* channel = channels.findChannel(name);
+    if (!channel) throw std::runtime_error(std::string("has no channel ") + name);
+    if (channel->type != Imf::HALF && channel->type != Imf::FLOAT)
+      throw std::runtime_error(std::string("channel ") + name + " is neither half nor float");
+    if (channel->xSampling != 1 || channel->ySampling != 1)
+      throw std::runtime_error(std::string("channel ") + name + " is subsampled");
+  }
+}
+
+image sized_for(const Imath::Box2i& window) {
+  const std::int64_t width = std::int64_t(window.max.x) - window.min.x + 1;
+  const std::int64_t height = std::int64_t(window.max.y) - window.min.y + 1;
+  if (width <= 0 || height <= 0 || width > max_pixels || height > max_pixels / width)
+    throw std::runtime_error("unusable size " + std::to_string(width) + " x " + std::to_string(height));
+  return make_image(int(width), int(height));
+}
+
+/// Three interleaved float channels; `window` is where the first pixel lies.
+Imf::FrameBuffer frame_buffer(float* first, const Imath::Box2i& window) {
+  Imf::FrameBuffer buffer;
+  for (int c = 0; c < 3; ++c)
+    buffer.insert(channel_names[c],
+                  Imf::Slice::Make(Imf::FLOAT, first + c, window, sizeof(vec3),
+                                   sizeof(vec3) * std::size_t(window.max.x - window.min.x + 1)));
+  return buffer;
+}
+
+std::runtime_error with_path(const std::string& path, const std::exception& reason) {
+  return std::runtime_error(path + ": " + reason.what());
+}
+
+}  // namespace
+
+image make_image(int width, int height) {
+  if (width <= 0 || height <= 0)
+    throw std::invalid_argument("a picture of " + std::to_string(width) + " x " + std::to_string(height) +
+                                " pixels, expected both positive");
+  return {width, height, std::vector<vec3>(std::size_t(width) * std::size_t(height), vec3(0.0f))};
+}
+
+image read_exr(const std::string& path) try {
+  Imf::InputFile file(path.c_str());
+  require_channels(file.header().channels());
+  const Imath::Box2i window = file.header().dataWindow();
+  image picture = sized_for(window);
+  file.setFrameBuffer(frame_buffer(&picture.pixels[0].x, window));
+  file.readPixels(window.min.y, window.max.y);
+  return picture;
+} catch (const std::exception& reason) {
+  throw with_path(path, reason);
+}
+
+void write_exr(const std::string& path, const image& picture) try {
+  require_consistent(picture);
+  Imf::Header header(picture.width, picture.height);
+  for (const char* name : channel_names) header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+  const Imath::Box2i window = header.dataWindow();
+  // The frame buffer's type has no const; an output file only reads from it.
+  float* first = const_cast<float*>(&picture.pixels[0].x);
+  Imf::OutputFile file(path.c_str(), header);
+  file.setFrameBuffer(frame_buffer(first, window));
+  file.writePixels(picture.height);
+} catch (const std::exception& reason) {
+  throw with_path(path, reason);
+}
+
+void write_png(const std::string& path, const image& picture, float exposure) try {
+  require_consistent(picture);
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(picture.pixels.size() * 3);
+  for (const vec3& pixel : picture.pixels)
+    for (int c = 0; c < 3; ++c) {
+      const float value = pixel[c] * exposure;
+      const float clamped = value > 0.0f ? std::min(value, 1.0f) : 0.0f;  // NaN is not above 0
+      bytes.push_back(static_cast<std::uint8_t>(linear_to_srgb(clamped) * 255.0f + 0.5f));
+    }
+  if (!stbi_write_png(path.c_str(), picture.width, picture.height, 3, bytes.data(), 3 * picture.width))
+    throw std::runtime_error("cannot be written");
+} catch (const std::exception& reason) {
+  throw with_path(path, reason);
+}
+
+image side_by_side(const std::vector<image>& pictures, int gap) {
+  int width = 0, height = 0;
+  for (const image& picture : pictures) {
+    width += picture.width + (width > 0 ? gap : 0);
+    height = std::max(height, picture.height);
+  }
+  image row = make_image(width, height);
+  std::fill(row.pixels.begin(), row.pixels.end(), vec3(1.0f));
+  int left = 0;
+  for (const image& picture : pictures) {
+    for (int y = 0; y < picture.height; ++y) {
+      const auto source = picture.pixels.begin() + std::ptrdiff_t(y) * picture.width;
+      std::copy(source, source + picture.width, row.pixels.begin() + std::ptrdiff_t(y) * width + left);
+    }
+    left += picture.width + gap;
+  }
+  return row;
+}
+
+float srgb_to_linear(float encoded) {
+  return encoded <= 0.04045f ? encoded / 12.92f : std::pow((encoded + 0.055f) / 1.055f, 2.4f);
+}
+
+float linear_to_srgb(float linear) {
+  return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1.0f / 2.4f) - 0.055f;
+}
+
+}  // namespace render

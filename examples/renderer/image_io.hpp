@@ -1,0 +1,39 @@
+// Pictures in memory and in files: OpenEXR in and out, PNG out.
+#pragma once
+
+#include "scene.hpp"
+
+#include <string>
+#include <vector>
+
+namespace render {
+
+/// Linear RGB (Rec. 709 primaries), row by row; row 0 is the top.
+struct image {
+  int width = 0;
+  int height = 0;
+  std::vector<vec3> pixels;
+};
+
+/// A black picture. Throws std::invalid_argument unless both sides are positive.
+image make_image(int width, int height);
+
+/// The R, G and B channels, half or float, of a single-part OpenEXR file; other channels are ignored.
+/// Throws std::runtime_error that names the path and the reason.
+image read_exr(const std::string& path);
+
+/// Writes R, G and B as 32-bit float. Throws std::runtime_error that names the path and the reason.
+void write_exr(const std::string& path, const image& picture);
+
+/// Writes 8-bit sRGB: values times `exposure`, clamped to [0, 1], through the sRGB curve. NaN becomes black.
+/// Throws std::runtime_error that names the path and the reason.
+void write_png(const std::string& path, const image& picture, float exposure = 1.0f);
+
+/// Pictures from left to right with `gap` >= 0 white columns between them; lower ones are filled up in white.
+image side_by_side(const std::vector<image>& pictures, int gap);
+
+/// The radiance that an sRGB-encoded value in [0, 1] stands for (IEC 61966-2-1), and back.
+float srgb_to_linear(float encoded);
+float linear_to_srgb(float linear);
+
+}  // namespace render

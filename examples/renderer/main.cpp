@@ -1,0 +1,165 @@
+// wfpg-render: renders a scene with or without guiding. Exit code 0, or 2 with a message on failure.
+#include "builtin_scenes.hpp"
+#include "gltf_loader.hpp"
+#include "progress_bar.hpp"
+#include "render.hpp"
+#include "stats_json.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <iostream>
+#include <map>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace {
+
+constexpr int failure = 2;
+
+struct arguments {
+  std::string scene, size, output, png, stats, reference;
+  render::render_options options;
+};
+
+// CLI11's own checked transformer accepts the numbers behind the names too; names are all that is documented.
+template <class T>
+CLI::Option* add_choice(CLI::App& app, const std::string& name, T& value,
+                        const std::map<std::string, T>& choices, const std::string& help) {
+  std::vector<std::string> names;
+  for (const auto& choice : choices) names.push_back(choice.first);
+  return app
+      .add_option_function<std::string>(
+          name, [&value, choices](const std::string& chosen) { value = choices.at(chosen); }, help)
+      ->check(CLI::IsMember(names))
+      ->type_name("NAME");
+}
+
+void add_method_options(CLI::App& app, render::render_options& options) {
+  using render::device;
+  using render::guiding;
+  using render::sampling_method;
+  using combine = wfpg::sample_combination;
+  add_choice<sampling_method>(app, "--method", options.method,
+                              {{"pt", sampling_method::pt}, {"wfpg", sampling_method::wfpg}},
+                              "path tracing, or guided by wfpg (default)");
+  add_choice<guiding>(app, "--guiding", options.mode,
+                      {{"oriented", guiding::oriented}, {"plain", guiding::plain}},
+                      "bins by position and normal (default), or by position alone");
+  add_choice<device>(app, "--device", options.where,
+                     {{"cpu", device::cpu}, {"omp", device::omp}, {"seq", device::seq}},
+                     "TBB (default), OpenMP, or one thread");
+  add_choice<bool>(app, "--nee", options.nee, {{"on", true}, {"off", false}},
+                   "next-event estimation toward area lights (default: on)");
+  add_choice<combine>(app, "--combine", options.combine,
+                      {{"pt-first", combine::pt_first},
+                       {"constant", combine::constant},
+                       {"linear", combine::linear},
+                       {"quadratic", combine::quadratic},
+                       {"one-two", combine::one_two},
+                       {"discard-first", combine::discard_first}},
+                      "how samples add up (default: pt-first)");
+}
+
+void add_budget_options(CLI::App& app, arguments& given) {
+  render::render_options& options = given.options;
+  CLI::Option* const spp =
+      app.add_option("--spp", options.spp, "samples a pixel (default: 64)")->check(CLI::Range(1, 1 << 30));
+  app.add_option("--seconds", options.seconds, "render for so long instead")
+      ->check(CLI::PositiveNumber)
+      ->excludes(spp);
+  app.add_option("--size", given.size, "picture, WIDTHxHEIGHT (default: the scene's)");
+  app.add_option("--max-depth", options.max_depth, "segments of a path (default: the scene's)")
+      ->check(CLI::Range(1, 1 << 30));
+  app.add_option("--seed", options.seed, "of the random numbers (default: 0)");
+}
+
+void add_guider_options(CLI::App& app, render::render_options& options) {
+  app.add_option("--octree-resolution", options.octree_resolution,
+                 "voxels a side, a power of two (default: 128)");
+  app.add_option("--field-resolution", options.field_resolution,
+                 "cells a side of the first field (default: 32)");
+  app.add_option("--rays-per-bin", options.rays_per_bin, "rays that a bin should have (default: 64)");
+  app.add_option("--min-bin-level", options.min_bin_level, "octree level of the largest bins (default: 3)");
+  app.add_option("--guide-fraction", options.guide_fraction,
+                 "samples drawn from fields (default: the mode's)")
+      ->check(CLI::Range(0.0, 1.0));
+}
+
+void add_file_options(CLI::App& app, arguments& given) {
+  app.add_option("SCENE", given.scene,
+                 "a .glb or .gltf file, or one of: " + CLI::detail::join(render::builtin_scene_names(), ", "))
+      ->required();
+  app.add_option("-o,--output", given.output, "picture, OpenEXR");
+  app.add_option("--png", given.png, "picture, sRGB PNG");
+  app.add_option("--stats", given.stats, "what it cost, JSON");
+  app.add_option("--reference", given.reference, "picture to print the error against, OpenEXR");
+}
+
+void parse_size(const std::string& text, render::render_options& options) {
+  char end = 0;
+  if (std::sscanf(text.c_str(), "%5dx%5d%c", &options.width, &options.height, &end) != 2 ||
+      options.width <= 0 || options.height <= 0)
+    throw std::invalid_argument("--size is " + text + ", expected WIDTHxHEIGHT, such as 640x360");
+}
+
+render::scene load_scene(const std::string& name) {
+  if (render::is_builtin_scene(name)) return render::make_builtin_scene(name);
+  const std::size_t dot = name.rfind('.');
+  const std::string extension = dot == std::string::npos ? "" : name.substr(dot);
+  if (extension == ".glb" || extension == ".gltf") return render::load_gltf(name);
+  throw std::invalid_argument("SCENE is " + name + ", expected a .glb or .gltf file or one of " +
+                              CLI::detail::join(render::builtin_scene_names(), ", "));
+}
+
+void print_error(const render::image_error& error) {
+  std::printf("mse %.6e  relmse %.6e  relmse trimmed %.6e  mse reinhard %.6e\n", error.mse, error.relmse,
+              error.relmse_trimmed, error.mse_reinhard);
+}
+
+void run(arguments& given) {
+  if (!given.size.empty()) parse_size(given.size, given.options);
+  const render::scene scene = load_scene(given.scene);
+  for (const std::string& warning : scene.warnings) std::cerr << "wfpg-render: warning: " << warning << '\n';
+  // Read before rendering, so that a wrong path costs no time.
+  std::optional<render::image> reference;
+  if (!given.reference.empty()) reference = render::read_exr(given.reference);
+
+  render::progress_bar bar;
+  const render::render_result result =
+      render::render(scene, given.options, [&bar](const render::render_progress& p) { bar.show(p); });
+  bar.finish();
+  if (!given.output.empty()) render::write_exr(given.output, result.picture);
+  if (!given.png.empty()) render::write_png(given.png, result.picture);
+  std::optional<render::image_error> error;
+  if (reference) error = render::compare(result.picture, *reference);
+  if (error) print_error(*error);
+  if (!given.stats.empty()) render::write_stats(given.stats, result.report, error);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  arguments given;
+  CLI::App app{"Renders a scene by wavefront path tracing, with or without path guiding."};
+  add_file_options(app, given);
+  add_method_options(app, given.options);
+  add_budget_options(app, given);
+  add_guider_options(app, given.options);
+  try {
+    app.parse(argc, argv);
+    if (given.output.empty() && given.png.empty() && given.stats.empty() && given.reference.empty())
+      throw CLI::RequiredError("one of -o, --png, --stats, --reference");
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : failure;
+  }
+  try {
+    run(given);
+  } catch (const std::exception& error) {
+    std::cerr << "wfpg-render: " << error.what() << '\n';
+    return failure;
+  }
+  return 0;
+}

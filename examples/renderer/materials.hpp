@@ -1,0 +1,146 @@
+// The BSDF of the renderer: one tagged, trivially copyable type, so that a kernel needs no virtual call.
+// Directions as in <wfpg/bsdf.hpp>: world space, unit length, away from the surface.
+#pragma once
+
+#include "microfacet.hpp"
+#include "scene.hpp"
+
+#include <wfpg/bsdf.hpp>
+
+#include <type_traits>
+
+namespace render {
+
+/// How one point scatters. Reflecting kinds do so on the side that both normals face; a dielectric's normals
+/// face outward. Directions that the two normals put on different sides carry nothing: no light leaks through
+/// a surface because its shading normal leans.
+struct bsdf {
+  vec3 normal{0.0f, 0.0f, 1.0f};  ///< shading normal, unit length
+  vec3 geometric_normal{0.0f, 0.0f, 1.0f};
+  vec3 colour{0.8f};  ///< material::base_color at this point
+  float alpha = 0.1f;
+  float ior = 1.5f;
+  material_kind kind = material_kind::lambert;
+
+  WFPG_HD bool is_delta() const { return kind == material_kind::mirror || kind == material_kind::dielectric; }
+  WFPG_HD bool transmits() const { return kind == material_kind::dielectric; }
+
+  /// f |cos| per channel, per steradian; 0 for delta lobes.
+  WFPG_HD vec3 eval_rgb(vec3 outgoing, vec3 incident) const {
+    if (is_delta() || !reflects(outgoing, incident)) return vec3(0.0f);
+    const frame local(normal);
+    const vec3 wo = local.to_local(outgoing);
+    const vec3 wi = local.to_local(incident);
+    if (kind == material_kind::lambert) return colour * (wi.z / pi);
+    const vec3 h = glm::normalize(wo + wi);
+    const float facets = ggx{alpha}.eval(wo, wi, h);
+    if (kind == material_kind::conductor) return fresnel_schlick(colour, glm::dot(wo, h)) * facets;
+    const float below = (1.0f - fresnel_dielectric(wo.z, ior)) * (1.0f - fresnel_dielectric(wi.z, ior));
+    return vec3(fresnel_dielectric(glm::dot(wo, h), ior) * facets) + colour * (below * wi.z / pi);
+  }
+  WFPG_HD float eval(vec3 outgoing, vec3 incident) const {
+    return wfpg::luminance(eval_rgb(outgoing, incident));
+  }
+
+  /// Density of sample(), per steradian; 0 for delta lobes.
+  WFPG_HD float pdf(vec3 outgoing, vec3 incident) const {
+    if (is_delta() || is_black() || !reflects(outgoing, incident)) return 0.0f;
+    const frame local(normal);
+    const vec3 wo = local.to_local(outgoing);
+    const vec3 wi = local.to_local(incident);
+    const float diffuse = wi.z / pi;
+    if (kind == material_kind::lambert) return diffuse;
+    const float facets = ggx{alpha}.pdf(wo, glm::normalize(wo + wi));
+    if (kind == material_kind::conductor) return facets;
+    const float coat = coat_probability(wo.z);
+    return coat * facets + (1.0f - coat) * diffuse;
+  }
+
+  WFPG_HD wfpg::bsdf_sample sample(vec3 outgoing, vec2 u) const {
+    if (is_black()) return {};
+    if (kind == material_kind::dielectric) return sample_dielectric(outgoing, u.x);
+    if (kind == material_kind::mirror) {
+      const vec3 incident = mirrored(outgoing, normal);
+      return {incident, reflects(outgoing, incident) ? 1.0f : 0.0f};
+    }
+    const frame local(normal);
+    const vec3 wo = local.to_local(outgoing);
+    if (wo.z <= 0.0f) return {};
+    const vec3 wi = kind == material_kind::lambert ? cosine_hemisphere(u) : sample_coat(wo, u);
+    const vec3 incident = glm::normalize(local.to_world(wi));
+    return {incident, pdf(outgoing, incident)};
+  }
+
+  /// Value over probability of the delta lobe that joins two directions, per channel.
+  WFPG_HD vec3 delta_weight_rgb(vec3 outgoing, vec3 incident) const {
+    if (kind == material_kind::mirror) return colour;
+    const float above = glm::dot(outgoing, normal);
+    if (above * glm::dot(incident, normal) > 0.0f) return vec3(1.0f);
+    // Radiance is squeezed into a smaller solid angle where the index is larger.
+    const float eta = relative_ior(above);
+    return colour / (eta * eta);
+  }
+
+  /// What part of the light goes on, roughly and per sample of this BSDF: for Russian roulette.
+  /// Does not see how radiance changes with the index of refraction, which paths that leave again get back.
+  WFPG_HD float reflectance(vec3 outgoing, vec3 incident) const {
+    if (is_delta()) return wfpg::luminance(colour);
+    const float density = pdf(outgoing, incident);
+    return density > 0.0f ? eval(outgoing, incident) / density : 0.0f;
+  }
+
+ private:
+  WFPG_HD bool is_black() const {
+    const bool needs_colour = kind == material_kind::lambert || kind == material_kind::mirror;
+    return needs_colour && !(wfpg::luminance(colour) > 0.0f);
+  }
+
+  WFPG_HD bool reflects(vec3 outgoing, vec3 incident) const {
+    return glm::dot(outgoing, normal) > 0.0f && glm::dot(outgoing, geometric_normal) > 0.0f &&
+           glm::dot(incident, normal) > 0.0f && glm::dot(incident, geometric_normal) > 0.0f;
+  }
+
+  WFPG_HD static vec3 mirrored(vec3 w, vec3 about) { return 2.0f * glm::dot(w, about) * about - w; }
+
+  WFPG_HD float relative_ior(float outgoing_cosine) const {
+    return outgoing_cosine > 0.0f ? ior : 1.0f / ior;
+  }
+
+  // How often a plastic's sample comes from its coat: as the two reflect, but neither is ever left out.
+  WFPG_HD float coat_probability(float cosine) const {
+    const float base = wfpg::luminance(colour);
+    if (!(base > 0.0f)) return 1.0f;
+    const float coat = fresnel_dielectric(cosine, ior);
+    return glm::min(0.9f, glm::max(0.1f, coat / (coat + (1.0f - coat) * base)));
+  }
+
+  // Of the conductor, and of the plastic with its base.
+  WFPG_HD vec3 sample_coat(vec3 wo, vec2 u) const {
+    if (kind == material_kind::plastic) {
+      const float coat = coat_probability(wo.z);
+      if (u.x >= coat)
+        return cosine_hemisphere({glm::min(0x1.fffffep-1f, (u.x - coat) / (1.0f - coat)), u.y});
+      u.x = glm::min(0x1.fffffep-1f, u.x / coat);
+    }
+    return mirrored(wo, ggx{alpha}.sample(wo, u));
+  }
+
+  WFPG_HD wfpg::bsdf_sample sample_dielectric(vec3 outgoing, float u) const {
+    const float above = glm::dot(outgoing, normal);
+    const vec3 facing = above < 0.0f ? -normal : normal;
+    const float cosine = std::abs(above);
+    const float eta = relative_ior(above);
+    const float reflected = fresnel_dielectric(cosine, eta);
+    const bool reflect = u < reflected;
+    const float beyond = std::sqrt(glm::max(0.0f, 1.0f - (1.0f - cosine * cosine) / (eta * eta)));
+    const vec3 incident = glm::normalize(reflect ? mirrored(outgoing, facing)
+                                                 : (cosine / eta - beyond) * facing - outgoing / eta);
+    const bool same_side = glm::dot(outgoing, geometric_normal) * glm::dot(incident, geometric_normal) > 0.0f;
+    if (same_side != reflect) return {};
+    return {incident, reflect ? reflected : 1.0f - reflected};
+  }
+};
+
+static_assert(wfpg::is_bsdf_v<bsdf> && std::is_trivially_copyable_v<bsdf>);
+
+}  // namespace render

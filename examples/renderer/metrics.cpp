@@ -1,0 +1,104 @@
+// Error measures, accumulated in double pixel by pixel.
+#include "metrics.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+namespace render {
+namespace {
+
+constexpr double relative_floor = 1e-2;
+constexpr double trimmed_share = 1e-3;
+
+/// One pixel's measures, means over its channels.
+struct pixel_error {
+  double squared = 0.0;
+  double relative = 0.0;
+  double reinhard = 0.0;
+};
+
+bool finite(vec3 v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+double reinhard(double value) {
+  const double positive = std::max(value, 0.0);
+  return positive / (1.0 + positive);
+}
+
+pixel_error error_of(vec3 test, vec3 reference) {
+  pixel_error sum;
+  for (int c = 0; c < 3; ++c) {
+    const double t = test[c], r = reference[c];
+    const double mapped = reinhard(t) - reinhard(r);
+    sum.squared += (t - r) * (t - r) / 3.0;
+    sum.relative += (t - r) * (t - r) / (r * r + relative_floor) / 3.0;
+    sum.reinhard += mapped * mapped / 3.0;
+  }
+  return sum;
+}
+
+/// The mean without the largest `trimmed_share` of the values, which it reorders.
+double trimmed_mean(std::vector<double>& values) {
+  const auto dropped = static_cast<std::size_t>(trimmed_share * static_cast<double>(values.size()));
+  const auto first_kept = values.begin() + static_cast<std::ptrdiff_t>(dropped);
+  std::nth_element(values.begin(), first_kept, values.end(), std::greater<double>());
+  double sum = 0.0;
+  for (auto value = first_kept; value != values.end(); ++value) sum += *value;
+  return sum / static_cast<double>(values.size() - dropped);
+}
+
+std::string size_of(const image& picture) {
+  return std::to_string(picture.width) + " x " + std::to_string(picture.height);
+}
+
+void require_comparable(const image& test, const image& reference) {
+  if (test.width != reference.width || test.height != reference.height)
+    throw std::invalid_argument("pictures of different sizes: " + size_of(test) + " and " +
+                                size_of(reference));
+  const std::size_t pixels = std::size_t(std::max(test.width, 0)) * std::size_t(std::max(test.height, 0));
+  if (pixels == 0 || test.pixels.size() != pixels || reference.pixels.size() != pixels)
+    throw std::invalid_argument("a picture is empty or its size does not match its pixels");
+}
+
+}  // namespace
+
+image_error compare(const image& test, const image& reference) {
+  require_comparable(test, reference);
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  image_error error;
+  std::vector<double> relative;
+  relative.reserve(test.pixels.size());
+  for (std::size_t i = 0; i < test.pixels.size(); ++i) {
+    pixel_error pixel{infinite, infinite, infinite};
+    if (finite(test.pixels[i]) && finite(reference.pixels[i]))
+      pixel = error_of(test.pixels[i], reference.pixels[i]);
+    else
+      ++error.non_finite;
+    error.mse += pixel.squared;
+    error.relmse += pixel.relative;
+    error.mse_reinhard += pixel.reinhard;
+    relative.push_back(pixel.relative);
+  }
+  const double count = static_cast<double>(test.pixels.size());
+  error.mse /= count;
+  error.relmse /= count;
+  error.mse_reinhard /= count;
+  error.relmse_trimmed = trimmed_mean(relative);
+  return error;
+}
+
+image_error noise_of_halves(const image& half_a, const image& half_b) {
+  image_error error = compare(half_a, half_b);
+  error.mse /= 4.0;
+  error.relmse /= 4.0;
+  error.relmse_trimmed /= 4.0;
+  error.mse_reinhard /= 4.0;
+  return error;
+}
+
+}  // namespace render

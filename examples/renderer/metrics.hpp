@@ -1,0 +1,28 @@
+// How far a picture is from a reference.
+#pragma once
+
+#include "image_io.hpp"
+
+#include <cstddef>
+
+namespace render {
+
+/// Means over pixels and the three colour channels; r is the reference's value, t the tested one's.
+/// A pixel with a NaN or an infinity in either picture counts as infinitely wrong in every measure.
+struct image_error {
+  double mse = 0.0;             ///< (t - r)²
+  double relmse = 0.0;          ///< (t - r)² / (r² + 0.01)
+  double relmse_trimmed = 0.0;  ///< relmse without the worst 0.1% of the pixels (rounded down)
+  double mse_reinhard = 0.0;    ///< (t' - r')² with c' = c / (1 + c), negative values taken as 0
+  std::size_t non_finite = 0;   ///< pixels with a NaN or an infinity; trimming may hide these, this does not
+};
+
+/// Throws std::invalid_argument where the sizes differ or a picture has no pixels.
+image_error compare(const image& test, const image& reference);
+
+/// The error of a reference that is the mean of two independent halves: compare(half_a, half_b) / 4. Each
+/// half has twice the variance of the mean, their difference four times it. Subtract it from an error against
+/// the mean. `non_finite` is not scaled.
+image_error noise_of_halves(const image& half_a, const image& half_b);
+
+}  // namespace render

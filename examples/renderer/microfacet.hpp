@@ -1,0 +1,75 @@
+// Fresnel reflectances, and the GGX distribution of microfacets (Walter et al. 2007) with visible normals
+// (Heitz 2018). Directions are in the frame of the surface, z along its normal.
+#pragma once
+
+#include "frame.hpp"
+
+namespace render {
+
+/// Unpolarised reflectance of a smooth boundary; `eta` is the index beyond over the index on the incident
+/// side, `cosine` >= 0 is the incident one. 1 for total reflection.
+WFPG_HD inline float fresnel_dielectric(float cosine, float eta) {
+  const float sine2 = glm::max(0.0f, 1.0f - cosine * cosine) / (eta * eta);
+  if (sine2 >= 1.0f) return 1.0f;
+  const float transmitted = std::sqrt(1.0f - sine2);
+  const float parallel = (eta * cosine - transmitted) / (eta * cosine + transmitted);
+  const float perpendicular = (cosine - eta * transmitted) / (cosine + eta * transmitted);
+  return 0.5f * (parallel * parallel + perpendicular * perpendicular);
+}
+
+/// Schlick's approximation from the reflectance at normal incidence, per channel.
+WFPG_HD inline vec3 fresnel_schlick(vec3 normal_reflectance, float cosine) {
+  const float x = glm::max(0.0f, 1.0f - cosine);
+  const float x2 = x * x;
+  return normal_reflectance + (vec3(1.0f) - normal_reflectance) * (x2 * x2 * x);
+}
+
+/// The GGX distribution of roughness `alpha` in (0, 1], isotropic.
+struct ggx {
+  float alpha = 1.0f;
+
+  /// Facets per solid angle of their normal `h` (above the surface), projected.
+  WFPG_HD float distribution(vec3 h) const {
+    // Not from h.z alone: 1 - h.z² loses what a smooth surface needs.
+    const float a2 = alpha * alpha;
+    const float t = (h.x * h.x + h.y * h.y) / a2 + h.z * h.z;
+    return 1.0f / (pi * a2 * t * t);
+  }
+
+  /// D G2 cos(incident) / (4 cos(incident) cos(outgoing)): the BRDF's value times the cosine, but Fresnel's
+  /// term. Both directions are above the surface. G2 is the height-correlated shadowing and masking.
+  WFPG_HD float eval(vec3 outgoing, vec3 incident, vec3 h) const {
+    const float terms = outgoing.z * slope_term(incident.z) + incident.z * slope_term(outgoing.z);
+    return distribution(h) * incident.z / (2.0f * terms);
+  }
+
+  /// Density of the reflected direction when h is drawn by sample().
+  WFPG_HD float pdf(vec3 outgoing, vec3 h) const {
+    return distribution(h) / (2.0f * (outgoing.z + slope_term(outgoing.z)));
+  }
+
+  /// A facet's normal seen from `outgoing`, above the surface.
+  WFPG_HD vec3 sample(vec3 outgoing, vec2 u) const {
+    const vec3 stretched = glm::normalize(vec3(alpha * outgoing.x, alpha * outgoing.y, outgoing.z));
+    const frame view(stretched);
+    // The frame's first axis has to lie in the surface for the two half disks below to be what they are.
+    const float planar2 = stretched.x * stretched.x + stretched.y * stretched.y;
+    const vec3 first =
+        planar2 > 1e-12f ? vec3(-stretched.y, stretched.x, 0.0f) / std::sqrt(planar2) : view.tangent;
+    const vec3 second = glm::cross(stretched, first);
+    const vec2 disk = uniform_disk(u);
+    const float side = 0.5f * (1.0f + stretched.z);
+    const float y = (1.0f - side) * std::sqrt(glm::max(0.0f, 1.0f - disk.x * disk.x)) + side * disk.y;
+    const float z = std::sqrt(glm::max(0.0f, 1.0f - disk.x * disk.x - y * y));
+    const vec3 h = disk.x * first + y * second + z * stretched;
+    return glm::normalize(vec3(alpha * h.x, alpha * h.y, glm::max(1e-6f, h.z)));
+  }
+
+ private:
+  WFPG_HD float slope_term(float cosine) const {
+    const float a2 = alpha * alpha;
+    return std::sqrt(a2 + (1.0f - a2) * cosine * cosine);
+  }
+};
+
+}  // namespace render

@@ -1,0 +1,223 @@
+// The kernels of a wave: functors of an index, that read and write what path_state.hpp describes.
+// A Recorder is what wfpg::path_guider::recorder() gives, or one that does nothing.
+#pragma once
+
+#include "camera.hpp"
+#include "path_state.hpp"
+
+#include <wfpg/mis.hpp>
+
+namespace render {
+
+/// Which vertex of which sample a wave is at; depth counts vertices from 0, the camera's first hit.
+struct wave_position {
+  random_stream random;
+  std::uint32_t depth = 0;
+  std::uint32_t max_depth = 1;  ///< vertices of a path, at most
+
+  WFPG_HD bool is_last() const { return depth + 1 >= max_depth; }
+  WFPG_HD std::uint32_t first_dimension() const { return depth * dimension::per_vertex; }
+  WFPG_HD vec2 draw(std::uint32_t path, std::uint32_t use) const {
+    return random(path, first_dimension() + use);
+  }
+};
+
+/// The lights as paths meet them: by chance, and by next-event estimation where that is on.
+struct path_lights {
+  scene_view scene;
+  light_view lights;
+  bool next_event = true;
+};
+
+/// Starts a path through each pixel.
+struct start_paths {
+  pinhole camera;
+  random_stream random;
+  wfpg::array_view<path_state> paths;
+  wfpg::array_view<vec3> radiance;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const auto path = static_cast<std::uint32_t>(i);
+    paths[i] = {};
+    paths[i].ray = camera.through(path, random(path, dimension::pixel));
+    radiance[i] = vec3(0.0f);
+  }
+};
+
+/// Finds the next vertex of each path, gathers what it emits, and names the queue that the path goes to.
+template <class Caster, class Recorder>
+struct trace_paths {
+  wave_position at;
+  path_lights world;
+  Caster caster;
+  Recorder recorder;
+  wfpg::array_view<path_state> paths;
+  wfpg::array_view<path_vertex> vertices;
+  wfpg::array_view<std::uint32_t> keys;  ///< the material's kind, or excluded
+  wfpg::array_view<vec3> radiance;
+  wfpg::array_view<std::uint32_t> segments;
+  std::uint32_t excluded;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    keys[i] = excluded;
+    path_state& path = paths[i];
+    if (!path.active) return;
+    ++segments[i];
+    const triangle_hit hit = caster.intersect(path.ray);
+    if (!hit.is_hit()) {
+      path.active = false;
+      gather(i, path.throughput * world.scene.environment);
+      return;
+    }
+    const hit_surface found = world.scene.surface(hit, -path.ray.direction);
+    const wfpg::surface<bsdf>& surface = found.surface;
+    const auto id = static_cast<std::uint32_t>(i);
+    recorder.vertex(id, at.depth, surface.position, surface.outgoing, path.throughput);
+    gather(i, path.throughput * found.emission * emission_weight(path, found));
+    path.active = !at.is_last();
+    if (!path.active) return;
+    vertices[i] = {surface, found.offset};
+    keys[i] = static_cast<std::uint32_t>(surface.bsdf.kind);
+  }
+
+ private:
+  WFPG_HD void gather(std::size_t i, vec3 contribution) const {
+    if (contribution == vec3(0.0f)) return;
+    radiance[i] += contribution;
+    recorder.emission(static_cast<std::uint32_t>(i), at.depth, contribution);
+  }
+
+  // Against next-event estimation at the vertex before, which could have found the same point.
+  WFPG_HD float emission_weight(const path_state& path, const hit_surface& found) const {
+    if (!world.next_event || !(path.pdf > 0.0f)) return 1.0f;
+    const vec3 normal = found.surface.geometric_normal;
+    const float cosine = std::abs(glm::dot(normal, path.ray.direction));
+    const float distance = glm::length(found.surface.position - path.ray.origin);
+    return wfpg::power_heuristic(path.pdf,
+                                 solid_angle_pdf(world.lights.pdf(found.emission), distance, cosine));
+  }
+};
+
+/// Next-event estimation up to its weight: draws a point of a light for each slot and looks whether it is
+/// seen.
+template <class Caster>
+struct query_lights {
+  wave_position at;
+  path_lights world;
+  Caster caster;
+  path_queue queue;
+  wfpg::array_view<const path_vertex> vertices;
+  wfpg::array_view<light_query> queries;
+
+  WFPG_HD void operator()(std::size_t slot) const {
+    queries[slot] = queue.holds(slot) ? query(queue[slot]) : light_query{};
+  }
+
+ private:
+  WFPG_HD light_query query(std::uint32_t path) const {
+    const path_vertex& vertex = vertices[path];
+    const wfpg::surface<bsdf>& surface = vertex.surface;
+    if (surface.bsdf.is_delta()) return {};
+    const light_sample light = world.lights.sample(world.scene, at.draw(path, dimension::light_choice).x,
+                                                   at.draw(path, dimension::light_point));
+    const vec3 toward = light.position - surface.position;
+    const float distance = glm::length(toward);
+    if (!(light.pdf > 0.0f && distance > 0.0f)) return {};
+    light_query result;
+    result.direction = toward / distance;
+    result.pdf = solid_angle_pdf(light.pdf, distance, -glm::dot(light.normal, result.direction));
+    if (!(result.pdf > 0.0f)) return {};
+    result.value = surface.bsdf.eval_rgb(surface.outgoing, result.direction) * light.radiance / result.pdf;
+    if (!(wfpg::luminance(result.value) > 0.0f) || is_hidden(vertex, light, result.direction)) return {};
+    return result;
+  }
+
+  WFPG_HD bool is_hidden(const path_vertex& vertex, const light_sample& light, vec3 direction) const {
+    const vec3 end = leave_surface(light.position, light.normal, -direction, light.offset);
+    wfpg::ray ray;
+    ray.origin =
+        leave_surface(vertex.surface.position, vertex.surface.geometric_normal, direction, vertex.offset);
+    ray.t_max = glm::length(end - ray.origin);
+    if (!(ray.t_max > 0.0f)) return false;
+    ray.direction = (end - ray.origin) / ray.t_max;
+    return caster.occluded(ray);
+  }
+};
+
+/// Adds each slot's light sample with its MIS weight, and sends the path along the direction drawn for it.
+template <class Recorder>
+struct shade_paths {
+  wave_position at;
+  Recorder recorder;
+  path_queue queue;
+  wfpg::array_view<const path_vertex> vertices;
+  wfpg::array_view<const light_query> queries;  ///< empty: no next-event estimation
+  wfpg::array_view<const float> densities;      ///< the mixture's, of the queries' directions
+  wfpg::array_view<const wfpg::sampled_direction> directions;
+  wfpg::array_view<path_state> paths;
+  wfpg::array_view<vec3> radiance;
+
+  WFPG_HD void operator()(std::size_t slot) const {
+    if (!queue.holds(slot)) return;
+    const std::uint32_t id = queue[slot];
+    if (!queries.empty()) add_light(slot, id);
+    path_state& path = paths[id];
+    path.active = scatter(vertices[id], directions[slot], path) &&
+                  survive_roulette(path, at.draw(id, dimension::roulette).x);
+  }
+
+ private:
+  // The first bounces carry most of the light. Later ones are spared while a tenth of it is left: ending
+  // those added more noise than it saved time.
+  static constexpr std::uint32_t first_roulette_depth = 3;
+  static constexpr float spared_reflectance = 0.1f;
+
+  WFPG_HD void add_light(std::size_t slot, std::uint32_t id) const {
+    const light_query query = queries[slot];
+    if (query.direction == vec3(0.0f)) return;
+    const vec3 contribution =
+        paths[id].throughput * query.value * wfpg::power_heuristic(query.pdf, densities[slot]);
+    radiance[id] += contribution;
+    recorder.radiance(id, at.depth, contribution);
+  }
+
+  // False where the path ends.
+  WFPG_HD bool scatter(const path_vertex& vertex, const wfpg::sampled_direction& drawn,
+                       path_state& path) const {
+    if (drawn.technique == wfpg::sampling_technique::none || !(drawn.pdf > 0.0f)) return false;
+    const bool delta = drawn.technique == wfpg::sampling_technique::delta;
+    const wfpg::surface<bsdf>& surface = vertex.surface;
+    const vec3 weight = delta ? surface.bsdf.delta_weight_rgb(surface.outgoing, drawn.direction)
+                              : surface.bsdf.eval_rgb(surface.outgoing, drawn.direction) / drawn.pdf;
+    if (!(wfpg::luminance(weight) > 0.0f)) return false;
+    path.throughput *= weight;
+    path.reflectance *= surface.bsdf.reflectance(surface.outgoing, drawn.direction);
+    path.pdf = delta ? 0.0f : drawn.pdf;
+    path.ray.origin =
+        leave_surface(surface.position, surface.geometric_normal, drawn.direction, vertex.offset);
+    path.ray.direction = drawn.direction;
+    return true;
+  }
+
+  // By the throughput that the path would have if its directions were all drawn from BSDFs. Its real one is
+  // low where guiding is sure of a direction, and those are the paths worth keeping.
+  WFPG_HD bool survive_roulette(path_state& path, float u) const {
+    if (at.depth < first_roulette_depth) return true;
+    const float probability = glm::min(1.0f, path.reflectance / spared_reflectance);
+    if (!(u < probability)) return false;
+    path.throughput /= probability;
+    path.reflectance /= probability;
+    return true;
+  }
+};
+
+/// Adds a sample to the film.
+struct add_to_film {
+  wfpg::array_view<const vec3> radiance;
+  wfpg::array_view<glm::dvec3> film;
+  double weight;
+
+  WFPG_HD void operator()(std::size_t i) const { film[i] += weight * glm::dvec3(radiance[i]); }
+};
+
+}  // namespace render

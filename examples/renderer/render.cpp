@@ -1,0 +1,63 @@
+// Options made complete and checked; the choice of the device.
+#include "render.hpp"
+
+#include <wfpg/error.hpp>
+#include <wfpg/exec/omp.hpp>
+#include <wfpg/exec/seq.hpp>
+#include <wfpg/exec/tbb.hpp>
+
+namespace render {
+
+extern template render_result render_on(const wfpg::exec::seq&, const scene&, const render_options&,
+                                        const progress_callback&);
+extern template render_result render_on(const wfpg::exec::omp&, const scene&, const render_options&,
+                                        const progress_callback&);
+extern template render_result render_on(const wfpg::exec::tbb&, const scene&, const render_options&,
+                                        const progress_callback&);
+
+namespace {
+
+constexpr int largest_side = 32768;
+constexpr int largest_depth = 1024;
+
+render_options completed(const scene& scene, render_options options) {
+  using wfpg::detail::require;
+  if (options.width == 0 && options.height == 0) {
+    options.width = scene.width;
+    options.height = scene.height;
+  }
+  if (options.max_depth == 0) options.max_depth = scene.max_depth;
+  require(options.width > 0 && options.width <= largest_side, "width", options.width, "1 to 32768");
+  require(options.height > 0 && options.height <= largest_side, "height", options.height, "1 to 32768");
+  require(options.max_depth > 0 && options.max_depth <= largest_depth, "max_depth", options.max_depth,
+          "1 to 1024");
+  require(options.seconds >= 0.0, "seconds", options.seconds, "0 or more");
+  const int least = options.combine == wfpg::sample_combination::discard_first ? 2 : 1;
+  require(options.seconds > 0.0 || options.spp >= least, "spp", options.spp,
+          least == 2 ? "at least 2, as the first sample is discarded" : "at least 1");
+  return options;
+}
+
+render_result render_completed(const scene& scene, const render_options& options,
+                               const progress_callback& progress) {
+  switch (options.where) {
+    case device::omp:
+      return render_on(wfpg::exec::omp(), scene, options, progress);
+    case device::seq:
+      return render_on(wfpg::exec::seq(), scene, options, progress);
+    default:
+      return render_on(wfpg::exec::tbb(), scene, options, progress);
+  }
+}
+
+}  // namespace
+
+render_result render(const scene& scene, const render_options& options, const progress_callback& progress) {
+  render_result result = render_completed(scene, completed(scene, options), progress);
+  result.report.scene = scene.name;
+  result.report.method = options.method == sampling_method::pt ? "pt" : "wfpg";
+  result.report.device = options.where == device::cpu ? "cpu" : options.where == device::omp ? "omp" : "seq";
+  return result;
+}
+
+}  // namespace render

@@ -1,0 +1,90 @@
+// Renders a scene with chosen options on a chosen device, and says what it cost.
+#pragma once
+
+#include "image_io.hpp"
+#include "stage_clock.hpp"
+
+#include <wfpg/sample_combiner.hpp>
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace render {
+
+enum class sampling_method { pt, wfpg };
+enum class guiding { oriented, plain };
+enum class device { cpu, omp, seq };  ///< TBB, OpenMP, one thread
+
+struct render_options {
+  sampling_method method = sampling_method::wfpg;
+  guiding mode = guiding::oriented;
+  device where = device::cpu;
+  int spp = 64;          ///< samples a pixel, positive; not used where `seconds` is
+  double seconds = 0.0;  ///< time for samples, building not counted; the last may use more; 0: spp decides
+  int width = 0;         ///< pixels, both positive; 0 x 0: the scene's own
+  int height = 0;
+  int max_depth = 0;  ///< segments of a path, positive; 0: the scene's own
+  bool nee = true;    ///< next-event estimation toward area lights, with MIS
+  std::uint64_t seed = 0;
+  std::uint32_t octree_resolution = 128;  ///< voxels a side, a power of two
+  std::uint32_t field_resolution = 32;    ///< cells a side at the first vertex
+  std::uint32_t rays_per_bin = 64;        ///< c_ray
+  std::uint32_t min_bin_level = 3;        ///< l_min, from the root
+  float guide_fraction = 0.0f;            ///< in [0, 1]; 0: the mode's own
+  wfpg::sample_combination combine = wfpg::sample_combination::pt_first;
+};
+
+/// Bins of one depth, means over the samples that were guided.
+struct bin_report {
+  double count = 0.0;
+  double mean_rays = 0.0;
+};
+
+struct octree_report {
+  std::uint32_t resolution = 0;
+  std::size_t nodes = 0;
+  std::size_t leaves = 0;
+  double bytes_per_node = 0.0;  ///< of everything that persists
+  double build_seconds = 0.0;
+};
+
+struct render_report {
+  std::string scene, method, device;
+  int spp = 0;                 ///< rendered
+  double total_seconds = 0.0;  ///< from building to the last sample
+  named_seconds seconds;       ///< by stage; "guide ..." are parts of "directions" and of the samples' ends
+  std::vector<std::pair<std::string, std::size_t>> memory;  ///< the guider's bytes, by part
+  std::size_t persistent_bytes = 0;
+  std::size_t transient_bytes = 0;
+  octree_report octree;
+  std::vector<bin_report> bins;  ///< by depth
+  double cones_per_segment = 0.0;
+};
+
+struct render_result {
+  image picture;
+  render_report report;
+};
+
+/// Where a rendering is; given after every sample.
+struct render_progress {
+  int samples = 0;        ///< done
+  double fraction = 0.0;  ///< of the budget, in [0, 1]
+  double seconds = 0.0;   ///< since rendering began
+};
+using progress_callback = std::function<void(const render_progress&)>;
+
+/// Renders on options.where. Throws std::invalid_argument for options or scenes that cannot be right; the
+/// message names what. `progress` may be empty.
+render_result render(const scene& scene, const render_options& options, const progress_callback& progress);
+
+/// The same on a policy, whatever options.where says; instantiated in render_seq.cpp, render_omp.cpp and
+/// render_tbb.cpp.
+template <class Exec>
+render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
+                        const progress_callback& progress);
+
+}  // namespace render

@@ -1,0 +1,122 @@
+// render_on for any policy: builds what a rendering needs, takes samples until the budget is spent, reports.
+#pragma once
+
+#include "embree_caster.hpp"
+#include "guider_report.hpp"
+#include "render.hpp"
+#include "unguided.hpp"
+#include "wavefront.hpp"
+
+#include <wfpg/path_guider.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+
+namespace render {
+
+/// Time since it was made.
+class stopwatch {
+ public:
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// Samples taken, and the part of the budget that they used.
+class sample_budget {
+ public:
+  explicit sample_budget(const render_options& options)
+      : spp_(options.spp),
+        seconds_(options.seconds),
+        least_(options.combine == wfpg::sample_combination::discard_first ? 2 : 1) {}
+
+  int samples() const { return samples_; }
+  bool is_spent() const { return samples_ >= least_ && fraction() >= 1.0; }
+  void count() { ++samples_; }
+  render_progress progress() const { return {samples_, std::min(1.0, fraction()), clock_.seconds()}; }
+
+ private:
+  double fraction() const {
+    return seconds_ > 0.0 ? clock_.seconds() / seconds_ : static_cast<double>(samples_) / spp_;
+  }
+
+  stopwatch clock_;
+  int spp_;
+  double seconds_;
+  int least_;  ///< the picture of fewer has no weight
+  int samples_ = 0;
+};
+
+/// The samples of one rendering, whatever their directions come from.
+template <class Exec, class Guider>
+void take_samples(path_tracer<Exec, embree_caster>& tracer, Guider& guider, const pinhole& camera,
+                  const render_options& options, const progress_callback& progress, render_report& report) {
+  sample_budget budget(options);
+  while (!budget.is_spent()) {
+    const auto sample = static_cast<std::uint32_t>(budget.samples());
+    const float weight = wfpg::sample_weight(options.combine, sample + 1);
+    tracer.render_sample(guider, camera, sample, weight);
+    budget.count();
+    if (progress) progress(budget.progress());
+  }
+  report.spp = budget.samples();
+}
+
+inline wfpg::guider_options guider_options_of(const render_options& options) {
+  wfpg::guider_options guided;
+  guided.octree_resolution = options.octree_resolution;
+  guided.field_resolution = options.field_resolution;
+  guided.rays_per_bin = options.rays_per_bin;
+  guided.min_bin_level = options.min_bin_level;
+  guided.mode = options.mode == guiding::plain ? wfpg::guiding_mode::plain : wfpg::guiding_mode::oriented;
+  guided.guide_fraction = options.guide_fraction;
+  guided.include_emission = !options.nee;
+  guided.unguided_samples = wfpg::unguided_samples(options.combine);
+  guided.seed = options.seed;
+  guided.max_paths = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  guided.max_depth = static_cast<std::uint32_t>(options.max_depth);
+  return guided;
+}
+
+template <class Exec>
+render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
+                        const progress_callback& progress) {
+  const stopwatch total;
+  stage_clock building;
+  render_result result;
+  render_report& report = result.report;
+
+  const device_scene<Exec> geometry(exec, scene);
+  const light_distribution<Exec> lights(exec, scene);
+  std::unique_ptr<const embree_scene> accelerated;
+  building.measure("embree", [&] { accelerated = std::make_unique<const embree_scene>(scene); });
+  const tracer_settings settings{options.width, options.height, static_cast<std::uint32_t>(options.max_depth),
+                                 options.seed};
+  path_tracer<Exec, embree_caster> tracer(exec, settings, {geometry.view(), lights.view(), options.nee},
+                                          accelerated->caster());
+  const pinhole camera(scene.view, options.width, options.height);
+  if (options.method == sampling_method::pt) {
+    unguided<Exec> guider(exec);
+    take_samples(tracer, guider, camera, options, progress, report);
+  } else {
+    const wfpg::triangle_mesh_view mesh{geometry.view().positions, geometry.view().triangles};
+    const stopwatch build;
+    wfpg::path_guider<Exec> guider(exec, mesh, guider_options_of(options));
+    building.add("octree", build.seconds());
+    report.octree.build_seconds = build.seconds();
+    take_samples(tracer, guider, camera, options, progress, report);
+    report_guider(guider, tracer.segments(), report);
+  }
+  result.picture = {options.width, options.height, tracer.picture()};
+  report.seconds.insert(report.seconds.begin(), tracer.clock().seconds().begin(),
+                        tracer.clock().seconds().end());
+  report.seconds.insert(report.seconds.begin(), building.seconds().begin(), building.seconds().end());
+  report.total_seconds = total.seconds();
+  return result;
+}
+
+}  // namespace render

@@ -1,0 +1,11 @@
+// The renderer on the policy exec::seq: one thread, for debugging and as the others' reference.
+#include "render_impl.hpp"
+
+#include <wfpg/exec/seq.hpp>
+
+namespace render {
+
+template render_result render_on(const wfpg::exec::seq&, const scene&, const render_options&,
+                                 const progress_callback&);
+
+}  // namespace render

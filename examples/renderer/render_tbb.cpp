@@ -1,0 +1,11 @@
+// The renderer on the policy exec::tbb: TBB.
+#include "render_impl.hpp"
+
+#include <wfpg/exec/tbb.hpp>
+
+namespace render {
+
+template render_result render_on(const wfpg::exec::tbb&, const scene&, const render_options&,
+                                 const progress_callback&);
+
+}  // namespace render

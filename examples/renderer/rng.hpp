@@ -1,0 +1,44 @@
+// Counter-based random numbers: a pure function of what they are for, so that a picture does not depend on
+// the order in which threads ask.
+#pragma once
+
+#include <wfpg/types.hpp>
+
+#include <cstdint>
+
+namespace render {
+
+/// Where the numbers of one path in one sample come from.
+struct random_stream {
+  std::uint64_t seed = 0;
+  std::uint32_t sample = 0;
+
+  /// Two independent numbers in [0, 1) for a path and a use of them (`dimension`).
+  WFPG_HD wfpg::vec2 operator()(std::uint32_t path, std::uint32_t dimension) const {
+    const std::uint64_t counter = (static_cast<std::uint64_t>(path) << 32) | dimension;
+    const std::uint64_t bits = mix(mix(mix(seed + 0x632be59bd9b4e019ull) ^ sample) + counter);
+    return {unit(static_cast<std::uint32_t>(bits >> 40)), unit(static_cast<std::uint32_t>(bits & 0xffffffu))};
+  }
+
+ private:
+  // The finaliser of SplitMix64 (Steele, Lea, Flood 2014): every input bit reaches every output bit.
+  WFPG_HD static std::uint64_t mix(std::uint64_t x) {
+    x += 0x9e3779b97f4a7c15ull;
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
+    return x ^ (x >> 31);
+  }
+  WFPG_HD static float unit(std::uint32_t bits24) { return static_cast<float>(bits24) * 0x1p-24f; }
+};
+
+/// Uses of random numbers at one vertex; the next vertex's begin `per_vertex` further on.
+namespace dimension {
+inline constexpr std::uint32_t direction = 0;  ///< this one and the next: the guider's
+inline constexpr std::uint32_t light_point = 2;
+inline constexpr std::uint32_t light_choice = 3;
+inline constexpr std::uint32_t roulette = 4;
+inline constexpr std::uint32_t per_vertex = 8;
+inline constexpr std::uint32_t pixel = 0xffffffffu;  ///< the camera's
+}  // namespace dimension
+
+}  // namespace render

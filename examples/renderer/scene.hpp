@@ -1,0 +1,66 @@
+// A scene as loaders and built-in makers describe it: triangles, materials, a camera, an environment.
+// Host data only; what kernels read is made from it in device_scene.hpp.
+#pragma once
+
+#include <wfpg/types.hpp>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace render {
+
+using wfpg::uvec3;
+using wfpg::vec2;
+using wfpg::vec3;
+
+/// Linear RGB texels, row by row from the top; looked up bilinearly and repeated.
+struct texture {
+  int width = 0;
+  int height = 0;
+  std::vector<vec3> texels;
+};
+
+enum class material_kind : std::uint32_t {
+  lambert,     ///< diffuse reflection
+  plastic,     ///< diffuse below a GGX dielectric coat
+  conductor,   ///< GGX with Schlick's Fresnel from base_color
+  mirror,      ///< perfect reflection times base_color
+  dielectric,  ///< smooth, reflects and refracts
+};
+
+/// How a surface scatters and emits.
+struct material {
+  material_kind kind = material_kind::lambert;
+  vec3 base_color{0.8f};           ///< reflectance, per channel in [0, 1]
+  std::int32_t base_texture = -1;  ///< multiplies base_color; index into scene::textures, -1: none
+  float alpha = 0.1f;              ///< GGX roughness (not perceptual), (0, 1]
+  float ior = 1.5f;                ///< inside over outside, for plastic and dielectric
+  vec3 emission{0.0f};             ///< emitted radiance, W/(m² sr), on the counter-clockwise side
+};
+
+/// A pinhole. The picture's y runs down from `up`.
+struct camera {
+  vec3 position{0.0f};
+  vec3 forward{0.0f, 0.0f, -1.0f};  ///< unit length
+  vec3 up{0.0f, 1.0f, 0.0f};        ///< unit length, need not be orthogonal to forward
+  float vertical_fov = 0.8f;        ///< radians, (0, pi)
+};
+
+struct scene {
+  std::string name;
+  std::vector<vec3> positions;  ///< world space
+  std::vector<vec3> normals;    ///< shading normals a vertex; same length as positions, or empty
+  std::vector<vec2> uvs;        ///< same length as positions, or empty
+  std::vector<uvec3> triangles;
+  std::vector<std::uint32_t> triangle_materials;  ///< a triangle; index into materials
+  std::vector<material> materials;
+  std::vector<texture> textures;
+  camera view;
+  vec3 environment{0.0f};             ///< constant radiance, W/(m² sr)
+  int width = 512, height = 512;      ///< intended size of the picture, pixels
+  int max_depth = 8;                  ///< intended number of path segments
+  std::vector<std::string> warnings;  ///< what the file asked for and the loader does not do, once each
+};
+
+}  // namespace render

@@ -1,0 +1,39 @@
+// Wall time by stage.
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace render {
+
+using named_seconds = std::vector<std::pair<std::string, double>>;
+
+/// Sums the seconds of named stages, in the order in which the names first come.
+class stage_clock {
+ public:
+  /// Calls f and adds its time to `stage`. Work that f leaves running is not counted.
+  template <class F>
+  void measure(const char* stage, const F& f) {
+    const auto start = std::chrono::steady_clock::now();
+    f();
+    add(stage, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  }
+
+  void add(const char* stage, double seconds) {
+    for (auto& [name, sum] : seconds_) {
+      if (name != stage) continue;
+      sum += seconds;
+      return;
+    }
+    seconds_.emplace_back(stage, seconds);
+  }
+
+  const named_seconds& seconds() const { return seconds_; }
+
+ private:
+  named_seconds seconds_;
+};
+
+}  // namespace render

@@ -1,0 +1,64 @@
+// Reports to JSON.
+#include "stats_json.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include <fstream>
+#include <stdexcept>
+
+namespace render {
+namespace {
+
+using json = nlohmann::ordered_json;
+
+json seconds_of(const render_report& report) {
+  json seconds{{"total", report.total_seconds}};
+  for (const auto& [stage, value] : report.seconds) seconds[stage] = value;
+  return seconds;
+}
+
+json memory_of(const render_report& report) {
+  json memory = json::object();
+  for (const auto& [part, bytes] : report.memory) memory[part] = bytes;
+  memory["persistent"] = report.persistent_bytes;
+  memory["transient"] = report.transient_bytes;
+  return memory;
+}
+
+json octree_of(const octree_report& octree) {
+  return {{"resolution", octree.resolution},
+          {"nodes", octree.nodes},
+          {"leaves", octree.leaves},
+          {"bytes_per_node", octree.bytes_per_node},
+          {"build_seconds", octree.build_seconds}};
+}
+
+json error_of(const image_error& error) {
+  return {{"mse", error.mse},
+          {"relmse", error.relmse},
+          {"relmse_trimmed", error.relmse_trimmed},
+          {"mse_reinhard", error.mse_reinhard}};
+}
+
+}  // namespace
+
+void write_stats(const std::string& path, const render_report& report,
+                 const std::optional<image_error>& error) {
+  json stats{
+      {"scene", report.scene}, {"method", report.method}, {"device", report.device}, {"spp", report.spp}};
+  stats["seconds"] = seconds_of(report);
+  stats["memory"] = memory_of(report);
+  stats["octree"] = octree_of(report.octree);
+  stats["bins"] = json::array();
+  for (const bin_report& depth : report.bins)
+    stats["bins"].push_back({{"count", depth.count}, {"mean_rays", depth.mean_rays}});
+  stats["cones_per_segment"] = report.cones_per_segment;
+  if (error) stats["error"] = error_of(*error);
+
+  std::ofstream file(path);
+  file << stats.dump(2) << '\n';
+  file.close();
+  if (!file) throw std::runtime_error(path + ": cannot be written");
+}
+
+}  // namespace render

@@ -1,0 +1,17 @@
+// What a rendering cost, as JSON.
+#pragma once
+
+#include "metrics.hpp"
+#include "render.hpp"
+
+#include <optional>
+#include <string>
+
+namespace render {
+
+/// Writes scene, method, device, spp, seconds, memory, octree, bins, cones_per_segment, and with an error
+/// `error`. Infinities and NaN become null. Throws std::runtime_error that names the path.
+void write_stats(const std::string& path, const render_report& report,
+                 const std::optional<image_error>& error);
+
+}  // namespace render

@@ -1,0 +1,156 @@
+// The path tracer: one sample of every pixel is one wave that goes from vertex to vertex as a whole.
+#pragma once
+
+#include "path_kernels.hpp"
+#include "stage_clock.hpp"
+
+#include <wfpg/buffer.hpp>
+#include <wfpg/partitioner.hpp>
+#include <wfpg/wave.hpp>
+
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+namespace render {
+
+struct tracer_settings {
+  int width = 512;              ///< pixels, positive
+  int height = 512;             ///< pixels, positive
+  std::uint32_t max_depth = 8;  ///< vertices of a path and segments from the camera, at least 1
+  std::uint64_t seed = 0;
+};
+
+/// Renders samples of a scene with directions from a guider.
+///
+/// Emission at vertices 1 to max_depth counts; next-event estimation, where it is on, is done at vertices 1
+/// to max_depth - 1, so that both estimate the same sum. Work is ordered by path, never by arrival: one seed
+/// gives one picture on any number of threads.
+template <class Exec, class Caster>
+class path_tracer {
+ public:
+  path_tracer(const Exec& exec, const tracer_settings& settings, const path_lights& world,
+              const Caster& caster)
+      : exec_(exec),
+        settings_(settings),
+        world_(world),
+        caster_(caster),
+        count_(static_cast<std::size_t>(settings.width) * static_cast<std::size_t>(settings.height)),
+        paths_(exec, count_),
+        vertices_(exec, count_),
+        queries_(exec, world.next_event ? count_ : 0),
+        densities_(exec, world.next_event ? count_ : 0),
+        directions_(exec, count_),
+        keys_(exec, count_),
+        segments_(exec, std::vector<std::uint32_t>(count_, 0)),
+        radiance_(exec, count_),
+        film_(exec, std::vector<glm::dvec3>(count_, glm::dvec3(0.0))),
+        partitioner_(exec, count_) {}
+
+  /// Sample number `sample` (from 0) of each pixel; `weight` >= 0 is its share of the picture.
+  template <class Guider>
+  void render_sample(Guider& guider, const pinhole& camera, std::uint32_t sample, float weight) {
+    wave_position at{{settings_.seed, sample}, 0, settings_.max_depth};
+    clock_.measure("camera", [&] {
+      exec_.for_each(count_, start_paths{camera, at.random, paths_.view(), radiance_.view()});
+    });
+    guider.begin_sample();
+    for (; at.depth < at.max_depth; ++at.depth) {
+      trace(guider, at);
+      if (at.is_last()) break;
+      const path_queue queue = sort_by_material();
+      if (world_.next_event) query(at, queue);
+      sample_directions(guider, at, queue);
+      shade(guider, at, queue);
+    }
+    guider.end_sample();
+    clock_.measure("film", [&] {
+      exec_.for_each(count_, add_to_film{radiance_.view(), film_.view(), static_cast<double>(weight)});
+    });
+    weight_ += static_cast<double>(weight);
+  }
+
+  /// Weighted mean of the samples, row by row; black where their weights sum to 0.
+  std::vector<vec3> picture() const {
+    std::vector<vec3> pixels;
+    pixels.reserve(count_);
+    for (const glm::dvec3& sum : film_.to_host(exec_))
+      pixels.push_back(weight_ > 0.0 ? vec3(sum / weight_) : vec3(0.0f));
+    return pixels;
+  }
+
+  /// Rays traced to extend paths, shadow rays not among them.
+  std::uint64_t segments() const {
+    const std::vector<std::uint32_t> counts = segments_.to_host(exec_);
+    return std::accumulate(counts.begin(), counts.end(), std::uint64_t(0));
+  }
+
+  const stage_clock& clock() const { return clock_; }
+
+ private:
+  template <class Guider>
+  void trace(Guider& guider, const wave_position& at) {
+    clock_.measure("trace", [&] {
+      auto recorder = guider.recorder();
+      exec_.for_each(count_, trace_paths<Caster, decltype(recorder)>{
+                                 at, world_, caster_, recorder, paths_.view(), vertices_.view(), keys_.view(),
+                                 radiance_.view(), segments_.view(), wfpg::partitioner<Exec>::excluded});
+    });
+  }
+
+  path_queue sort_by_material() {
+    path_queue queue;
+    clock_.measure("sort", [&] { queue.by_material = partitioner_.partition(exec_, keys_.view()); });
+    return queue;
+  }
+
+  void query(const wave_position& at, const path_queue& queue) {
+    clock_.measure("lights", [&] {
+      exec_.for_each(count_,
+                     query_lights<Caster>{at, world_, caster_, queue, vertices_.view(), queries_.view()});
+    });
+  }
+
+  template <class Guider>
+  void sample_directions(Guider& guider, const wave_position& at, const path_queue& queue) {
+    clock_.measure("directions", [&] {
+      const wfpg::wave wave{at.depth, count_, queued_surfaces{queue, vertices_.view()},
+                            queued_random{queue, at.random, at.first_dimension() + dimension::direction}};
+      if (world_.next_event)
+        guider.sample_directions(
+            wave, caster_, directions_.view(),
+            wfpg::density_queries{queued_light_directions{queries_.view()}, densities_.view()});
+      else
+        guider.sample_directions(wave, caster_, directions_.view());
+    });
+  }
+
+  template <class Guider>
+  void shade(Guider& guider, const wave_position& at, const path_queue& queue) {
+    clock_.measure("shade", [&] {
+      auto recorder = guider.recorder();
+      exec_.for_each(count_, shade_paths<decltype(recorder)>{
+                                 at, recorder, queue, vertices_.view(), queries_.view(), densities_.view(),
+                                 directions_.view(), paths_.view(), radiance_.view()});
+    });
+  }
+
+  Exec exec_;
+  tracer_settings settings_;
+  path_lights world_;
+  Caster caster_;
+  std::size_t count_;
+  wfpg::buffer<path_state, Exec> paths_;
+  wfpg::buffer<path_vertex, Exec> vertices_;
+  wfpg::buffer<light_query, Exec> queries_;
+  wfpg::buffer<float, Exec> densities_;
+  wfpg::buffer<wfpg::sampled_direction, Exec> directions_;
+  wfpg::buffer<std::uint32_t, Exec> keys_, segments_;
+  wfpg::buffer<vec3, Exec> radiance_;
+  wfpg::buffer<glm::dvec3, Exec> film_;
+  wfpg::partitioner<Exec> partitioner_;
+  double weight_ = 0.0;
+  stage_clock clock_;
+};
+
+}  // namespace render
