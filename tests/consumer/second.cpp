@@ -1,0 +1,8 @@
+// A second translation unit with everything in it: nothing is defined twice.
+#include <wfpg/exec/omp.hpp>
+#include <wfpg/exec/tbb.hpp>
+#include <wfpg/wfpg.hpp>
+
+std::uint32_t nodes_of_second_unit() {
+  return wfpg::path_guider<wfpg::exec::seq>(wfpg::exec::seq(), wfpg::triangle_mesh_view{}).octree().node_count();
+}

@@ -1,0 +1,104 @@
+// Compiled, never run: each view of the library goes to a kernel by value and is called there, so that
+// whatever a device will run is annotated for it.
+#include <wfpg/wfpg.hpp>
+
+namespace cuda_compile {
+
+struct grey {
+  WFPG_HD float eval(wfpg::vec3, wfpg::vec3) const { return 0.25f; }
+  WFPG_HD float pdf(wfpg::vec3, wfpg::vec3) const { return 0.25f; }
+  WFPG_HD wfpg::bsdf_sample sample(wfpg::vec3, wfpg::vec2 u) const {
+    return {wfpg::square_to_sphere(u), 0.25f};
+  }
+  WFPG_HD bool is_delta() const { return false; }
+  WFPG_HD bool transmits() const { return false; }
+};
+
+struct surfaces {
+  WFPG_HD wfpg::surface<grey> operator()(std::uint32_t) const { return {}; }
+};
+
+struct random_numbers {
+  WFPG_HD wfpg::vec2 operator()(std::uint32_t ray, std::uint32_t) const {
+    return wfpg::vec2(float(ray % 7u) / 7.0f);
+  }
+};
+
+__global__ void use_octree(wfpg::sparse_voxel_octree_view tree, wfpg::vec3 p, float* out) {
+  const wfpg::node_id leaf = tree.nearest_leaf(p);
+  if (leaf == wfpg::invalid_node) return;
+  const wfpg::node_id node = tree.node_for_cone(leaf, 1.0f, 0.1f);
+  out[0] = tree.centre(node).x + tree.bounds(tree.ancestor(leaf, 1)).lower.y;
+}
+
+__global__ void use_cache(wfpg::exitance_cache_view cache, wfpg::vec3 p, float* out) {
+  cache.deposit(p, wfpg::vec3(0, 0, 1), wfpg::vec3(1.0f));
+  out[0] = cache.read(0, wfpg::vec3(0, 0, 1)) + cache.normal(0).x;
+}
+
+__global__ void use_recorder(wfpg::path_recorder_view recorder) {
+  recorder.vertex(threadIdx.x, 0, wfpg::vec3(0.0f), wfpg::vec3(0, 0, 1), wfpg::vec3(1.0f));
+  recorder.radiance(threadIdx.x, 0, wfpg::vec3(1.0f));
+  recorder.emission(threadIdx.x, 1, wfpg::vec3(1.0f));
+}
+
+__global__ void use_bins(wfpg::bins_view bins, float* out) {
+  out[threadIdx.x] = float(bins.size(threadIdx.x) + bins.node(threadIdx.x) + bins.orientation(threadIdx.x));
+}
+
+__global__ void use_guide(wfpg::guide_view guide, wfpg::sampled_direction* out, float* density) {
+  const wfpg::surface<grey> s;
+  out[threadIdx.x] = guide.sample(threadIdx.x, s, 0.5f, wfpg::vec2(0.25f));
+  density[threadIdx.x] = guide.pdf(threadIdx.x, s, out[threadIdx.x].direction);
+  if (guide.guides(threadIdx.x)) out[threadIdx.x] = guide.sample(threadIdx.x, wfpg::vec2(0.25f));
+}
+
+__global__ void use_caster(wfpg::svo_ray_caster caster, wfpg::ray r, wfpg::ray_hit* out) {
+  *out = caster(r);
+}
+
+// What detail/ runs inside for_each.
+template <class Functor>
+__global__ void run(Functor f) {
+  f(threadIdx.x);
+}
+
+template <class Functor>
+void launch(const Functor& f) {
+  run<<<1, 32>>>(f);
+}
+
+}  // namespace cuda_compile
+
+void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance_cache_view& cache,
+                const wfpg::path_recorder_view& recorder, float* out, wfpg::sampled_direction* directions) {
+  using namespace cuda_compile;
+  namespace d = wfpg::detail;
+  use_octree<<<1, 1>>>(tree, wfpg::vec3(0.0f), out);
+  use_cache<<<1, 1>>>(cache, wfpg::vec3(0.0f), out);
+  use_recorder<<<1, 32>>>(recorder);
+  use_bins<<<1, 32>>>(wfpg::bins_view{}, out);
+  use_guide<<<1, 32>>>(wfpg::guide_view{}, directions, out);
+  use_caster<<<1, 1>>>(wfpg::svo_ray_caster(tree), wfpg::ray{}, nullptr);
+
+  launch(d::count_items{});
+  launch(d::count_fragments{});
+  launch(d::emit_fragments{});
+  launch(d::check_samples{});
+  launch(d::emit_samples{});
+  launch(d::starts_group{});
+  launch(d::gather_groups{});
+  launch(d::link_nodes{});
+  launch(d::leaf_normals{});
+  launch(d::inner_normals{});
+  launch(d::fold_deposits{});
+  launch(d::average_children{});
+  launch(wfpg::deposit_paths{recorder, cache});
+  launch(d::flag_group_starts{});
+  launch(d::write_group_offsets{});
+  launch(d::count_at_leaves<d::wave_rays<surfaces>>{});
+  launch(d::sum_children{});
+  launch(d::ascend_to_marked{});
+  launch(d::serve_unbinned<d::serve_ray<surfaces, random_numbers, wfpg::no_queries>>{});
+  launch(d::add_counts{});
+}

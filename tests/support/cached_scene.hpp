@@ -1,0 +1,78 @@
+// A scene with an octree and an exitance cache, and deposits into it by a policy.
+#pragma once
+
+#include "support/policies.hpp"
+#include "support/random_meshes.hpp"
+
+#include <wfpg/exitance_cache.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+namespace wfpg_test {
+
+/// Fragments, their octree and its cache.
+template <class Exec>
+struct cached_scene {
+  Exec exec;
+  wfpg::voxel_fragments<Exec> fragments;
+  wfpg::sparse_voxel_octree<Exec> tree;
+  wfpg::exitance_cache<Exec> cache;
+
+  cached_scene(wfpg::voxel_fragments<Exec> from, std::size_t capacity)
+      : fragments(std::move(from)), tree(exec, fragments), cache(exec, tree, fragments, capacity) {}
+  cached_scene(const test_mesh& mesh, std::uint32_t resolution, std::size_t capacity)
+      : cached_scene(voxelized(Exec(), mesh, resolution), capacity) {}
+
+  wfpg::sparse_voxel_octree_view octree() const { return tree.view(); }
+  wfpg::exitance_cache_view view() const { return cache.view(); }
+};
+
+/// Fragments at the centres of voxels of a grid of 8³ unit voxels from the origin.
+struct voxel_normal {
+  wfpg::uvec3 voxel;
+  wfpg::vec3 normal;
+  float area;
+};
+template <class Exec>
+wfpg::voxel_fragments<Exec> fragments_in_grid(const std::vector<voxel_normal>& list) {
+  const Exec exec;
+  std::vector<wfpg::morton_code> codes;
+  std::vector<std::uint32_t> normals;
+  std::vector<float> areas;
+  for (const voxel_normal& f : list) {
+    codes.push_back(wfpg::morton_encode(f.voxel));
+    normals.push_back(wfpg::pack_direction(f.normal));
+    areas.push_back(f.area);
+  }
+  wfpg::voxel_fragments<Exec> fragments;
+  fragments.codes = wfpg::buffer<wfpg::morton_code, Exec>(exec, codes);
+  fragments.normals = wfpg::buffer<std::uint32_t, Exec>(exec, normals);
+  fragments.areas = wfpg::buffer<float, Exec>(exec, areas);
+  fragments.grid = {wfpg::vec3(0.0f), 8.0f, 8};
+  return fragments;
+}
+
+struct deposit {
+  wfpg::vec3 position{0.5f};
+  wfpg::vec3 direction{0.0f, 0.0f, 1.0f};
+  float radiance = 1.0f;
+};
+
+struct make_deposits {
+  wfpg::exitance_cache_view cache;
+  wfpg::array_view<const deposit> deposits;
+  void operator()(std::size_t i) const {
+    cache.deposit(deposits[i].position, deposits[i].direction, deposits[i].radiance);
+  }
+};
+
+template <class Exec>
+void deposit_all(cached_scene<Exec>& scene, const std::vector<deposit>& deposits) {
+  const wfpg::buffer<deposit, Exec> device(scene.exec, deposits);
+  scene.exec.for_each(deposits.size(), make_deposits{scene.view(), device.view()});
+}
+
+}  // namespace wfpg_test

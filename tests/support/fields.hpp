@@ -1,0 +1,123 @@
+// Fields for the tests of samplers: cell values of many kinds, and a distribution built from them by a
+// policy.
+#pragma once
+
+#include "support/policies.hpp"
+
+#include <wfpg/field_sampler.hpp>
+
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace wfpg_test {
+
+enum class field_kind : std::uint32_t { noise, delta, uniform, one_row, all_zero, extreme, count };
+
+inline const char* name_of(field_kind kind) {
+  static constexpr const char* names[] = {"noise", "delta", "uniform", "one row", "all zero", "extreme"};
+  return names[static_cast<std::uint32_t>(kind)];
+}
+
+/// F² values of a kind. `noise` has zeros among them, `extreme` spans 30 orders of magnitude.
+inline std::vector<float> field_values(field_kind kind, std::uint32_t resolution, std::uint64_t seed) {
+  random_numbers random(seed);
+  std::vector<float> values(std::size_t(resolution) * resolution, 0.0f);
+  const std::uint32_t row = random.below(resolution);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const float u = random.unit();
+    if (kind == field_kind::noise) values[i] = u < 0.25f ? 0.0f : u;
+    if (kind == field_kind::uniform) values[i] = 3.0f;
+    if (kind == field_kind::one_row && i / resolution == row) values[i] = 0.1f + u;
+    if (kind == field_kind::extreme) values[i] = std::pow(10.0f, 30.0f * u - 15.0f);
+  }
+  if (kind == field_kind::delta) values[random.below(static_cast<std::uint32_t>(values.size()))] = 7.0f;
+  return values;
+}
+
+/// The probabilities that cells should have, from their values alone.
+inline std::vector<double> cell_probabilities(const std::vector<float>& values, float floor = 0.0f) {
+  std::vector<double> result;
+  double sum = 0.0;
+  for (float value : values) sum += double(value) + double(floor);
+  for (float value : values)
+    result.push_back(sum > 0.0 ? (double(value) + double(floor)) / sum : 1.0 / double(values.size()));
+  return result;
+}
+
+struct build_grid {
+  std::uint32_t* words;
+  std::uint32_t resolution;
+  float floor;
+  template <class Block>
+  void operator()(Block& block, std::size_t) const {
+    wfpg::detail::build_distribution(block, {words}, static_cast<int>(resolution), floor);
+  }
+};
+
+/// A distribution in the memory of a policy, built by it.
+template <class Exec>
+class built_field {
+ public:
+  built_field(const Exec& exec, const std::vector<float>& values, std::uint32_t resolution,
+              float floor = 0.0f)
+      : words_(exec, words_of(values, resolution)), resolution_(resolution) {
+    exec.for_each_block(1, 0, build_grid{words_.data(), resolution, floor});
+  }
+
+  wfpg::grid_distribution grid() const {
+    return {words_.data(), words_.data() + std::size_t(resolution_) * resolution_, resolution_};
+  }
+  std::vector<std::uint32_t> words(const Exec& exec) const { return words_.to_host(exec); }
+
+ private:
+  static std::vector<std::uint32_t> words_of(const std::vector<float>& values, std::uint32_t resolution) {
+    std::vector<std::uint32_t> words;
+    for (float value : values) words.push_back(wfpg::detail::float_bits(value));
+    words.resize(wfpg::detail::distribution_words(resolution), 0xdeadbeefu);
+    return words;
+  }
+
+  wfpg::buffer<std::uint32_t, Exec> words_;
+  std::uint32_t resolution_;
+};
+
+/// Equal-area bins of the sphere in (cos theta, phi), for tests that must not share the map's own cells.
+struct sphere_bins {
+  std::uint32_t rows, columns;
+
+  std::size_t size() const { return std::size_t(rows) * columns; }
+  std::size_t of(wfpg::vec3 d) const {
+    const double turn = std::atan2(double(d.y), double(d.x)) / (2.0 * 3.14159265358979) + 0.5;
+    return index(0.5 * (double(d.z) + 1.0), turn);
+  }
+  /// The direction at the middle of fine cell i of n² in a bin.
+  wfpg::vec3 inside(std::size_t bin, std::uint32_t i, std::uint32_t n) const {
+    const double v = (double(bin / columns) + (i / n + 0.5) / n) / rows;
+    const double turn = (double(bin % columns) + (i % n + 0.5) / n) / columns;
+    const double z = 2.0 * v - 1.0, r = std::sqrt(1.0 - z * z);
+    const double phi = (turn - 0.5) * 2.0 * 3.14159265358979;
+    return {float(r * std::cos(phi)), float(r * std::sin(phi)), float(z)};
+  }
+  /// What `samples` samples of a density, per steradian, put into each bin: the midpoint rule with n² points.
+  template <class Density>
+  std::vector<double> expected(const Density& density, double samples, std::uint32_t n) const {
+    const double area = 4.0 * 3.14159265358979 / double(size());
+    std::vector<double> result(size(), 0.0);
+    for (std::size_t bin = 0; bin < size(); ++bin) {
+      for (std::uint32_t i = 0; i < n * n; ++i) result[bin] += double(density(inside(bin, i, n)));
+      result[bin] *= samples * area / (double(n) * n);
+    }
+    return result;
+  }
+
+ private:
+  std::size_t index(double v, double turn) const {
+    const auto row = std::min(std::uint32_t(v * rows), rows - 1);
+    const auto column = std::min(std::uint32_t(turn * columns), columns - 1);
+    return std::size_t(row) * columns + column;
+  }
+};
+
+}  // namespace wfpg_test

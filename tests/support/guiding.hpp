@@ -1,0 +1,211 @@
+// A guider in the unit box with a bright patch in its ceiling, and a path tracer of two bounces around it.
+#pragma once
+
+#include "support/policies.hpp"
+#include "support/scenes.hpp"
+
+#include <wfpg/path_guider.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+namespace wfpg_test {
+
+/// The ceiling's patch, 0.7 <= x, z <= 0.9 at y = 1, and its radiance.
+constexpr float patch_low = 0.7f, patch_high = 0.9f, patch_radiance = 10.0f;
+
+inline float emitted(vec3 p) {
+  const bool inside = p.x >= patch_low && p.x <= patch_high && p.z >= patch_low && p.z <= patch_high;
+  return inside && p.y > 0.999f ? patch_radiance : 0.0f;
+}
+
+/// The patch's irradiance on the floor, facing up, by the midpoint rule in doubles.
+inline double floor_irradiance(vec3 p) {
+  constexpr int n = 400;
+  const double side = double(patch_high) - double(patch_low), step = side / n;
+  double sum = 0.0;
+  for (int i = 0; i < n * n; ++i) {
+    const double x = double(patch_low) + (i % n + 0.5) * step - double(p.x);
+    const double z = double(patch_low) + (i / n + 0.5) * step - double(p.z);
+    const double square = x * x + z * z + 1.0;
+    sum += 1.0 / (square * square);
+  }
+  return double(patch_radiance) * sum * step * step;
+}
+
+inline wfpg::guider_options box_options(wfpg::guiding_mode mode = wfpg::guiding_mode::oriented) {
+  wfpg::guider_options options;
+  options.mode = mode;
+  options.octree_resolution = 32;
+  options.min_bin_level = 2;
+  options.rays_per_bin = 32;
+  options.field_resolution = 16;
+  options.min_field_resolution = 8;
+  options.unguided_samples = 0;
+  options.max_rays = 1024;
+  options.deposit_capacity = 6 * 40 * 40;
+  return options;
+}
+
+/// A policy's array of surfaces, as a wave.
+template <class Exec>
+class wave_of_surfaces {
+ public:
+  wave_of_surfaces(const Exec& exec, const std::vector<test_surface>& surfaces, std::uint32_t depth = 0,
+                   std::uint64_t seed = 1)
+      : surfaces_(exec, surfaces), depth_(depth), seed_(seed) {}
+
+  auto get() const {
+    return wfpg::wave{depth_, surfaces_.size(), stored_surfaces{const_view<test_surface>(surfaces_)},
+                      hashed_numbers{seed_}};
+  }
+
+ private:
+  wfpg::buffer<test_surface, Exec> surfaces_;
+  std::uint32_t depth_;
+  std::uint64_t seed_;
+};
+
+/// A guider of the box that knows the patch.
+template <class Exec>
+struct guided_box {
+  Exec exec;
+  wfpg::path_guider<Exec> guider;
+
+  explicit guided_box(const wfpg::guider_options& options = box_options(),
+                      wfpg::memory_resource* resource = nullptr)
+      : exec(resource), guider(exec, box_mesh<Exec>(exec).view(), options) {}
+
+  /// Deposits the patch on 40² points a wall, and begins the sample after it.
+  void learn() {
+    deposit_on_walls(guider.cache(), 40,
+                     [](std::uint32_t face, float u, float v) { return emitted(face_point(face, u, v)); });
+    guider.end_sample();
+    guider.begin_sample();
+  }
+
+  template <class Caster = box_caster>
+  std::vector<wfpg::sampled_direction> sample(const std::vector<test_surface>& surfaces,
+                                              const Caster& caster = {}, std::uint64_t seed = 1,
+                                              std::uint32_t depth = 0) {
+    const wave_of_surfaces<Exec> wave(exec, surfaces, depth, seed);
+    const wfpg::buffer<wfpg::sampled_direction, Exec> directions(exec, surfaces.size());
+    guider.sample_directions(wave.get(), caster, directions.view());
+    return directions.to_host(exec);
+  }
+};
+
+inline bool same_bits(const wfpg::sampled_direction& a, const wfpg::sampled_direction& b) {
+  return std::memcmp(&a.direction, &b.direction, sizeof a.direction) == 0 &&
+         wfpg::detail::float_bits(a.pdf) == wfpg::detail::float_bits(b.pdf) && a.technique == b.technique;
+}
+
+inline bool same_bits(const std::vector<wfpg::sampled_direction>& a,
+                      const std::vector<wfpg::sampled_direction>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const auto& x, const auto& y) { return same_bits(x, y); });
+}
+
+/// Rays of every kind: Lambert, glossy, glass, mirror and black surfaces, inactive ones with nonsense in
+/// them.
+inline std::vector<test_surface> mixed_surfaces(std::size_t n, std::uint64_t seed) {
+  auto surfaces = wall_surfaces(n, seed);
+  for (std::size_t i = 0; i < n; ++i) {
+    surfaces[i].bsdf.kind = static_cast<bsdf_kind>(i % 8 < 5 ? i % 8 : 0);
+    if (i % 8 != 7) continue;
+    surfaces[i].active = false;
+    surfaces[i].position = vec3(std::nanf(""));
+  }
+  return surfaces;
+}
+
+/// The state of one path between depths.
+struct path_step {
+  test_surface surface;
+  float throughput = 1.0f;
+  float radiance = 0.0f;
+};
+
+/// Follows a sampled direction to the wall that it meets, and records what is there.
+struct follow_path {
+  wfpg::array_view<path_step> paths;
+  wfpg::array_view<const wfpg::sampled_direction> directions;
+  wfpg::array_view<test_surface> surfaces;
+  wfpg::path_recorder_view recorder;
+  std::uint32_t depth;
+
+  void operator()(std::size_t path) const {
+    path_step& step = paths[path];
+    test_surface& surface = surfaces[path];
+    const wfpg::sampled_direction& d = directions[path];
+    if (!surface.active) return;
+    surface.active = d.pdf > 0.0f;
+    if (!surface.active) return;
+    step.throughput *= surface.bsdf.eval(surface.outgoing, d.direction) / d.pdf;
+    wfpg::ray ray;
+    ray.origin = surface.position;
+    ray.direction = d.direction;
+    const float distance = box_caster()(ray).distance;
+    const vec3 p = glm::clamp(ray.origin + distance * d.direction, vec3(0.0f), vec3(1.0f));
+    surface = make_surface(p, inward_normal(p), -d.direction);
+    recorder.vertex(path, depth + 1, p, -d.direction, vec3(step.throughput));
+    recorder.emission(path, depth + 1, vec3(step.throughput * emitted(p)));
+    step.radiance += step.throughput * emitted(p);
+  }
+
+ private:
+  static vec3 inward_normal(vec3 p) {
+    std::uint32_t nearest = 0;
+    for (std::uint32_t face = 1; face < 6; ++face)
+      if (away(p, face) < away(p, nearest)) nearest = face;
+    return face_normal(nearest);
+  }
+  static float away(vec3 p, std::uint32_t face) {
+    return std::abs(p[int(face / 2)] - (face % 2 ? 1.0f : 0.0f));
+  }
+};
+
+/// Traces `samples` samples of paths of two bounces from points on the walls; what each path gathered.
+template <class Exec, class Caster>
+std::vector<float> trace_paths(const Exec& exec, wfpg::path_guider<Exec>& guider, std::uint32_t samples,
+                               std::size_t paths, const Caster& caster) {
+  std::vector<float> picture;
+  for (std::uint32_t sample = 0; sample < samples; ++sample) {
+    const auto first = wall_surfaces(paths, sample);
+    const wfpg::buffer<test_surface, Exec> surfaces(exec, first);
+    const wfpg::buffer<path_step, Exec> steps(exec, std::vector<path_step>(paths));
+    const wfpg::buffer<wfpg::sampled_direction, Exec> directions(exec, paths);
+    guider.begin_sample();
+    const wfpg::path_recorder_view recorder = guider.recorder();
+    exec.for_each(paths, [recorder, at = surfaces.view()](std::size_t i) {
+      recorder.vertex(i, 0, at[i].position, at[i].outgoing, vec3(1.0f));
+    });
+    for (std::uint32_t depth = 0; depth < 2; ++depth) {
+      const stored_surfaces stored{const_view<test_surface>(surfaces)};
+      guider.sample_directions(wfpg::wave{depth, paths, stored, hashed_numbers{100 * sample + depth}}, caster,
+                               directions.view());
+      exec.for_each(paths, follow_path{steps.view(), const_view<wfpg::sampled_direction>(directions),
+                                       surfaces.view(), recorder, depth});
+    }
+    guider.end_sample();
+    for (const path_step& step : steps.to_host(exec)) picture.push_back(step.radiance);
+  }
+  return picture;
+}
+
+/// Options for trace_paths.
+inline wfpg::guider_options tracing_options(std::size_t paths,
+                                            wfpg::guiding_mode mode = wfpg::guiding_mode::oriented) {
+  wfpg::guider_options options = box_options(mode);
+  options.max_paths = paths;
+  options.max_depth = 3;
+  options.max_rays = 0;
+  options.deposit_capacity = 0;
+  options.unguided_samples = 1;
+  return options;
+}
+
+}  // namespace wfpg_test

@@ -1,0 +1,107 @@
+// The execution policies that tests run on, and a test case for each of them: WFPG_TEST_CASE defines one test
+// per policy and warp width, named "NAME - tbb16" and tagged [tbb][w16].
+//
+// WFPG_TEST_ONLY_TBB leaves the other policies out, for the thread sanitizer.
+#pragma once
+
+#include "support/catch.hpp"
+
+#if !defined(WFPG_TEST_ONLY_TBB)
+#include <wfpg/exec/omp.hpp>
+#include <wfpg/exec/seq.hpp>
+#endif
+#include <wfpg/buffer.hpp>
+#include <wfpg/exec/tbb.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#define WFPG_TEST_JOIN_(a, b) a##b
+#define WFPG_TEST_JOIN(a, b) WFPG_TEST_JOIN_(a, b)
+
+#define WFPG_TEST_ONE(function, name, tags, policy, width)                  \
+  TEST_CASE(name " - " #policy #width, tags "[" #policy "][w" #width "]") { \
+    function<wfpg::exec::basic_##policy<width>>();                          \
+  }
+#define WFPG_TEST_WIDTHS(function, name, tags, policy) \
+  WFPG_TEST_ONE(function, name, tags, policy, 8)       \
+  WFPG_TEST_ONE(function, name, tags, policy, 16)      \
+  WFPG_TEST_ONE(function, name, tags, policy, 32)
+
+#if defined(WFPG_TEST_ONLY_TBB)
+#define WFPG_TEST_POLICIES(function, name, tags) WFPG_TEST_WIDTHS(function, name, tags, tbb)
+#else
+#define WFPG_TEST_POLICIES(function, name, tags) \
+  WFPG_TEST_WIDTHS(function, name, tags, seq)    \
+  WFPG_TEST_WIDTHS(function, name, tags, omp)    \
+  WFPG_TEST_WIDTHS(function, name, tags, tbb)
+#endif
+
+#define WFPG_TEST_CASE_(function, name, tags) \
+  template <class Exec>                       \
+  void function();                            \
+  WFPG_TEST_POLICIES(function, name, tags)    \
+  template <class Exec>                       \
+  void function()
+
+/// A test case on every policy and width; its body knows the policy as `Exec`. Use in an anonymous namespace.
+#define WFPG_TEST_CASE(name, tags) WFPG_TEST_CASE_(WFPG_TEST_JOIN(policy_test_, __LINE__), name, tags)
+
+namespace wfpg_test {
+
+/// The elements of a view in the policy's memory, on the host.
+template <class Exec, class T>
+std::vector<std::remove_const_t<T>> to_host(const Exec& exec, wfpg::array_view<T> view) {
+  std::vector<std::remove_const_t<T>> host(view.size());
+  exec.copy_to_host(host.data(), view.data(), view.size() * sizeof(T));
+  return host;
+}
+
+/// A view of const elements.
+template <class T, class Exec>
+wfpg::array_view<const T> const_view(const wfpg::buffer<T, Exec>& buffer) {
+  return buffer.view();
+}
+
+/// Reproducible random numbers that are the same on every platform.
+class random_numbers {
+ public:
+  explicit random_numbers(std::uint64_t seed) : state_(seed) {}
+
+  std::uint64_t bits() {  // SplitMix64
+    std::uint64_t z = state_ += 0x9e3779b97f4a7c15ull;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+    return z ^ (z >> 31);
+  }
+  /// In [0, n).
+  std::uint32_t below(std::uint32_t n) { return static_cast<std::uint32_t>((bits() >> 32) * n >> 32); }
+  /// In [0, 1).
+  float unit() { return static_cast<float>(bits() >> 40) * 0x1p-24f; }
+  float between(float low, float high) { return low + (high - low) * unit(); }
+  wfpg::vec3 point(float low, float high) {
+    const float x = between(low, high), y = between(low, high);
+    return {x, y, between(low, high)};
+  }
+  wfpg::vec3 direction() {
+    for (;;) {
+      const wfpg::vec3 p = point(-1.0f, 1.0f);
+      const float square = glm::dot(p, p);
+      if (square > 1.0e-4f && square <= 1.0f) return glm::normalize(p);
+    }
+  }
+
+ private:
+  std::uint64_t state_;
+};
+
+template <class T>
+void shuffle(std::vector<T>& values, random_numbers& random) {
+  for (std::size_t i = values.size(); i > 1; --i)
+    std::swap(values[i - 1], values[random.below(static_cast<std::uint32_t>(i))]);
+}
+
+}  // namespace wfpg_test

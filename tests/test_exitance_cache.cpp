@@ -1,0 +1,311 @@
+// The exitance cache: deposits, averages bottom-up, reads, what is dropped, determinism.
+#include "support/cached_scene.hpp"
+#include "support/catch.hpp"
+#include "support/policies.hpp"
+#include "support/random_meshes.hpp"
+
+#include <wfpg/exitance_cache.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+namespace {
+
+using namespace wfpg_test;
+using wfpg::exitance_cache_view;
+using wfpg::invalid_node;
+using wfpg::morton_code;
+using wfpg::node_id;
+using wfpg::uvec3;
+using wfpg::vec3;
+
+constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+constexpr float infinity = std::numeric_limits<float>::infinity();
+
+WFPG_TEST_CASE("what is deposited on a side is read from it", "[exitance_cache]") {
+  const vec3 z(0, 0, 1), slanted = glm::normalize(vec3(0.9f, 0, 0.1f));
+  cached_scene<Exec> scene(fragments_in_grid<Exec>({{{1, 1, 1}, z, 1.0f}}), 100);
+  const vec3 p(1.5f);
+  const node_id leaf = scene.octree().leaf_at(p);
+  CHECK(scene.view().read(leaf, z) == 0.0f);
+  CHECK(scene.view().radiance(leaf, 0) < 0.0f);
+
+  deposit_all(scene, {{p, z, 1.0f}, {p, slanted, 2.0f}, {p, z, 6.0f}, {p, -z, 8.0f}});
+  CHECK(scene.view().read(leaf, z) == 0.0f);  // not before update
+  scene.cache.update(scene.exec);
+  CHECK(scene.view().read(leaf, z) == 3.0f);
+  CHECK(scene.view().read(leaf, slanted) == 3.0f);  // no cosine
+  CHECK(scene.view().read(leaf, -slanted) == 8.0f);
+  CHECK(scene.view().radiance(leaf, 0) == 3.0f);
+  CHECK(scene.view().radiance(leaf, 1) == 8.0f);
+
+  deposit_all(scene, {{p, z, 7.0f}, {p, -z, 0.0f}, {p, -z, -0.0f}, {{1.5f, 1.5f, 2.4f}, -z, 0.0f}});
+  scene.cache.update(scene.exec);
+  CHECK(scene.view().read(leaf, z) == 4.0f);
+  CHECK(scene.view().read(leaf, -z) == 2.0f);  // four deposits, one from the voxel next door
+  scene.cache.update(scene.exec);
+  CHECK(scene.view().read(leaf, z) == 4.0f);
+  CHECK(scene.cache.dropped(scene.exec).total() == 0);
+
+  scene.view().deposit(p, z, vec3(1.0f));
+  scene.cache.clear(scene.exec);
+  scene.cache.update(scene.exec);
+  CHECK(scene.view().read(leaf, z) == 0.0f);
+  CHECK(scene.view().radiance(0, 0) < 0.0f);
+  scene.view().deposit(p, z, vec3(1.0f, 2.0f, 3.0f));
+  scene.cache.update(scene.exec);
+  CHECK(scene.view().read(leaf, z) == Approx(wfpg::luminance(vec3(1.0f, 2.0f, 3.0f))));
+}
+
+std::vector<deposit> random_deposits(const test_mesh& mesh, std::size_t n, std::uint64_t seed) {
+  random_numbers random(seed);
+  std::vector<deposit> deposits;
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t t = random.below(static_cast<std::uint32_t>(mesh.triangles.size()));
+    const float u = random.unit(), v = random.unit() * (1.0f - u);
+    const vec3 a = mesh.vertex(t, 0), b = mesh.vertex(t, 1), c = mesh.vertex(t, 2);
+    const float radiance = std::pow(10.0f, random.between(-4.0f, 4.0f));
+    deposits.push_back({a + u * (b - a) + v * (c - a), random.direction(), radiance});
+  }
+  return deposits;
+}
+
+/// A node's side, from its leaves upward, by recursion; negative without data.
+float averaged(const exitance_cache_view& cache, node_id node, std::uint32_t side) {
+  const auto& tree = cache.octree();
+  if (tree.is_leaf(node)) return cache.radiance(node, side);
+  const vec3 facing = side == 0 ? cache.normal(node) : -cache.normal(node);
+  float sum = 0.0f, n = 0.0f;
+  for (std::uint32_t octant = 0; octant < 8; ++octant) {
+    const node_id child = tree.child(node, octant);
+    if (child == invalid_node) continue;
+    const std::uint32_t matching = glm::dot(cache.normal(child), facing) >= 0.0f ? 0 : 1;
+    const float value = averaged(cache, child, matching);
+    if (value < 0.0f) continue;
+    sum += value;
+    n += 1.0f;
+  }
+  return n > 0.0f ? sum / n : -1.0f;
+}
+
+/// All sides of all nodes.
+template <class Exec>
+std::vector<float> all_radiance(const cached_scene<Exec>& scene) {
+  std::vector<float> values;
+  for (node_id node = 0; node < scene.octree().node_count(); ++node)
+    for (std::uint32_t side = 0; side < 2; ++side) values.push_back(scene.view().radiance(node, side));
+  return values;
+}
+
+WFPG_TEST_CASE("averages are those of a naive recursion", "[exitance_cache]") {
+  const test_mesh mesh = sphere_mesh(10);
+  cached_scene<Exec> scene(mesh, 16, 1000);
+  for (int round = 0; round < 3; ++round) {
+    deposit_all(scene, random_deposits(mesh, 400, round));
+    scene.cache.update(scene.exec);
+    std::size_t wrong = 0, without = 0;
+    for (node_id node = 0; node < scene.octree().node_count(); ++node)
+      for (std::uint32_t side = 0; side < 2; ++side) {
+        wrong += scene.view().radiance(node, side) != averaged(scene.view(), node, side) ? 1 : 0;
+        without += scene.view().radiance(node, side) < 0.0f ? 1 : 0;
+      }
+    CHECK(wrong == 0);
+    CHECK(without > 10);
+    CHECK(without < 2 * scene.octree().node_count() - 200);
+  }
+}
+
+WFPG_TEST_CASE("leaf means are those of the deposits", "[exitance_cache]") {
+  const test_mesh mesh = box_mesh();
+  cached_scene<Exec> scene(mesh, 8, 20000);
+  std::vector<double> sums(2 * scene.octree().node_count(), 0.0), counts = sums;
+  for (int round = 0; round < 3; ++round) {
+    const std::vector<deposit> deposits = random_deposits(mesh, 20000, 10 + round);
+    deposit_all(scene, deposits);
+    scene.cache.update(scene.exec);
+    for (const deposit& d : deposits) {
+      const node_id leaf = scene.octree().nearest_leaf(d.position);
+      const std::uint32_t side = glm::dot(scene.view().normal(leaf), d.direction) >= 0.0f ? 0 : 1;
+      sums[2 * leaf + side] += d.radiance;
+      counts[2 * leaf + side] += 1.0;
+    }
+  }
+  CHECK(scene.cache.dropped(scene.exec).total() == 0);
+  double worst = 0.0;
+  for (node_id leaf = scene.octree().first_leaf(); leaf < scene.octree().node_count(); ++leaf)
+    for (std::uint32_t side = 0; side < 2; ++side) {
+      const std::size_t slot = 2 * leaf + side;
+      const double expected = counts[slot] > 0.0 ? sums[slot] / counts[slot] : -1.0;
+      worst = std::max(worst, std::abs(scene.view().radiance(leaf, side) / expected - 1.0));
+    }
+  CHECK(worst < 1.0e-6);
+}
+
+WFPG_TEST_CASE("sides match between parent and child by direction", "[exitance_cache]") {
+  const vec3 z(0, 0, 1);
+  cached_scene<Exec> scene(fragments_in_grid<Exec>({{{0, 0, 0}, z, 10.0f}, {{1, 0, 0}, -z, 1.0f}}), 10);
+  const node_id up = scene.octree().leaf_at(uvec3(0, 0, 0)), down = scene.octree().leaf_at(uvec3(1, 0, 0));
+  deposit_all(scene, {{{0.5f, 0.5f, 0.5f}, z, 2.0f}, {{1.5f, 0.5f, 0.5f}, z, 4.0f}});
+  scene.cache.update(scene.exec);
+  CHECK(scene.view().side_facing(up, z) == 0);
+  CHECK(scene.view().side_facing(down, z) == 1);
+  CHECK(scene.view().radiance(down, 1) == 4.0f);
+  const node_id parent = scene.octree().parent(up);
+  CHECK(scene.view().radiance(parent, scene.view().side_facing(parent, z)) == 3.0f);
+  CHECK(scene.view().radiance(parent, scene.view().side_facing(parent, -z)) < 0.0f);
+  CHECK(scene.view().read(0, z) == 3.0f);
+  CHECK(scene.view().read(0, -z) == 0.0f);
+}
+
+WFPG_TEST_CASE("a side without data reads its first ancestor that has some", "[exitance_cache]") {
+  const vec3 z(0, 0, 1);
+  cached_scene<Exec> scene(fragments_in_grid<Exec>({{{0, 0, 0}, z, 10.0f},
+                                                    {{1, 0, 0}, -z, 1.0f},    // a sibling turned over
+                                                    {{2, 0, 0}, z, 1.0f},     // a cousin
+                                                    {{7, 7, 7}, -z, 0.5f}}),  // shares the root only
+                           10);
+  deposit_all(scene, {{{0.5f, 0.5f, 0.5f}, z, 2.0f}, {{2.5f, 0.5f, 0.5f}, z, 6.0f}});
+  scene.cache.update(scene.exec);
+  const auto read = [&](uvec3 voxel, vec3 toward) {
+    return scene.view().read(scene.octree().leaf_at(voxel), toward);
+  };
+  CHECK(read({0, 0, 0}, z) == 2.0f);
+  CHECK(read({1, 0, 0}, z) == 2.0f);
+  CHECK(read({2, 0, 0}, z) == 6.0f);
+  CHECK(read({7, 7, 7}, z) == 4.0f);
+  for (const uvec3 voxel : {uvec3(0, 0, 0), uvec3(1, 0, 0), uvec3(2, 0, 0), uvec3(7, 7, 7)})
+    CHECK(read(voxel, -z) == 0.0f);
+}
+
+WFPG_TEST_CASE("deposits that cannot be are dropped and counted", "[exitance_cache]") {
+  const vec3 z(0, 0, 1), p(1.5f);
+  cached_scene<Exec> scene(fragments_in_grid<Exec>({{{1, 1, 1}, z, 1.0f}}), 100);
+  deposit_all(scene, {
+                         {p, z, nan},
+                         {p, z, infinity},
+                         {p, z, -infinity},
+                         {p, z, -1.0e-30f},
+                         {{nan, 0, 0}, z, 1.0f},
+                         {{0, infinity, 0}, z, 1.0f},
+                         {p, {0, 0, nan}, 1.0f},
+                         {p, {infinity, 0, 0}, 1.0f},
+                         {{5.5f, 5.5f, 5.5f}, z, 1.0f},
+                         {{-100, 0, 0}, z, 1.0f},
+                         {{3.0e38f, 0, 0}, z, 1.0f},
+                         {p, z, 0.25f},
+                     });
+  scene.view().deposit(p, z, vec3(nan, 1.0f, 1.0f));
+  scene.view().deposit(p, z, vec3(1.0f, -100.0f, 1.0f));
+  scene.cache.update(scene.exec);
+  const wfpg::dropped_deposits dropped = scene.cache.dropped(scene.exec);
+  CHECK(dropped.invalid == 10);
+  CHECK(dropped.outside == 3);
+  CHECK(dropped.overflow == 0);
+  CHECK(dropped.total() == 13);
+  CHECK(scene.view().read(scene.octree().leaf_at(p), z) == 0.25f);
+
+  deposit_all(scene, std::vector<deposit>(3, {p, z, 3.0e38f}));
+  scene.cache.update(scene.exec);
+  CHECK(std::isfinite(scene.view().read(scene.octree().leaf_at(p), z)));
+  CHECK(scene.cache.dropped(scene.exec).total() == 13);
+}
+
+WFPG_TEST_CASE("a full queue drops and counts, and works again after an update", "[exitance_cache]") {
+  const vec3 z(0, 0, 1), p(1.5f);
+  cached_scene<Exec> scene(fragments_in_grid<Exec>({{{1, 1, 1}, z, 1.0f}}), 1000);
+  const node_id leaf = scene.octree().leaf_at(p);
+  deposit_all(scene, std::vector<deposit>(1500, {p, z, 2.0f}));
+  CHECK(scene.cache.dropped(scene.exec).overflow == 500);
+  scene.cache.update(scene.exec);
+  CHECK(scene.view().read(leaf, z) == 2.0f);
+  deposit_all(scene, std::vector<deposit>(1000, {p, z, 4.0f}));
+  scene.cache.update(scene.exec);
+  CHECK(scene.cache.dropped(scene.exec).overflow == 500);
+  CHECK(scene.view().read(leaf, z) == 3.0f);
+
+  cached_scene<Exec> without_queue(fragments_in_grid<Exec>({{{1, 1, 1}, z, 1.0f}}), 0);
+  deposit_all(without_queue, {{p, z, 1.0f}});
+  without_queue.cache.update(without_queue.exec);
+  CHECK(without_queue.cache.dropped(without_queue.exec).overflow == 1);
+  using cache = wfpg::exitance_cache<Exec>;
+  CHECK_THROWS_AS(cache(scene.exec, scene.tree, scene.fragments, std::size_t(1) << 32),
+                  std::invalid_argument);
+}
+
+WFPG_TEST_CASE("an empty scene's cache takes deposits and gives nothing", "[exitance_cache]") {
+  cached_scene<Exec> scene(test_mesh(), 64, 10);
+  deposit_all(scene, std::vector<deposit>(5));
+  scene.cache.update(scene.exec);
+  CHECK(scene.cache.dropped(scene.exec).outside == 5);
+  CHECK(scene.cache.persistent_bytes() == 0);
+  CHECK(scene.view().read(invalid_node, vec3(0, 0, 1)) == 0.0f);
+}
+
+WFPG_TEST_CASE("the order of deposits does not change a bit", "[exitance_cache]") {
+  const test_mesh mesh = sphere_mesh(12);
+  std::vector<deposit> deposits = random_deposits(mesh, 20000, 77);
+  random_numbers random(78);
+  std::vector<float> first;
+  for (int round = 0; round < 3; ++round) {
+    cached_scene<Exec> scene(mesh, 8, 30000 - 1000 * round);
+    deposit_all(scene, deposits);
+    scene.cache.update(scene.exec);
+    const std::vector<float> values = all_radiance(scene);
+    if (round == 0) first = values;
+    CHECK((values == first));
+    shuffle(deposits, random);
+  }
+  static const std::vector<float> on_first_policy = first;
+  CHECK((first == on_first_policy));
+}
+
+TEST_CASE("2^32 deposits in one voxel lose nothing", "[exitance_cache]") {
+  double mean = 0.0;
+  std::uint32_t count = 0;
+  const std::uint64_t half = 1ull << 31;
+  wfpg::detail::add_to_mean(mean, count, static_cast<double>(half), half);
+  CHECK(count == half);
+  CHECK(mean == 1.0);
+  wfpg::detail::add_to_mean(mean, count, 3.0 * static_cast<double>(half), half);
+  CHECK(mean == 2.0);
+  CHECK(count == 0xffffffffu);
+  wfpg::detail::add_to_mean(mean, count, 2.0 * static_cast<double>(half), half);
+  CHECK(mean == Approx(2.0).epsilon(1.0e-15));
+  CHECK(count == 0xffffffffu);
+  wfpg::detail::add_to_mean(mean, count, 2.0 + 0x1p32, 1);
+  CHECK(mean == Approx(3.0).epsilon(1.0e-9));
+  CHECK(count == 0xffffffffu);
+
+  mean = 0.0;
+  count = 0;
+  random_numbers random(5);
+  double sum = 0.0;
+  const std::uint64_t batch = 1ull << 20;
+  for (int i = 0; i < 4096; ++i) {
+    const double value = random.unit();
+    wfpg::detail::add_to_mean(mean, count, value * static_cast<double>(batch), batch);
+    sum += value;
+  }
+  CHECK(count == 0xffffffffu);
+  CHECK(mean == Approx(sum / 4096.0).epsilon(1.0e-12));
+}
+
+WFPG_TEST_CASE("an octree and its cache take at most 28 bytes a node", "[exitance_cache]") {
+  for (const test_mesh& mesh : {sphere_mesh(24), box_mesh(), box_mesh({0, 0, 0}, {4, 3, 2.2f})})
+    for (const std::uint32_t resolution : {32u, 128u}) {
+      const cached_scene<Exec> scene(mesh, resolution, 100);
+      const std::size_t nodes = scene.tree.node_count(), leaves = scene.tree.leaf_count();
+      const std::size_t bytes = scene.tree.bytes() + scene.cache.persistent_bytes();
+      INFO(double(bytes) / double(nodes) << " bytes a node at resolution " << resolution);
+      CHECK(bytes <= 28 * nodes);
+      CHECK(scene.cache.persistent_bytes() == 26 * leaves + 10 * (nodes - leaves));
+      CHECK(scene.cache.transient_bytes() < 8 * 100 + 64);
+    }
+}
+
+}  // namespace

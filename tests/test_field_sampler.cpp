@@ -1,0 +1,377 @@
+// The field sampler: frequencies against probabilities worked out from the cells, densities that integrate to
+// one and are the sampler's own, and cells without weight that are never drawn.
+#include "support/chi_square.hpp"
+#include "support/fields.hpp"
+#include "support/policies.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+using namespace wfpg_test;
+using wfpg::directional_field;
+using wfpg::grid_distribution;
+using wfpg::vec2;
+using wfpg::vec3;
+
+namespace {
+
+constexpr std::uint32_t resolutions[] = {2, 16, 31, 32, 128};
+constexpr float below_one = 1.0f - 0x1p-24f;
+
+std::string name_of(field_kind kind, std::uint32_t resolution, std::uint64_t seed) {
+  return std::string(name_of(kind)) + " field of " + std::to_string(resolution) + "², seed " +
+         std::to_string(seed);
+}
+
+vec2 random_point(std::uint64_t seed, std::size_t i) {
+  return wfpg::detail::unit_vec2(wfpg::detail::hash(seed, i));
+}
+
+bool in_square(vec2 p) {
+  return p.x >= 0.0f && p.x < 1.0f && p.y >= 0.0f && p.y < 1.0f;
+}
+
+std::size_t cell_of(vec2 uv, std::uint32_t resolution) {
+  return std::size_t(uv.y * float(resolution)) * resolution + std::size_t(uv.x * float(resolution));
+}
+
+struct draw_points {
+  grid_distribution grid;
+  std::uint64_t seed;
+  wfpg::array_view<vec2> points;
+  void operator()(std::size_t i) const { points[i] = grid.sample(random_point(seed, i)); }
+};
+
+struct drawn_direction {
+  vec3 direction;
+  float pdf;
+};
+
+struct draw_directions {
+  directional_field field;
+  std::uint64_t seed;
+  wfpg::array_view<drawn_direction> drawn;
+  void operator()(std::size_t i) const {
+    const vec3 d = field.sample(random_point(seed, i));
+    drawn[i] = {d, field.pdf(d)};
+  }
+};
+
+template <class Exec, class T, class Draw>
+std::vector<T> draw(const Exec& exec, std::size_t n, Draw kernel, wfpg::array_view<T> Draw::*output) {
+  const wfpg::buffer<T, Exec> results(exec, n);
+  kernel.*output = results.view();
+  exec.for_each(n, kernel);
+  return results.to_host(exec);
+}
+
+/// Numbers that land on both sides of every cell's border, and at both ends of [0,1).
+std::vector<float> difficult_numbers(const grid_distribution& grid, std::uint32_t row) {
+  std::vector<float> numbers = {0.0f, 0x1p-24f, 0.5f, below_one};
+  double sum = 0.0, total = 0.0;
+  for (std::uint32_t x = 0; x < grid.resolution(); ++x) total += grid.weight(x, row);
+  if (total == 0.0) return numbers;
+  for (std::uint32_t x = 0; x < grid.resolution(); ++x) {
+    sum += grid.weight(x, row);
+    const float edge = float(std::floor(sum / total * 0x1p24) * 0x1p-24);
+    for (int step = -2; step <= 2; ++step)
+      numbers.push_back(std::clamp(edge + float(step) * 0x1p-24f, 0.0f, below_one));
+  }
+  return numbers;
+}
+
+/// Midpoint rule over the square, whose map preserves area: n² points a cell.
+double integral_over_square(const directional_field& field, std::uint32_t n) {
+  const std::uint32_t side = field.grid().resolution() * n;
+  double sum = 0.0;
+  for (std::uint32_t y = 0; y < side; ++y)
+    for (std::uint32_t x = 0; x < side; ++x) {
+      const vec2 uv{(float(x) + 0.5f) / float(side), (float(y) + 0.5f) / float(side)};
+      sum += double(field.pdf(field.direction(uv)));
+    }
+  return sum * double(field.cell_solid_angle()) / (double(n) * n);
+}
+
+/// The same over the whole sphere in (cos theta, phi), without the map.
+double integral_over_sphere(const directional_field& field, std::uint32_t rows) {
+  const auto parts = sphere_bins{rows, 2 * rows}.expected([&](vec3 d) { return field.pdf(d); }, 1.0, 1);
+  double sum = 0.0;
+  for (double part : parts) sum += part;
+  return sum;
+}
+
+const vec3 tilted = glm::normalize(vec3(0.3f, -0.8f, -0.52f));
+
+}  // namespace
+
+TEST_CASE("chi-square test: known tails, pooling, and wrong counts are found", "[chi_square]") {
+  CHECK(chi_square_tail(3.841, 1.0) == Approx(0.05).epsilon(1e-3));
+  CHECK(chi_square_tail(10.828, 1.0) == Approx(0.001).epsilon(1e-3));
+  CHECK(chi_square_tail(124.342, 100.0) == Approx(0.05).epsilon(1e-3));
+  CHECK(chi_square_tail(10.0, 10.0) == Approx(0.44049).epsilon(1e-4));
+  const std::vector<double> expected = {100, 1, 1, 1, 1, 1, 1, 100};
+  const auto fair = chi_square_test({104, 0, 2, 1, 1, 1, 1, 96}, expected);
+  CHECK(fair.degrees == 2.0);
+  CHECK(fair.p > 0.5);
+  CHECK(chi_square_test({160, 1, 1, 1, 1, 1, 1, 40}, expected).p < 1e-6);
+  CHECK(chi_square_test({1, 0, 205, 0, 0, 0, 0, 0}, expected).p < 1e-6);
+  CHECK(chi_square_test({10, 1}, {11, 0}).p == 0.0);
+  CHECK(chi_square_test({160, 40}, {100, 100}).message.find("bin 0, observed 160, expected 100") !=
+        std::string::npos);
+
+  chi_square_family small_errors;
+  for (int i = 0; i < 100; ++i) small_errors.add(chi_square_test({110, 90}, {100, 100}), "biased a little");
+  CHECK(!small_errors.accepted());
+  chi_square_family one_error;
+  for (int i = 0; i < 99; ++i) one_error.add(chi_square_test({102, 98}, {100, 100}), "fair");
+  CHECK(one_error.accepted());
+  one_error.add(chi_square_test({150, 50}, {100, 100}), "wrong");
+  CHECK(!one_error.accepted());
+}
+
+namespace {
+
+WFPG_TEST_CASE("field sampler: frequencies of 100 random fields", "[field_sampler]") {
+  const Exec exec;
+  chi_square_family family;
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    const auto kind = static_cast<field_kind>(seed % std::uint64_t(field_kind::count));
+    const std::uint32_t resolution = resolutions[seed / std::uint64_t(field_kind::count) % 5];
+    const auto values = field_values(kind, resolution, seed);
+    const built_field<Exec> field(exec, values, resolution);
+    const std::size_t samples = std::max<std::size_t>(10000, 2 * values.size());
+    const auto points = draw(exec, samples, draw_points{field.grid(), 1000 + seed, {}}, &draw_points::points);
+
+    std::vector<double> expected = cell_probabilities(values);
+    for (double& p : expected) p *= double(samples);
+    std::vector<double> observed(values.size(), 0.0);
+    REQUIRE(std::all_of(points.begin(), points.end(), [](vec2 p) { return in_square(p); }));
+    for (vec2 p : points) observed[cell_of(p, resolution)] += 1.0;
+    family.add(chi_square_test(observed, expected), name_of(kind, resolution, seed));
+  }
+  INFO(family.message());
+  CHECK(family.accepted());
+}
+
+WFPG_TEST_CASE("field sampler: points are uniform inside a cell", "[field_sampler]") {
+  const Exec exec;
+  constexpr std::uint32_t n = 8;
+  const built_field<Exec> field(exec, field_values(field_kind::noise, 31, 5), 31);
+  std::vector<double> observed(n * n, 0.0);
+  const std::size_t samples = 20000;
+  for (vec2 p : draw(exec, samples, draw_points{field.grid(), 3, {}}, &draw_points::points)) {
+    const vec2 inside = p * 31.0f - glm::floor(p * 31.0f);
+    observed[cell_of(glm::min(inside, vec2(below_one)), n)] += 1.0;
+  }
+  const auto result = chi_square_test(observed, std::vector<double>(n * n, double(samples) / (n * n)));
+  INFO(result.message);
+  CHECK(result.p > 1e-3);
+}
+
+WFPG_TEST_CASE("field sampler: directions have the reported density", "[field_sampler]") {
+  const Exec exec;
+  const sphere_bins bins{12, 24};
+  chi_square_family family;
+  const std::size_t samples = 20000;
+  std::size_t bad = 0;
+  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+    const std::uint32_t resolution = seed % 2 ? 16 : 31;
+    const auto kind = seed < 4 ? field_kind::noise : field_kind::uniform;
+    const built_field<Exec> built(exec, field_values(kind, resolution, seed), resolution, 0.1f);
+    const directional_field field = seed % 3
+                                        ? directional_field(built.grid())
+                                        : directional_field(built.grid(), seed ? tilted : vec3(0, 0, -1));
+    std::vector<double> observed(bins.size(), 0.0);
+    for (const auto& d :
+         draw(exec, samples, draw_directions{field, 77 + seed, {}}, &draw_directions::drawn)) {
+      bad += std::abs(glm::length(d.direction) - 1.0f) > 1e-5f;
+      bad += field.hemisphere() && glm::dot(d.direction, field.normal()) < -1e-6f;
+      observed[bins.of(d.direction)] += 1.0;
+    }
+    const auto expected = bins.expected([&](vec3 d) { return field.pdf(d); }, double(samples), 12);
+    family.add(chi_square_test(observed, expected), name_of(kind, resolution, seed));
+  }
+  CHECK(bad == 0);
+  INFO(family.message());
+  CHECK(family.accepted());
+}
+
+WFPG_TEST_CASE("field sampler: a sampled direction's density is its cell's, bit for bit", "[field_sampler]") {
+  const Exec exec;
+  for (std::uint32_t resolution : resolutions)
+    for (std::uint32_t k = 0; k < std::uint32_t(field_kind::count); ++k) {
+      const auto kind = static_cast<field_kind>(k);
+      const built_field<Exec> built(exec, field_values(kind, resolution, 17), resolution);
+      const grid_distribution grid = built.grid();
+      std::size_t differing = 0;
+      for (const directional_field& field : {directional_field(grid), directional_field(grid, tilted)})
+        for (std::size_t i = 0; i < 500; ++i) {
+          const vec2 u = random_point(9, i), uv = grid.sample(u);
+          const std::size_t cell = cell_of(uv, resolution);
+          const auto weight = float(grid.weight(cell % resolution, cell / resolution));
+          const float domain = (field.hemisphere() ? 2.0f : 4.0f) * wfpg::detail::pi;
+          const float density = weight / float(grid.total()) * float(resolution * resolution) / domain;
+          differing += field.pdf(field.sample(u)) != density || !(density > 0.0f);
+        }
+      INFO(name_of(kind, resolution, 17));
+      CHECK(differing == 0);
+    }
+}
+
+WFPG_TEST_CASE("field sampler: cells without weight are never drawn, at borders and ends either",
+               "[field_sampler]") {
+  const Exec exec;
+  for (std::uint32_t resolution : {2u, 16u, 31u, 32u, 100u, 128u}) {
+    std::vector<float> values(std::size_t(resolution) * resolution,
+                              0.0f);  // every other cell, every other row
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (i % resolution % 2 == 1 && i / resolution % 2 == 0) values[i] = 1.0f;
+    const built_field<Exec> built(exec, values, resolution);
+    const grid_distribution grid = built.grid();
+    std::size_t outside = 0, empty = 0, no_density = 0;
+    const auto numbers = difficult_numbers(grid, 0);
+    for (float x : numbers)
+      for (float y : {0.0f, 0x1p-24f, 0.3f, 0.5f, 0.5f + 0x1p-24f, below_one}) {
+        const vec2 p = grid.sample({x, y});
+        outside += !in_square(p);
+        empty += in_square(p) && values[cell_of(p, resolution)] == 0.0f;
+        for (const directional_field& field : {directional_field(grid), directional_field(grid, tilted)})
+          no_density += !(field.pdf(field.sample({x, y})) > 0.0f);
+      }
+    INFO("resolution " << resolution);
+    CHECK(outside == 0);
+    CHECK(empty == 0);
+    CHECK(no_density == 0);
+  }
+}
+
+WFPG_TEST_CASE("field sampler: u = 0 draws the first cell with weight, u just below 1 the last",
+               "[field_sampler]") {
+  const Exec exec;
+  for (std::uint32_t resolution : resolutions) {
+    std::vector<float> values = field_values(field_kind::noise, resolution, 3);
+    for (std::uint32_t i = 0; i < resolution; ++i) values[i] = 0.0f;  // the first row
+    values[resolution] = 0.0f;
+    values[resolution + 1] = 1.0f;
+    values[values.size() - 1] = 2.0f;
+    const built_field<Exec> built(exec, values, resolution);
+    CHECK(cell_of(built.grid().sample({0.0f, 0.0f}), resolution) == resolution + 1);
+    CHECK(cell_of(built.grid().sample({below_one, below_one}), resolution) == values.size() - 1);
+  }
+}
+
+WFPG_TEST_CASE("field sampler: stratified numbers stay in order inside a row", "[field_sampler]") {
+  const Exec exec;
+  const built_field<Exec> built(exec, field_values(field_kind::extreme, 31, 4), 31, 1.0f);
+  for (float y : {0.1f, 0.7f}) {
+    float last_x = 0.0f;
+    int disorder = 0;
+    for (int i = 0; i < 5000; ++i) {
+      const vec2 p = built.grid().sample({float(i) / 5000.0f, y});
+      disorder += p.x < last_x;
+      last_x = p.x;
+    }
+    CHECK(disorder == 0);
+  }
+}
+
+WFPG_TEST_CASE("field sampler: densities integrate to one", "[field_sampler]") {
+  const Exec exec;
+  for (std::uint32_t resolution : resolutions)
+    for (std::uint32_t k = 0; k < std::uint32_t(field_kind::count); ++k) {
+      const auto kind = static_cast<field_kind>(k);
+      const built_field<Exec> built(exec, field_values(kind, resolution, 21), resolution,
+                                    k % 2 ? 0.0f : 0.01f);
+      INFO(name_of(kind, resolution, 21));
+      const std::uint32_t n = resolution > 100 ? 1 : 2;
+      CHECK(integral_over_square(directional_field(built.grid()), n) == Approx(1.0).margin(1e-5));
+      CHECK(integral_over_square(directional_field(built.grid(), tilted), n) == Approx(1.0).margin(1e-5));
+    }
+}
+
+WFPG_TEST_CASE("field sampler: densities integrate to one over the sphere without the map",
+               "[field_sampler]") {
+  const Exec exec;
+  const built_field<Exec> noise(exec, field_values(field_kind::noise, 16, 2), 16);
+  CHECK(integral_over_sphere(directional_field(noise.grid()), 200) == Approx(1.0).margin(1e-3));
+  CHECK(integral_over_sphere(directional_field(noise.grid(), tilted), 400) == Approx(1.0).margin(2e-3));
+  const built_field<Exec> delta(exec, field_values(field_kind::delta, 2, 2), 2);
+  CHECK(integral_over_sphere(directional_field(delta.grid()), 200) == Approx(1.0).margin(2e-3));
+}
+
+WFPG_TEST_CASE("field sampler: values without rounding give the same bits on every width",
+               "[field_sampler]") {
+  const Exec exec;
+  for (std::uint32_t resolution : resolutions) {
+    random_numbers random(resolution);
+    std::vector<float> values(std::size_t(resolution) * resolution);
+    float total = 0.0f;  // exact: integers, and less than 2^24 in all
+    for (float& value : values) total += value = float(random.below(1000));
+    const built_field<Exec> built(exec, values, resolution);
+
+    std::vector<std::uint32_t> expected(wfpg::detail::distribution_words(resolution));
+    std::uint32_t through = 0;
+    const float scale = 0x1p31f / total;
+    for (std::uint32_t y = 0; y < resolution; ++y) {
+      std::uint32_t row = 0;
+      for (std::uint32_t x = 0; x < resolution; ++x) {
+        const float value = values[y * resolution + x];
+        row += value > 0.0f ? std::max(std::uint32_t(std::min(value * scale, 0x1p31f)), 1u) : 0u;
+        expected[y * resolution + x] = row;
+      }
+      expected[resolution * resolution + y] = through += row;
+    }
+    INFO("resolution " << resolution);
+    CHECK(built.words(exec) == expected);
+  }
+}
+
+WFPG_TEST_CASE("field sampler: floors, all-zero fields, and values near the ends of floats",
+               "[field_sampler]") {
+  const Exec exec;
+  const built_field<Exec> floored(exec, {0.0f, 1.0f, 0.0f, 2.0f}, 2, 1.0f);
+  const auto probability = [](const grid_distribution& grid, std::uint32_t cell) {
+    return double(grid.weight(cell % 2, cell / 2)) / double(grid.total());
+  };
+  for (std::uint32_t cell = 0; cell < 4; ++cell)
+    CHECK(probability(floored.grid(), cell) ==
+          Approx(cell_probabilities({0.0f, 1.0f, 0.0f, 2.0f}, 1.0f)[cell]).epsilon(1e-6));
+
+  const built_field<Exec> black(exec, {0.0f, 0.0f, 0.0f, 0.0f}, 2);
+  const built_field<Exec> nearly_black(exec, {1e-38f, 0.0f, 1e-40f, 0.0f}, 2);
+  for (std::uint32_t cell = 0; cell < 4; ++cell) {
+    CHECK(probability(black.grid(), cell) == 0.25);
+    CHECK(probability(nearly_black.grid(), cell) == 0.25);
+  }
+  const built_field<Exec> bright(exec, {1e30f, 3e30f, 1e-30f, 0.0f}, 2);
+  CHECK(probability(bright.grid(), 0) == Approx(0.25).epsilon(1e-6));
+  CHECK(probability(bright.grid(), 1) == Approx(0.75).epsilon(1e-6));
+  CHECK(bright.grid().weight(0, 1) == 1);
+  CHECK(bright.grid().weight(1, 1) == 0);
+}
+
+WFPG_TEST_CASE("field sampler: hemispheres have no density below the horizon", "[field_sampler]") {
+  const Exec exec;
+  const built_field<Exec> built(exec, std::vector<float>(16 * 16, 1.0f), 16);
+  random_numbers random(8);
+  for (int i = 0; i < 200; ++i) {
+    const vec3 normal = random.direction(), d = random.direction();
+    const directional_field field(built.grid(), normal);
+    const float density = field.pdf(d);
+    if (glm::dot(d, normal) > 1e-4f) CHECK(density == Approx(1.0 / (2.0 * 3.14159265)).epsilon(1e-5));
+    if (glm::dot(d, normal) < -1e-4f) CHECK(density == 0.0f);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("field sampler: a default field is empty", "[field_sampler]") {
+  CHECK(directional_field().empty());
+  CHECK(!directional_field(grid_distribution(nullptr, nullptr, 4)).empty());
+  CHECK(directional_field(grid_distribution(nullptr, nullptr, 4)).cell_solid_angle() ==
+        Approx(4.0 * 3.14159265 / 16.0));
+  CHECK(directional_field(grid_distribution(nullptr, nullptr, 4), tilted).cell_solid_angle() ==
+        Approx(2.0 * 3.14159265 / 16.0));
+}

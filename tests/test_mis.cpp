@@ -1,0 +1,188 @@
+// Multiple importance sampling: the heuristics, and the mixture of a field and a BSDF, whose density has to
+// be how often it draws a direction.
+#include "support/chi_square.hpp"
+#include "support/fields.hpp"
+#include "support/policies.hpp"
+#include "support/scenes.hpp"
+
+#include <wfpg/mis.hpp>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+using namespace wfpg_test;
+using wfpg::directional_field;
+using wfpg::guide_mixture;
+using wfpg::sampled_direction;
+using wfpg::sampling_technique;
+
+namespace {
+
+const vec3 up = glm::normalize(vec3(-0.2f, 0.9f, 0.4f));
+const vec3 toward_eye = glm::normalize(vec3(0.5f, 0.6f, 0.3f));
+
+struct draw_mixture {
+  guide_mixture mixture;
+  test_surface surface;
+  std::uint64_t seed;
+  wfpg::array_view<sampled_direction> drawn;
+  void operator()(std::size_t i) const {
+    const hashed_numbers random{seed};
+    const auto ray = static_cast<std::uint32_t>(i);
+    drawn[i] = mixture.sample(surface, random(ray, 0).x, random(ray, 1));
+  }
+};
+
+template <class Exec>
+std::vector<sampled_direction> draw(const Exec& exec, const guide_mixture& mixture,
+                                    const test_surface& surface, std::size_t n, std::uint64_t seed) {
+  const wfpg::buffer<sampled_direction, Exec> drawn(exec, n);
+  exec.for_each(n, draw_mixture{mixture, surface, seed, drawn.view()});
+  return drawn.to_host(exec);
+}
+
+std::size_t count(const std::vector<sampled_direction>& drawn, sampling_technique technique) {
+  std::size_t n = 0;
+  for (const sampled_direction& d : drawn) n += d.technique == technique;
+  return n;
+}
+
+constexpr float fractions[] = {0.0f, 0.3f, 0.7f, 1.0f};
+
+}  // namespace
+
+TEST_CASE("MIS: heuristics sum to one, at any scale of the densities", "[mis]") {
+  for (float p : {1e-30f, 1e-3f, 1.0f, 7.0f, 1e20f, 1e30f})
+    for (float q : {1e-30f, 1e-3f, 1.0f, 7.0f, 1e20f, 1e30f}) {
+      INFO("p " << p << ", q " << q);
+      CHECK(wfpg::balance_heuristic(p, q) + wfpg::balance_heuristic(q, p) == Approx(1.0f));
+      CHECK(wfpg::power_heuristic(p, q) + wfpg::power_heuristic(q, p) == Approx(1.0f));
+    }
+  CHECK(wfpg::balance_heuristic(3.0f, 1.0f) == Approx(0.75f));
+  CHECK(wfpg::power_heuristic(3.0f, 1.0f) == Approx(0.9f));
+  CHECK(wfpg::balance_heuristic(0.0f, 0.0f) == 0.0f);
+  CHECK(wfpg::power_heuristic(0.0f, 0.0f) == 0.0f);
+  CHECK(wfpg::balance_heuristic(2.0f, 0.0f) == 1.0f);
+  CHECK(wfpg::power_heuristic(2.0f, 0.0f) == 1.0f);
+}
+
+namespace {
+
+WFPG_TEST_CASE("MIS: the mixture's density is its sampling frequency", "[mis]") {
+  const Exec exec;
+  const sphere_bins bins{10, 20};
+  const std::size_t samples = 20000;
+  const built_field<Exec> built(exec, field_values(field_kind::noise, 16, 3), 16, 0.05f);
+  chi_square_family family;
+  for (const directional_field& field :
+       {directional_field(built.grid()), directional_field(built.grid(), up)})
+    for (bsdf_kind kind : {bsdf_kind::lambert, bsdf_kind::glass})
+      for (float fraction : fractions) {
+        const test_surface surface = make_surface({}, up, toward_eye, kind);
+        const guide_mixture mixture{field, fraction};
+        const auto drawn = draw(exec, mixture, surface, samples, 5 + family.size());
+        std::vector<double> observed(bins.size(), 0.0);
+        for (const sampled_direction& d : drawn) observed[bins.of(d.direction)] += 1.0;
+        const auto expected =
+            bins.expected([&](vec3 d) { return mixture.pdf(surface, d); }, double(samples), 10);
+        family.add(chi_square_test(observed, expected), "fraction " + std::to_string(fraction));
+
+        const double guided = double(count(drawn, sampling_technique::guide)) / double(samples);
+        const double sigma = std::sqrt(fraction * (1.0 - fraction) / double(samples));
+        CHECK(std::abs(guided - fraction) <= 4.0 * sigma);
+        CHECK(count(drawn, sampling_technique::none) == 0);
+      }
+  INFO(family.message());
+  CHECK(family.accepted());
+}
+
+WFPG_TEST_CASE("MIS: a query's density is the sample's, bit for bit", "[mis]") {
+  const Exec exec;
+  const built_field<Exec> built(exec, field_values(field_kind::extreme, 31, 3), 31);
+  for (const directional_field& field :
+       {directional_field(built.grid()), directional_field(built.grid(), up)})
+    for (bsdf_kind kind : {bsdf_kind::lambert, bsdf_kind::glossy, bsdf_kind::glass})
+      for (float fraction : fractions) {
+        const test_surface surface = make_surface({}, up, toward_eye, kind);
+        const guide_mixture mixture{field, fraction};
+        std::size_t differing = 0;
+        for (const sampled_direction& d : draw(exec, mixture, surface, 500, 11)) {
+          if (d.technique == sampling_technique::none) continue;
+          differing += d.pdf != mixture.pdf(surface, d.direction) || !(d.pdf > 0.0f);
+        }
+        INFO("kind " << int(kind) << ", fraction " << fraction);
+        CHECK(differing == 0);
+      }
+}
+
+WFPG_TEST_CASE("MIS: the density is the weighted sum of the two", "[mis]") {
+  const Exec exec;
+  const built_field<Exec> built(exec, field_values(field_kind::noise, 16, 9), 16);
+  const directional_field field(built.grid());
+  const test_surface surface = make_surface({}, up, toward_eye);
+  random_numbers random(2);
+  for (int i = 0; i < 100; ++i) {
+    const vec3 d = random.direction();
+    for (float fraction : fractions)
+      CHECK(guide_mixture{field, fraction}.pdf(surface, d) ==
+            Approx(fraction * field.pdf(d) + (1.0f - fraction) * surface.bsdf.pdf(toward_eye, d)));
+  }
+}
+
+WFPG_TEST_CASE("MIS: delta BSDFs are sampled alone", "[mis]") {
+  const Exec exec;
+  const built_field<Exec> built(exec, field_values(field_kind::noise, 16, 3), 16);
+  const test_surface surface = make_surface({}, up, toward_eye, bsdf_kind::mirror);
+  const vec3 mirrored = surface.bsdf.sample(toward_eye, {}).direction;
+  for (float fraction : fractions) {
+    const guide_mixture mixture{directional_field(built.grid(), up), fraction};
+    for (const sampled_direction& d : draw(exec, mixture, surface, 100, 1)) {
+      CHECK(d.technique == sampling_technique::delta);
+      CHECK(d.direction == mirrored);
+      CHECK(d.pdf == 0.75f);
+    }
+    CHECK(mixture.pdf(surface, mirrored) == 0.0f);
+  }
+}
+
+WFPG_TEST_CASE("MIS: fraction 0 and an empty field leave the BSDF, fraction 1 the field", "[mis]") {
+  const Exec exec;
+  const built_field<Exec> built(exec, field_values(field_kind::noise, 16, 3), 16);
+  const directional_field field(built.grid(), up);
+  const test_surface surface = make_surface({}, up, toward_eye);
+  for (const guide_mixture& mixture :
+       {guide_mixture{field, 0.0f}, guide_mixture{{}, 0.7f}, guide_mixture{}}) {
+    const auto drawn = draw(exec, mixture, surface, 200, 4);
+    CHECK(count(drawn, sampling_technique::bsdf) == drawn.size());
+    for (std::uint32_t i = 0; i < drawn.size(); ++i) {
+      const wfpg::bsdf_sample alone = surface.bsdf.sample(toward_eye, hashed_numbers{4}(i, 1));
+      CHECK(drawn[i].direction == alone.direction);
+      CHECK(drawn[i].pdf == alone.pdf);
+    }
+  }
+  const auto guided = draw(exec, {field, 1.0f}, surface, 200, 4);
+  CHECK(count(guided, sampling_technique::guide) == guided.size());
+  for (const sampled_direction& d : guided) CHECK(d.pdf == field.pdf(d.direction));
+}
+
+WFPG_TEST_CASE("MIS: a BSDF whose sampling fails ends the path", "[mis]") {
+  const Exec exec;
+  const built_field<Exec> built(exec, field_values(field_kind::noise, 16, 3), 16);
+  const test_surface surface = make_surface({}, up, toward_eye, bsdf_kind::black);
+  const guide_mixture mixture{directional_field(built.grid(), up), 0.5f};
+  const auto drawn = draw(exec, mixture, surface, 1000, 6);
+  const std::size_t failed = count(drawn, sampling_technique::none);
+  CHECK(failed > 400);
+  CHECK(failed < 600);
+  CHECK(failed + count(drawn, sampling_technique::guide) == drawn.size());
+  for (const sampled_direction& d : drawn)
+    if (d.technique == sampling_technique::none) {
+      CHECK(d.pdf == 0.0f);
+      CHECK(d.direction == vec3(0.0f));
+    } else {
+      CHECK(d.pdf == mixture.pdf(surface, d.direction));
+    }
+}
+
+}  // namespace

@@ -1,0 +1,293 @@
+// The facade: options, waves of unusual rays, deposits and drops, memory, statistics, failures. What
+// directions it draws is test_path_guider_sampling.cpp's.
+#include "support/guiding.hpp"
+#include "support/policies.hpp"
+#include "support/scenes.hpp"
+
+#include <wfpg/path_guider.hpp>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+using namespace wfpg_test;
+using wfpg::guider_options;
+using wfpg::guiding_mode;
+using wfpg::path_guider;
+using wfpg::sampled_direction;
+using wfpg::sampling_technique;
+
+namespace {
+
+constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+constexpr float infinity = std::numeric_limits<float>::infinity();
+
+struct bad_option {
+  const char* name;  ///< that the message has to contain
+  std::function<void(guider_options&)> spoil;
+};
+
+const std::vector<bad_option>& bad_options() {
+  static const std::vector<bad_option> list = {
+      {"octree", [](guider_options& o) { o.octree_resolution = 0; }},
+      {"octree", [](guider_options& o) { o.octree_resolution = 3; }},
+      {"octree", [](guider_options& o) { o.octree_resolution = 1u << 20; }},
+      {"rays_per_bin", [](guider_options& o) { o.rays_per_bin = 0; }},
+      {"field_resolution", [](guider_options& o) { o.field_resolution = 1; }},
+      {"field_resolution", [](guider_options& o) { o.field_resolution = 129; }},
+      {"min_field_resolution", [](guider_options& o) { o.min_field_resolution = 0; }},
+      {"min_field_resolution", [](guider_options& o) { o.min_field_resolution = 500; }},
+      {"guide_fraction", [](guider_options& o) { o.guide_fraction = -0.1f; }},
+      {"guide_fraction", [](guider_options& o) { o.guide_fraction = 1.5f; }},
+      {"guide_fraction", [](guider_options& o) { o.guide_fraction = nan; }},
+      {"filter_alpha", [](guider_options& o) { o.field.filter_alpha = -1.0f; }},
+      {"filter_alpha", [](guider_options& o) { o.field.filter_alpha = infinity; }},
+      {"floor", [](guider_options& o) { o.field.floor = -1.0f; }},
+      {"floor", [](guider_options& o) { o.field.floor = nan; }},
+      {"max_depth", [](guider_options& o) { o.max_depth = 0; }},
+      {"max_depth", [](guider_options& o) { o.max_depth = 5000; }},
+      {"max_paths", [](guider_options& o) { o.max_paths = std::size_t(1) << 40; }},
+      {"max_rays", [](guider_options& o) { o.max_rays = std::size_t(1) << 40; }},
+      {"max_paths times max_depth", [](guider_options& o) {
+         o.max_paths = std::size_t(1) << 31;
+         o.max_depth = 1024;
+         o.deposit_capacity = 0;
+       }}};
+  return list;
+}
+
+std::string message_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "";
+}
+
+WFPG_TEST_CASE("path guider: options out of range are named", "[path_guider]") {
+  const Exec exec;
+  const box_mesh<Exec> mesh(exec);
+  for (const bad_option& bad : bad_options()) {
+    guider_options options;
+    bad.spoil(options);
+    const std::string message = message_of([&] { path_guider<Exec>(exec, mesh.view(), options); });
+    INFO("expected: " << bad.name << ", message: " << message);
+    CHECK(message.find(bad.name) != std::string::npos);
+  }
+  guider_options good = box_options();
+  good.guide_fraction = 1.0f;
+  good.field_resolution = 128;
+  good.min_field_resolution = 2;
+  good.octree_resolution = 1;
+  CHECK(message_of([&] { path_guider<Exec>(exec, mesh.view(), good); }).empty());
+}
+
+WFPG_TEST_CASE("path guider: waves beyond the capacity, and outputs that are too small", "[path_guider]") {
+  guided_box<Exec> box;
+  box.learn();
+  const wave_of_surfaces<Exec> wave(box.exec, wall_surfaces(100, 1)), large(box.exec, wall_surfaces(1025, 1));
+  const wfpg::buffer<sampled_direction, Exec> directions(box.exec, 2000);
+  const wfpg::buffer<float, Exec> densities(box.exec, 99);
+  const auto query = [](std::uint32_t) { return vec3(0, 1, 0); };
+  CHECK_THROWS_AS(box.guider.sample_directions(large.get(), box_caster{}, directions.view()),
+                  std::invalid_argument);
+  CHECK_THROWS_AS(box.guider.prepare(large.get(), box_caster{}), std::invalid_argument);
+  CHECK_THROWS_AS(box.guider.sample_directions(wave.get(), box_caster{}, directions.view().subview(0, 99)),
+                  std::invalid_argument);
+  CHECK_THROWS_AS(box.guider.sample_directions(wave.get(), box_caster{}, directions.view(),
+                                               wfpg::density_queries{query, densities.view()}),
+                  std::invalid_argument);
+  CHECK(box.sample(wall_surfaces(1024, 1)).size() == 1024);
+}
+
+WFPG_TEST_CASE("path guider: no rays, and no capacity for any", "[path_guider]") {
+  guided_box<Exec> box;
+  box.learn();
+  batch_box_caster::log log;
+  CHECK(box.sample({}).empty());
+  CHECK(box.sample({}, batch_box_caster{{}, &log}).empty());
+  const wave_of_surfaces<Exec> none(box.exec, {});
+  CHECK(!box.guider.prepare(none.get(), box_caster{}).guides(0));
+  CHECK(log.rays == 0);
+  CHECK(box.guider.statistics().depths[0].bins == 0);
+
+  guider_options options = box_options();
+  options.max_rays = 0;
+  guided_box<Exec> incapable(options);
+  incapable.learn();
+  CHECK(incapable.sample({}).empty());
+  CHECK_THROWS_AS(incapable.sample(wall_surfaces(1, 1)), std::invalid_argument);
+}
+
+WFPG_TEST_CASE("path guider: rays outside every voxel are counted and sampled by their BSDF",
+               "[path_guider]") {
+  guided_box<Exec> box;
+  box.learn();
+  auto surfaces = wall_surfaces(200, 1);
+  const vec3 outside[] = {{5, 5, 5}, {-2, 0.5f, 0.5f}, {nan, 0, 0}, {infinity, 0, 0}, {0.5f, 0.5f, 0.5f}};
+  for (std::size_t i = 0; i < 5; ++i) surfaces[40 * i].position = outside[i];
+  const auto drawn = box.sample(surfaces);
+  const wave_of_surfaces<Exec> wave(box.exec, surfaces);
+  const wfpg::guide_view view = box.guider.prepare(wave.get(), box_caster{});
+  for (std::size_t i = 0; i < 5; ++i) {
+    const test_surface& s = surfaces[40 * i];
+    const sampled_direction& d = drawn[40 * i];
+    CHECK(d.technique == sampling_technique::bsdf);
+    CHECK(d.direction == s.bsdf.sample(s.outgoing, hashed_numbers{1}(std::uint32_t(40 * i), 1)).direction);
+    CHECK(d.pdf == s.bsdf.pdf(s.outgoing, d.direction));
+    CHECK(!view.guides(std::uint32_t(40 * i)));
+    CHECK(view.guides(std::uint32_t(40 * i + 1)));
+  }
+  CHECK(!view.guides(200));
+  const auto statistics = box.guider.statistics();
+  CHECK(statistics.depths[0].unbinned == 10);  // of two waves
+  CHECK(statistics.depths[0].rays == 390);
+}
+
+WFPG_TEST_CASE("path guider: inactive rays of the capacity get nothing and disturb nobody", "[path_guider]") {
+  guided_box<Exec> box;
+  box.learn();
+  const auto surfaces = mixed_surfaces(800, 2);
+  const auto drawn = box.sample(surfaces);
+  int wrong = 0;
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    const sampled_direction& d = drawn[i];
+    const bool none = d.technique == sampling_technique::none;
+    if (none) wrong += d.pdf != 0.0f || d.direction != vec3(0.0f);
+    if (!none) wrong += !(d.pdf > 0.0f) || std::abs(glm::length(d.direction) - 1.0f) > 1e-5f;
+    if (!surfaces[i].active) wrong += !none;
+    if (surfaces[i].active && surfaces[i].bsdf.kind == bsdf_kind::mirror)
+      wrong += d.technique != sampling_technique::delta || d.pdf != 0.75f;
+    if (surfaces[i].active && surfaces[i].bsdf.kind == bsdf_kind::lambert) wrong += none;
+  }
+  CHECK(wrong == 0);
+  const auto statistics = box.guider.statistics();
+  CHECK(statistics.depths[0].rays == 600);  // neither inactive ones nor mirrors
+  CHECK(statistics.depths[0].unbinned == 0);
+
+  std::vector<test_surface> all_inactive(50, test_surface{});
+  for (test_surface& s : all_inactive) s.active = false;
+  for (const sampled_direction& d : box.sample(all_inactive)) CHECK(d.technique == sampling_technique::none);
+}
+
+WFPG_TEST_CASE("path guider: an empty mesh guides nothing and works", "[path_guider]") {
+  const Exec exec;
+  path_guider<Exec> guider(exec, wfpg::triangle_mesh_view{}, tracing_options(64));
+  CHECK(!guider.guided());
+  const auto picture = trace_paths(exec, guider, 3, 64, box_caster{});
+  CHECK(std::all_of(picture.begin(), picture.end(), [](float x) { return std::isfinite(x); }));
+  CHECK(std::accumulate(picture.begin(), picture.end(), 0.0) > 0.0);
+  const wave_of_surfaces<Exec> wave(exec, wall_surfaces(64, 1));
+  guider.begin_sample();
+  CHECK(!guider.guided());
+  CHECK(!guider.prepare(wave.get(), box_caster{}).guides(0));
+  const auto statistics = guider.statistics();
+  CHECK(statistics.guided_samples == 0);
+  CHECK(statistics.deposits.outside > 0);
+  CHECK(guider.octree().leaf_count() == 0);
+  CHECK(guider.memory().persistent() < 1024);
+}
+
+WFPG_TEST_CASE("path guider: an octree from hit points and bounds guides", "[path_guider]") {
+  const Exec exec;
+  std::vector<wfpg::surface_fragment> hits;
+  for (const test_surface& s : wall_surfaces(3000, 5)) hits.push_back({s.position, s.normal, 1.0f});
+  const wfpg::buffer<wfpg::surface_fragment, Exec> device(exec, hits);
+  guider_options options = box_options();
+  options.octree_resolution = 8;
+  path_guider<Exec> guider(exec,
+                           wfpg::fragments_from_samples(exec, const_view<wfpg::surface_fragment>(device), 8,
+                                                        {vec3(0.0f), vec3(1.0f)}),
+                           options);
+  deposit_on_walls(guider.cache(), 40,
+                   [](std::uint32_t f, float u, float v) { return emitted(face_point(f, u, v)); });
+  guider.end_sample();
+  guider.begin_sample();
+  const std::vector<test_surface> surfaces(500, make_surface({0.5f, 0, 0.5f}, {0, 1, 0}, {0, 1, 0}));
+  const wave_of_surfaces<Exec> wave(exec, surfaces);
+  const wfpg::buffer<sampled_direction, Exec> directions(exec, surfaces.size());
+  guider.sample_directions(wave.get(), box_caster{}, directions.view());
+  const vec3 to_patch = glm::normalize(vec3(0.3f, 1.0f, 0.3f));
+  int toward = 0;
+  for (const sampled_direction& d : directions.to_host(exec))
+    toward += glm::dot(d.direction, to_patch) > 0.9f;
+  CHECK(toward > 200);  // of cosine-distributed ones about 60
+}
+
+WFPG_TEST_CASE("path guider: what is not finite is dropped and counted, and guiding goes on",
+               "[path_guider]") {
+  const Exec exec;
+  const box_mesh<Exec> mesh(exec);
+  path_guider<Exec> guider(exec, mesh.view(), tracing_options(64));
+  trace_paths(exec, guider, 1, 64, box_caster{});
+  guider.begin_sample();
+  const auto recorder = guider.recorder();
+  const auto surfaces = wall_surfaces(64, 9);
+  const float bad[] = {nan, infinity, -infinity, -1.0f};
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    recorder.vertex(i, 0, surfaces[i].position, surfaces[i].outgoing, vec3(1.0f));
+    recorder.radiance(i, 0, vec3(bad[i]));
+  }
+  recorder.vertex(4, 0, vec3(nan), {0, 1, 0}, vec3(1.0f));
+  recorder.vertex(5, 0, surfaces[5].position, vec3(0, 1, 0), vec3(nan));
+  recorder.vertex(6, 0, vec3(9.0f), {0, 1, 0}, vec3(1.0f));
+  const auto before = guider.statistics();
+  guider.end_sample();
+  const auto after = guider.statistics();
+  CHECK(after.deposits.invalid - before.deposits.invalid == 5);
+  CHECK(after.deposits.outside - before.deposits.outside == 1);
+  CHECK(after.deposits.overflow == 0);
+  for (float radiance : trace_paths(exec, guider, 1, 64, box_caster{})) CHECK(std::isfinite(radiance));
+}
+
+WFPG_TEST_CASE("path guider: vertices out of range are dropped and counted", "[path_guider]") {
+  const Exec exec;
+  const box_mesh<Exec> mesh(exec);
+  path_guider<Exec> guider(exec, mesh.view(), tracing_options(4));
+  guider.begin_sample();
+  const auto recorder = guider.recorder();
+  recorder.vertex(4, 0, {}, {0, 1, 0}, vec3(1.0f));  // no such path
+  recorder.vertex(0, 3, {}, {0, 1, 0}, vec3(1.0f));  // no such depth
+  recorder.vertex(0, 1, {}, {0, 1, 0}, vec3(1.0f));  // not in order
+  recorder.radiance(0, 0, vec3(1.0f));               // no such vertex
+  recorder.emission(7, 0, vec3(1.0f));
+  recorder.emission(0, 5, vec3(1.0f));
+  CHECK(guider.statistics().dropped_vertices == 6);
+  recorder.vertex(0, 0, {0.5f, 0.0f, 0.5f}, {0, 1, 0}, vec3(1.0f));
+  CHECK(guider.statistics().dropped_vertices == 6);
+  guider.end_sample();
+}
+
+WFPG_TEST_CASE("path guider: a caster that throws leaves it usable", "[path_guider]") {
+  guider_options options = box_options();
+  options.caster_buffer_bytes = 1;  // a bin a call
+  guided_box<Exec> box(options), other(options);
+  box.learn();
+  other.learn();
+  const auto surfaces = mixed_surfaces(500, 3);
+  const auto expected = other.sample(surfaces);
+  std::vector<std::size_t> in_use;
+  for (std::size_t call : {3, 3, 0, 1, 3}) {
+    const wave_of_surfaces<Exec> wave(box.exec, surfaces);
+    batch_box_caster::log failing;
+    failing.throw_at = call;
+    CHECK_THROWS_AS(box.sample(surfaces, batch_box_caster{{}, &failing}), std::runtime_error);
+    failing.calls = 0;
+    CHECK_THROWS_AS(box.guider.prepare(wave.get(), batch_box_caster{{}, &failing}), std::runtime_error);
+    in_use.push_back(box.guider.memory().transient());
+  }
+  CHECK(in_use.back() == in_use[1]);  // nothing leaks
+  batch_box_caster::log log;
+  CHECK(same_bits(box.sample(surfaces, batch_box_caster{{}, &log}), expected));
+  CHECK(same_bits(box.sample(surfaces), expected));
+  box.guider.end_sample();
+  box.guider.begin_sample();
+  CHECK(box.sample(surfaces).size() == surfaces.size());
+}
+
+}  // namespace

@@ -1,0 +1,136 @@
+// What a guider tells of itself, and what it asks of its memory resource.
+#include "support/guiding.hpp"
+#include "support/policies.hpp"
+#include "support/scenes.hpp"
+
+#include <wfpg/path_guider.hpp>
+
+#include <set>
+#include <string>
+#include <vector>
+
+using namespace wfpg_test;
+using wfpg::guider_options;
+using wfpg::guiding_mode;
+
+namespace {
+
+WFPG_TEST_CASE("path guider: memory() is what it holds of its resource, by part", "[path_guider]") {
+  counting_resource resource;
+  const Exec exec(&resource);
+  {
+    const box_mesh<Exec> mesh(exec);
+    guider_options options = tracing_options(300);
+    options.octree_resolution = 64;
+    const std::size_t mesh_bytes = resource.bytes_in_use;
+    wfpg::path_guider<Exec> guider(exec, mesh.view(), options);
+    for (int round = 0; round < 3; ++round) {
+      const wfpg::memory_report memory = guider.memory();
+      CHECK(memory.persistent() + memory.transient() == resource.bytes_in_use - mesh_bytes);
+      std::set<std::string> names;
+      for (const wfpg::memory_part& part : memory.parts) names.insert(part.name);
+      CHECK(names ==
+            std::set<std::string>{"octree", "cache", "deposits", "paths", "binning", "fields", "scratch"});
+      CHECK(memory.persistent() <= 28 * std::size_t(guider.octree().node_count()));
+      for (const wfpg::memory_part& part : memory.parts)
+        if (part.name == std::string("paths")) CHECK(part.bytes <= 300 * 3 * 40 + 300 * 4 + 64);
+      trace_paths(exec, guider, 1, 300, box_caster{});
+    }
+  }
+  CHECK(resource.bytes_in_use == 0);
+}
+
+WFPG_TEST_CASE("path guider: nothing is allocated after the first guided sample", "[path_guider]") {
+  counting_resource resource;
+  const Exec exec(&resource);
+  const box_mesh<Exec> mesh(exec);
+  batch_box_caster::log log;
+  const auto wave = [](std::uint32_t sample, std::uint32_t depth) {
+    auto surfaces =
+        wall_surfaces(512, 10 * sample + depth);  // other bins every time, and more after the first
+    for (std::size_t i = 0; sample == 0 && i < 60; ++i) surfaces[i] = surfaces[60 + i];
+    return surfaces;
+  };
+  for (int form = 0; form < 4; ++form) {
+    guider_options options = box_options();
+    options.max_rays = 512;
+    options.rays_per_bin = 3;
+    wfpg::path_guider<Exec> guider(exec, mesh.view(), options);
+    std::vector<wfpg::sampled_direction> host(512);
+    const wfpg::array_view<wfpg::sampled_direction> directions(host.data(), host.size());
+    std::size_t after_first = 0;
+    for (std::uint32_t sample = 0; sample < 8; ++sample) {
+      guider.begin_sample();
+      for (std::uint32_t depth = 0; depth < 2; ++depth) {
+        const auto surfaces = wave(sample, depth);
+        const wfpg::wave rays{depth, surfaces.size(), stored_surfaces{{surfaces.data(), surfaces.size()}},
+                              hashed_numbers{sample}};
+        const batch_box_caster batch{{}, &log};
+        if (form == 0) guider.sample_directions(rays, box_caster{}, directions);
+        if (form == 1) guider.sample_directions(rays, batch, directions);
+        if (form == 2) CHECK(guider.prepare(rays, box_caster{}).guides(0));
+        if (form == 3) CHECK(guider.prepare(rays, batch).guides(0));
+      }
+      deposit_on_walls(guider.cache(), 40, [](std::uint32_t, float, float) { return 1.0f; });
+      guider.end_sample();
+      if (sample == 0) after_first = resource.allocations;
+    }
+    INFO("form " << form);
+    CHECK(resource.allocations == after_first);
+  }
+}
+
+WFPG_TEST_CASE("path guider: statistics count bins, rays and cones by depth", "[path_guider]") {
+  guided_box<Exec> box;
+  CHECK(box.guider.statistics().samples == 0);
+  CHECK(box.guider.statistics().build.skipped() == 0);
+  box.learn();
+  const auto surfaces = wall_surfaces(600, 7);
+  for (std::uint32_t depth : {0u, 0u, 1u, 30u}) box.sample(surfaces, box_caster{}, 1, depth);
+  CHECK(box.guider.field_resolution(0) == 16);
+  CHECK(box.guider.field_resolution(1) == 8);
+  CHECK(box.guider.field_resolution(100) == 8);
+
+  const auto statistics = box.guider.statistics();
+  CHECK(statistics.samples == 1);
+  CHECK(statistics.guided_samples == 1);
+  REQUIRE(statistics.depths.size() == box.guider.options().max_depth);
+  const auto& first = statistics.depths[0];
+  CHECK(first.rays == 1200);
+  CHECK(first.unbinned == 0);
+  CHECK(first.bins > 20);
+  CHECK(first.bins < 1200);
+  CHECK(first.cones == first.bins * 256);
+  CHECK(statistics.depths[1].rays == 600);
+  CHECK(statistics.depths[1].bins * 2 == first.bins);
+  CHECK(statistics.depths[1].cones == statistics.depths[1].bins * 64);
+  CHECK(statistics.depths[2].rays == 0);
+  CHECK(statistics.depths.back().rays == 600);  // depths beyond share the last place
+  double seconds = 0.0;
+  for (const wfpg::stage_time& stage : statistics.seconds) {
+    CHECK(stage.seconds >= 0.0);
+    seconds += stage.seconds;
+  }
+  CHECK(statistics.seconds.size() == 5);
+  CHECK(seconds > 0.0);
+}
+
+WFPG_TEST_CASE("path guider: a build report tells what of the mesh was left out", "[path_guider]") {
+  const Exec exec;
+  auto positions = box_positions();
+  auto triangles = box_triangles();
+  positions.push_back(vec3(std::nanf("")));
+  triangles.push_back({0, 1, 8});
+  triangles.push_back({0, 1, 99});
+  triangles.push_back({2, 2, 3});
+  const wfpg::buffer<vec3, Exec> p(exec, positions);
+  const wfpg::buffer<wfpg::uvec3, Exec> t(exec, triangles);
+  const wfpg::path_guider<Exec> guider(exec, {const_view<vec3>(p), const_view<wfpg::uvec3>(t)},
+                                       box_options());
+  const auto build = guider.statistics().build;
+  CHECK(build.non_finite == 1);
+  CHECK(build.out_of_range == 1);
+  CHECK(build.degenerate == 1);
+}
+
+}  // namespace

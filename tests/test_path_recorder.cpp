@@ -1,0 +1,218 @@
+// Equation 5 on hand-made paths: what the recorder deposits at each vertex, and what it drops.
+#include "support/cached_scene.hpp"
+#include "support/catch.hpp"
+#include "support/policies.hpp"
+
+#include <wfpg/path_recorder.hpp>
+
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+namespace {
+
+using namespace wfpg_test;
+using wfpg::node_id;
+using wfpg::vec3;
+
+constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+constexpr float infinity = std::numeric_limits<float>::infinity();
+const vec3 up(0.0f, 0.0f, 1.0f);
+
+/// Where vertices lie: the centre of the k-th voxel along x, whose normal is up.
+vec3 place(std::uint32_t k) {
+  return {static_cast<float>(k) + 0.5f, 0.5f, 0.5f};
+}
+
+/// Eight voxels in a row with a recorder; a path is written by calls of the view on the host.
+template <class Exec>
+struct recording {
+  cached_scene<Exec> scene;
+  wfpg::path_recorder<Exec> recorder;
+
+  recording(std::size_t paths, std::uint32_t max_depth, bool include_emission)
+      : scene(row(), 1000), recorder(scene.exec, paths, max_depth, include_emission) {}
+
+  static wfpg::voxel_fragments<Exec> row() {
+    std::vector<voxel_normal> list;
+    for (std::uint32_t k = 0; k < 8; ++k) list.push_back({{k, 0, 0}, up, 1.0f});
+    return fragments_in_grid<Exec>(list);
+  }
+  wfpg::path_recorder_view view() const { return recorder.view(); }
+  void finish() {
+    recorder.deposit(scene.exec, scene.view());
+    scene.cache.update(scene.exec);
+  }
+  /// Radiance that leaves voxel k upward; negative where nothing was deposited.
+  float leaving(std::uint32_t k, std::uint32_t side = 0) const {
+    const node_id leaf = scene.octree().leaf_at(place(k));
+    return scene.view().radiance(leaf, side);
+  }
+  std::uint32_t dropped() const { return recorder.dropped(scene.exec); }
+};
+
+/// A path of vertices at places 0, 1, ... with these throughputs.
+void write_vertices(const wfpg::path_recorder_view& paths, std::size_t path,
+                    const std::vector<vec3>& throughputs) {
+  for (std::uint32_t depth = 0; depth < throughputs.size(); ++depth)
+    paths.vertex(path, depth, place(depth), up, throughputs[depth]);
+}
+
+WFPG_TEST_CASE("radiance at each vertex is what arrives over the throughput", "[path_recorder]") {
+  recording<Exec> r(1, 4, true);
+  write_vertices(r.view(), 0, {vec3(1.0f), vec3(0.5f), vec3(0.25f)});
+  r.view().radiance(0, 0, vec3(1.0f));
+  r.view().radiance(0, 1, vec3(2.0f));
+  r.view().radiance(0, 2, vec3(3.0f));
+  r.view().radiance(0, 2, vec3(1.0f));
+  r.finish();
+  CHECK(r.leaving(2) == Approx(4.0f / 0.25f));
+  CHECK(r.leaving(1) == Approx(6.0f / 0.5f));
+  CHECK(r.leaving(0) == Approx(7.0f));
+  CHECK(r.leaving(3) < 0.0f);
+  CHECK(r.leaving(0, 1) < 0.0f);
+  CHECK(r.dropped() == 0);
+}
+
+WFPG_TEST_CASE("colours are divided one by one and reduced to luminance", "[path_recorder]") {
+  recording<Exec> r(1, 3, true);
+  write_vertices(r.view(), 0, {vec3(1.0f), {0.5f, 0.25f, 0.125f}, {0.5f, 0.0f, 0.125f}});
+  r.view().radiance(0, 1, {1.0f, 2.0f, 3.0f});
+  r.view().radiance(0, 2, {0.5f, 0.0f, 0.25f});
+  r.finish();
+  CHECK(r.leaving(2) == Approx(wfpg::luminance({1.0f, 0.0f, 2.0f})));  // a channel that is zero gives none
+  CHECK(r.leaving(1) == Approx(wfpg::luminance({1.5f / 0.5f, 2.0f / 0.25f, 3.25f / 0.125f})));
+  CHECK(r.leaving(0) == Approx(wfpg::luminance({1.5f, 2.0f, 3.25f})));
+  CHECK(r.scene.cache.dropped(r.scene.exec).total() == 0);
+}
+
+WFPG_TEST_CASE("emission leaves the emitter where it is included", "[path_recorder]") {
+  for (const bool included : {true, false}) {
+    recording<Exec> r(1, 4, included);
+    write_vertices(r.view(), 0, {vec3(1.0f), vec3(0.5f), vec3(0.25f)});
+    r.view().emission(0, 2, vec3(8.0f));
+    r.finish();
+    INFO("included " << included);
+    CHECK(r.leaving(2) == Approx(included ? 32.0f : 0.0f));
+    CHECK(r.leaving(1) == Approx(16.0f));
+    CHECK(r.leaving(0) == Approx(8.0f));
+    CHECK(r.dropped() == 0);
+  }
+}
+
+WFPG_TEST_CASE("an emitter seen by the camera", "[path_recorder]") {
+  for (const bool included : {true, false}) {
+    recording<Exec> r(1, 4, included);
+    write_vertices(r.view(), 0, {vec3(1.0f)});
+    r.view().emission(0, 0, vec3(5.0f));
+    r.finish();
+    CHECK(r.leaving(0) == Approx(included ? 5.0f : 0.0f));
+    CHECK(r.dropped() == 0);
+  }
+}
+
+WFPG_TEST_CASE("the environment counts as scattered by the last vertex", "[path_recorder]") {
+  for (const bool included : {true, false}) {
+    recording<Exec> r(2, 2, included);
+    write_vertices(r.view(), 0, {vec3(1.0f), vec3(0.5f)});
+    r.view().emission(0, 2, vec3(3.0f));  // the path's length, and the recorder's capacity
+    r.view().emission(1, 0, vec3(7.0f));  // a camera ray into the environment touches nothing
+    r.finish();
+    CHECK(r.leaving(1) == Approx(6.0f));
+    CHECK(r.leaving(0) == Approx(3.0f));
+    CHECK(r.dropped() == 0);
+  }
+}
+
+WFPG_TEST_CASE("what is out of range is dropped and counted", "[path_recorder]") {
+  recording<Exec> r(2, 2, true);
+  const auto view = r.view();
+  CHECK(view.paths() == 2);
+  CHECK(view.max_depth() == 2);
+  write_vertices(view, 0, {vec3(1.0f), vec3(1.0f)});
+  view.vertex(2, 0, place(4), up, vec3(1.0f));  // no such path
+  view.vertex(~std::size_t(0), 0, place(4), up, vec3(1.0f));
+  view.vertex(0, 2, place(4), up, vec3(1.0f));  // too deep
+  view.vertex(0, 0xffffffffu, place(4), up, vec3(1.0f));
+  view.vertex(1, 1, place(4), up, vec3(1.0f));  // out of order
+  view.vertex(0, 1, place(4), up, vec3(1.0f));  // recorded already
+  CHECK(r.dropped() == 6);
+  view.radiance(2, 0, vec3(100.0f));
+  view.radiance(0, 2, vec3(100.0f));
+  view.radiance(1, 0, vec3(100.0f));  // a vertex that was not recorded
+  view.emission(0, 3, vec3(100.0f));
+  view.emission(5, 0, vec3(100.0f));
+  view.emission(1, 1, vec3(100.0f));
+  CHECK(r.dropped() == 12);
+  view.radiance(0, 1, vec3(2.0f));
+  r.finish();
+  CHECK(r.leaving(0) == 2.0f);
+  CHECK(r.leaving(1) == 2.0f);
+  CHECK(r.leaving(4) < 0.0f);
+
+  recording<Exec> nothing(0, 0, true);
+  nothing.view().vertex(0, 0, place(0), up, vec3(1.0f));
+  nothing.view().emission(0, 0, vec3(1.0f));
+  nothing.finish();
+  CHECK(nothing.dropped() == 2);
+}
+
+WFPG_TEST_CASE("a deposit forgets the paths, a clear drops them", "[path_recorder]") {
+  recording<Exec> r(1, 3, true);
+  write_vertices(r.view(), 0, {vec3(1.0f), vec3(1.0f)});
+  r.view().radiance(0, 1, vec3(4.0f));
+  r.finish();
+  write_vertices(r.view(), 0, {vec3(1.0f)});  // the same vertex again, of the next path
+  r.view().radiance(0, 0, vec3(2.0f));
+  r.finish();
+  CHECK(r.leaving(0) == 3.0f);
+  CHECK(r.leaving(1) == 4.0f);
+  write_vertices(r.view(), 0, {vec3(1.0f)});
+  r.view().radiance(0, 0, vec3(100.0f));
+  r.recorder.clear(r.scene.exec);
+  r.finish();
+  CHECK(r.leaving(0) == 3.0f);
+  CHECK(r.dropped() == 0);
+}
+
+WFPG_TEST_CASE("radiance that is no number is dropped by the cache", "[path_recorder]") {
+  recording<Exec> r(5, 2, true);
+  const auto view = r.view();
+  for (std::size_t path = 0; path < 5; ++path) write_vertices(view, path, {vec3(1.0f), vec3(0.5f)});
+  view.radiance(0, 1, {nan, 0.0f, 0.0f});
+  view.radiance(1, 1, {0.0f, infinity, 0.0f});
+  view.radiance(2, 1, vec3(-1.0f));
+  view.radiance(3, 1, vec3(1.0f));
+  r.finish();
+  CHECK(r.scene.cache.dropped(r.scene.exec).invalid == 6);
+  CHECK(r.leaving(1) == 1.0f);  // of 2 and 0
+  CHECK(r.leaving(0) == 0.5f);
+}
+
+/// Writes a path of the given length; every vertex scatters one unit.
+struct write_path {
+  wfpg::path_recorder_view paths;
+  std::uint32_t length;
+  void operator()(std::size_t path) const {
+    float throughput = 1.0f;
+    for (std::uint32_t depth = 0; depth < length; ++depth) {
+      paths.vertex(path, depth, place(depth), path % 2 ? -up : up, vec3(throughput));
+      paths.radiance(path, depth, vec3(1.0f));
+      throughput *= 0.5f;
+    }
+  }
+};
+
+WFPG_TEST_CASE("paths are recorded in parallel, by kernels", "[path_recorder]") {
+  const std::uint32_t length = 4;
+  recording<Exec> r(200, length, true);
+  r.scene.exec.for_each(200, write_path{r.view(), length});
+  r.finish();
+  for (std::uint32_t depth = 0; depth < length; ++depth)
+    for (std::uint32_t side = 0; side < 2; ++side)
+      CHECK(r.leaving(depth, side) == Approx(float(length - depth) * float(1u << depth)));
+  CHECK(r.scene.cache.dropped(r.scene.exec).total() == 0);
+  CHECK(r.recorder.bytes() <= 200 * length * 40 + 200 * 4 + 64);
+}
+
+}  // namespace

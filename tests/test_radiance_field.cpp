@@ -1,0 +1,253 @@
+// Fields of bins in a box whose light is known: what cells see, and that the form of the
+// caster and the size of its buffer change nothing. Filter and floor are test_radiance_field_filter.cpp's.
+#include "support/fields.hpp"
+#include "support/policies.hpp"
+#include "support/scenes.hpp"
+
+#include <wfpg/detail/serve_rays.hpp>
+#include <wfpg/radiance_field.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+using namespace wfpg_test;
+using wfpg::directional_field;
+using wfpg::guiding_mode;
+
+namespace {
+
+constexpr float wall_radiance[6] = {1.0f, 2.0f, 3.0f, 16.0f, 5.0f, 0.0f};
+
+/// The box, its octree and cache, with light on its walls.
+template <class Exec>
+struct lit_box {
+  Exec exec;
+  wfpg::sparse_voxel_octree<Exec> tree;
+  wfpg::exitance_cache<Exec> cache;
+
+  template <class Radiance>
+  explicit lit_box(const Radiance& radiance, std::uint32_t resolution = 32) {
+    const box_mesh<Exec> mesh(exec);
+    auto fragments = wfpg::voxelize(exec, mesh.view(), resolution);
+    tree = wfpg::sparse_voxel_octree<Exec>(exec, fragments);
+    cache = wfpg::exitance_cache<Exec>(exec, tree, fragments, 6 * 64 * 64);
+    deposit_on_walls(cache.view(), 64, radiance);
+    cache.update(exec);
+  }
+};
+
+float constant_walls(std::uint32_t face, float, float) {
+  return wall_radiance[face];
+}
+
+/// Copies out the cells of a field before anything is done to them.
+struct raw_cells {
+  wfpg::detail::field_cells cells;
+  wfpg::exitance_cache_view cache;
+  box_caster caster;
+  wfpg::array_view<float> values;
+  wfpg::array_view<wfpg::ray> cones;
+  void operator()(std::size_t i) const {
+    cones[i] = cells.cone(static_cast<std::uint32_t>(i));
+    values[i] = cells.value(cache, cones[i], caster(cones[i]));
+  }
+};
+
+struct seen_cells {
+  std::vector<float> values;
+  std::vector<wfpg::ray> cones;
+};
+
+template <class Exec>
+seen_cells look(const lit_box<Exec>& box, const wfpg::field_origin& origin, std::uint32_t resolution,
+                box_caster caster = {}) {
+  const std::size_t n = std::size_t(resolution) * resolution;
+  const wfpg::buffer<float, Exec> values(box.exec, n);
+  const wfpg::buffer<wfpg::ray, Exec> cones(box.exec, n);
+  const wfpg::detail::field_cells cells(origin, resolution);
+  box.exec.for_each(n, raw_cells{cells, box.cache.view(), caster, values.view(), cones.view()});
+  return {values.to_host(box.exec), cones.to_host(box.exec)};
+}
+
+/// The face that a ray from inside meets, and how far from the face's rim.
+std::uint32_t face_hit(const wfpg::ray& r, float& from_rim) {
+  const vec3 p = r.origin + box_caster()(r).distance * r.direction;
+  std::uint32_t face = 0;
+  float nearest = 1.0f;
+  for (std::uint32_t f = 0; f < 6; ++f) {
+    const float away = std::abs(p[int(f / 2)] - (f % 2 ? 1.0f : 0.0f));
+    if (away >= nearest) continue;
+    nearest = away;
+    face = f;
+  }
+  from_rim = 1.0f;
+  for (int axis = 0; axis < 3; ++axis)
+    if (axis != int(face / 2)) from_rim = std::min({from_rim, p[axis], 1.0f - p[axis]});
+  return face;
+}
+
+WFPG_TEST_CASE("radiance field: cells see the radiance of the wall they look at", "[radiance_field]") {
+  const lit_box<Exec> box(constant_walls);
+  wfpg::field_origin origin;
+  origin.position = {0.45f, 0.4f, 0.55f};
+  const seen_cells seen = look(box, origin, 32);
+  const float node = 0.1f;  // cones read nodes of about their own width: away from the rim only one wall's
+  int checked = 0, wrong = 0;
+  for (std::size_t i = 0; i < seen.values.size(); ++i) {
+    float from_rim;
+    const std::uint32_t face = face_hit(seen.cones[i], from_rim);
+    if (from_rim < 1.5f * node) continue;
+    ++checked;
+    wrong += std::abs(seen.values[i] - wall_radiance[face]) > 1e-4f * wall_radiance[face];
+  }
+  CHECK(checked > 400);
+  CHECK(wrong == 0);
+}
+
+WFPG_TEST_CASE("radiance field: a uniform furnace is uniform, to the rim and at any resolution",
+               "[radiance_field]") {
+  const lit_box<Exec> box([](std::uint32_t, float, float) { return 2.5f; });
+  for (std::uint32_t resolution : {2u, 16u, 31u}) {
+    wfpg::field_origin origin;
+    origin.position = {0.3f, 0.4f, 0.6f};
+    origin.seed = resolution;
+    for (float value : look(box, origin, resolution).values) CHECK(value == Approx(2.5f).epsilon(1e-5));
+    origin.cosine = origin.hemisphere = true;
+    origin.normal = glm::normalize(vec3(1, 2, -3));
+    const seen_cells seen = look(box, origin, resolution);
+    for (std::size_t i = 0; i < seen.values.size(); ++i) {
+      const float cosine = glm::dot(seen.cones[i].direction, origin.normal);
+      CHECK(cosine > -1e-6f);
+      CHECK(seen.values[i] == Approx(2.5f * std::max(cosine, 0.0f)).epsilon(1e-5).margin(1e-6));
+    }
+  }
+}
+
+WFPG_TEST_CASE("radiance field: cones are jittered inside their cells, anew with the seed",
+               "[radiance_field]") {
+  wfpg::field_origin origin;
+  const wfpg::detail::field_cells first(origin, 16);
+  origin.seed = 1;
+  const wfpg::detail::field_cells second(origin, 16);
+  int same = 0, outside = 0;
+  for (std::uint32_t cell = 0; cell < 256; ++cell) {
+    const vec3 a = first.cone(cell).direction, b = second.cone(cell).direction;
+    same += a == b;
+    const vec2 uv = wfpg::sphere_to_square(b) * 16.0f - vec2(float(cell % 16), float(cell / 16));
+    outside += uv.x < -1e-3f || uv.x > 1.001f || uv.y < -1e-3f || uv.y > 1.001f;
+  }
+  CHECK(same == 0);
+  CHECK(outside == 0);
+}
+
+WFPG_TEST_CASE("radiance field: the environment where a cone misses", "[radiance_field]") {
+  const lit_box<Exec> box([](std::uint32_t, float, float) { return 0.0f; });
+  wfpg::field_origin origin;
+  origin.position = {0.5f, 0.5f, 0.5f};
+  const seen_cells seen = look(box, origin, 32, box_caster{true});
+  int sky = 0;
+  for (std::size_t i = 0; i < seen.values.size(); ++i) {
+    const bool misses = !box_caster{true}(seen.cones[i]).is_hit();
+    CHECK(seen.values[i] == (misses ? 5.0f : 0.0f));
+    sky += misses;
+  }
+  CHECK(std::abs(sky - 1024 / 6) < 20);
+}
+
+WFPG_TEST_CASE("radiance field: what is not finite or negative from a caster counts as nothing or bounded",
+               "[radiance_field]") {
+  const lit_box<Exec> box(constant_walls);
+  const wfpg::detail::field_cells cells({}, 4);
+  const auto value = [&](float environment) {
+    return cells.value(box.cache.view(), cells.cone(0), {-1.0f, environment});
+  };
+  CHECK(value(2.0f) == 2.0f);
+  CHECK(value(-2.0f) == 0.0f);
+  CHECK(value(std::nanf("")) == 0.0f);
+  CHECK(value(INFINITY) == 0.0f);
+  CHECK(value(1e38f) == 1e30f);
+}
+
+/// The resident fields of one wave, as bits, and of each ray which is its.
+struct made_fields {
+  std::vector<std::uint32_t> words, field_of_ray;
+  std::vector<wfpg::resident_field> fields;
+  std::vector<std::uint32_t> orientations;
+};
+
+template <class Exec, class Caster>
+made_fields make_fields(const lit_box<Exec>& box, const std::vector<test_surface>& wave, guiding_mode mode,
+                        const Caster& caster, std::size_t buffer_bytes) {
+  constexpr std::uint32_t resolution = 8;
+  const Exec& exec = box.exec;
+  const wfpg::buffer<test_surface, Exec> surfaces(exec, wave);
+  const stored_surfaces stored{const_view<test_surface>(surfaces)};
+  wfpg::spatial_binner<Exec> binner(exec, box.tree.view(), {1, 16}, wave.size());
+  const auto bins = binner.bin(exec, wave.size(), wfpg::detail::wave_rays<stored_surfaces>{stored, mode});
+  const wfpg::detail::bin_fields<stored_surfaces> fields{bins,       stored, box.cache.view(), {}, mode,
+                                                         resolution, 42};
+  const std::size_t n = wfpg::read_element(exec, bins.count);
+  const wfpg::buffer<std::uint32_t, Exec> words(exec, n * wfpg::detail::distribution_words(resolution));
+  const wfpg::buffer<wfpg::resident_field, Exec> resident(exec, n);
+  const wfpg::buffer<std::uint32_t, Exec> field_of_ray(
+      exec, std::vector<std::uint32_t>(wave.size(), wfpg::guide_view::no_field));
+  wfpg::detail::for_each_field(
+      exec, fields, caster,
+      wfpg::detail::resident_sink{
+          bins, words.data(), resident.data(), field_of_ray.data(), {0.5f, 0.5f, 0}, resolution},
+      0, buffer_bytes);
+  made_fields result{words.to_host(exec), field_of_ray.to_host(exec), resident.to_host(exec), {}};
+  for (std::size_t bin = 0; bin < n; ++bin) result.orientations.push_back(bins.orientation(bin));
+  return result;
+}
+
+WFPG_TEST_CASE("radiance field: casters of both forms, and buffers of any size, give the same bits",
+               "[radiance_field]") {
+  const lit_box<Exec> box(constant_walls);
+  const auto wave = wall_surfaces(300, 1);
+  for (guiding_mode mode : {guiding_mode::oriented, guiding_mode::plain}) {
+    const made_fields in_place = make_fields(box, wave, mode, box_caster{}, 0);
+    CHECK(in_place.fields.size() > 7);
+    for (std::size_t bytes : {std::size_t(0), std::size_t(3 * 64 * 48), std::size_t(1) << 20}) {
+      batch_box_caster::log log;
+      const made_fields batch = make_fields(box, wave, mode, batch_box_caster{{}, &log}, bytes);
+      CHECK(batch.words == in_place.words);
+      CHECK(batch.field_of_ray == in_place.field_of_ray);
+      CHECK(log.rays == in_place.fields.size() * 64);
+      if (bytes == 0) CHECK(log.largest == 64);
+      if (bytes == 0) CHECK(log.calls == in_place.fields.size());
+      if (bytes > 1000000) CHECK(log.calls == 1);
+    }
+  }
+}
+
+WFPG_TEST_CASE("radiance field: every ray gets a field, above its own horizon where surfaces reflect",
+               "[radiance_field]") {
+  const lit_box<Exec> box(constant_walls);
+  auto wave = wall_surfaces(400, 2);
+  for (std::size_t i = 0; i < wave.size(); i += 4) wave[i].bsdf.kind = bsdf_kind::glass;
+  for (guiding_mode mode : {guiding_mode::oriented, guiding_mode::plain}) {
+    const made_fields made = make_fields(box, wave, mode, box_caster{}, 0);
+    int below = 0, hemispheres = 0;
+    for (std::size_t ray = 0; ray < wave.size(); ++ray) {
+      REQUIRE(made.field_of_ray[ray] < made.fields.size());
+      const wfpg::resident_field& f = made.fields[made.field_of_ray[ray]];
+      hemispheres += f.hemisphere;
+      CHECK(f.hemisphere == (mode == guiding_mode::oriented && !wave[ray].bsdf.transmits()));
+      const std::uint32_t* words = made.words.data() + made.field_of_ray[ray] * (8 * 8 + 8);
+      const wfpg::grid_distribution grid(words, words + 64, 8);
+      if (!f.hemisphere) continue;
+      const directional_field field(grid, f.normal);
+      for (std::uint32_t i = 0; i < 20; ++i) {
+        const vec3 d = field.sample(hashed_numbers{ray}(i, 0));
+        below += glm::dot(d, wave[ray].normal) < -1e-6f;  // walls are flat: a bin's rays share their normal
+      }
+    }
+    CHECK(below == 0);
+    CHECK(hemispheres == (mode == guiding_mode::oriented ? 300 : 0));
+  }
+}
+
+}  // namespace

@@ -1,0 +1,328 @@
+// The glTF loader: what it reads, and that hostile files end in an error that names path and reason.
+#include "gltf_loader.hpp"
+#include "image_io.hpp"
+#include "support/catch.hpp"
+#include "support/renderer_io.hpp"
+#include "support/tiny_gltf.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace {
+
+using namespace render_test;
+using render::image;
+using render::material_kind;
+
+bool warns(const scene& s, const std::string& part) {
+  for (const std::string& line : s.warnings)
+    if (contains(line, part)) return true;
+  return false;
+}
+
+}  // namespace
+
+TEST_CASE("glTF: one triangle, embedded and binary", "[renderer][gltf]") {
+  temporary_folder folder;
+  const tiny_gltf tiny;
+  for (const std::string& path : {folder.write("a.gltf", tiny.json()), folder.write("a.glb", tiny.glb())}) {
+    const scene s = render::load_gltf(path);
+    check_consistent(s);
+    CHECK(s.name == "a");
+    REQUIRE(s.triangles.size() == 1);
+    CHECK(s.normals.empty());
+    CHECK(s.uvs.empty());
+    check_close(corner(s, 0, 1), {1, 0, 0});
+    check_close(corner(s, 0, 2), {0, 1, 0});
+    CHECK(warns(s, "camera"));
+    // The camera that is made up sees the triangle.
+    const vec3 towards = glm::normalize(vec3(0.5f, 0.5f, 0.0f) - s.view.position);
+    CHECK(glm::dot(towards, s.view.forward) > 0.99f);
+  }
+}
+
+TEST_CASE("glTF: a buffer in a file beside", "[renderer][gltf]") {
+  temporary_folder folder;
+  const tiny_gltf tiny;
+  std::string json = tiny.json();
+  const std::size_t start = json.find("data:application");
+  json.replace(start, json.find('"', start) - start, "beside.bin");
+  const std::string path = folder.write("a.gltf", json);
+  CHECK_THROWS_AS(render::load_gltf(path), std::runtime_error);
+  folder.write("beside.bin", tiny.buffer);
+  CHECK(render::load_gltf(path).triangles.size() == 1);
+}
+
+TEST_CASE("glTF: triangles without indices, and none at all", "[renderer][gltf]") {
+  tiny_gltf tiny;
+  tiny.with("meshes", R"([{"primitives": [{"attributes": {"POSITION": 0}}]}])");
+  const scene s = tiny.load();
+  check_consistent(s);
+  REQUIRE(s.triangles.size() == 1);
+  CHECK(s.materials[s.triangle_materials[0]].kind == material_kind::lambert);
+  const scene empty = tiny.with("nodes", "[{}]").load();
+  CHECK(empty.triangles.empty());
+}
+
+TEST_CASE("glTF: transforms of nested nodes", "[renderer][gltf]") {
+  const float half = std::sqrt(0.5f);
+  tiny_gltf tiny;
+  // The parent moves; the child turns by a right angle about z and then scales along its own x.
+  tiny.with("nodes", R"([{"children": [1], "translation": [10, 20, 30]},
+                         {"mesh": 0, "scale": [2, 1, 1], "rotation": [0, 0, )" +
+                         std::to_string(half) + ", " + std::to_string(half) + "]}]");
+  const scene s = tiny.load();
+  REQUIRE(s.triangles.size() == 1);
+  check_close(corner(s, 0, 0), {10, 20, 30});
+  check_close(corner(s, 0, 1), {10, 22, 30});
+  check_close(corner(s, 0, 2), {9, 20, 30});
+
+  tiny.with("nodes", R"([{"mesh": 0, "matrix": [1,0,0,0, 0,0,1,0, 0,-1,0,0, 5,6,7,1]}])");
+  const scene m = tiny.load();
+  check_close(corner(m, 0, 1), {6, 6, 7});
+  check_close(corner(m, 0, 2), {5, 6, 8});
+}
+
+TEST_CASE("glTF: mirroring turns the winding round", "[renderer][gltf]") {
+  tiny_gltf tiny;
+  const scene plain = tiny.load();
+  const scene mirrored = tiny.with("nodes", R"([{"mesh": 0, "scale": [-1, 1, 1]}])").load();
+  check_close(face_normal(plain, 0), {0, 0, 1});
+  check_close(face_normal(mirrored, 0), {0, 0, 1});
+}
+
+TEST_CASE("glTF: normals and texture coordinates", "[renderer][gltf]") {
+  tiny_gltf tiny;
+  // Normals: one plain, one unnormalised, one of no length, which the triangle's own replaces.
+  tiny.buffer = raw<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}) + raw<float>({0, 0, 1, 3, 0, 3, 0, 0, 0}) +
+                raw<std::uint8_t>({0, 255, 255, 0, 51, 51, 0, 0});
+  tiny.with("bufferViews", R"([{"buffer": 0, "byteLength": 36},
+                               {"buffer": 0, "byteOffset": 36, "byteLength": 36},
+                               {"buffer": 0, "byteOffset": 72, "byteLength": 6}])");
+  tiny.with("accessors", R"([{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+      {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC3"},
+      {"bufferView": 2, "componentType": 5121, "count": 3, "type": "VEC2", "normalized": true}])");
+  tiny.with("meshes", R"([{"primitives": [
+      {"attributes": {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2}}, {"attributes": {"POSITION": 0}}]}])");
+  tiny.with("nodes", R"([{"mesh": 0, "scale": [1, 1, 2]}])");
+  const scene s = tiny.load();
+  check_consistent(s);
+  REQUIRE(s.normals.size() == 6);
+  check_close(s.normals[0], {0, 0, 1});
+  check_close(s.normals[1], glm::normalize(vec3(1, 0, 0.5f)));
+  check_close(s.normals[2], {0, 0, 1});
+  check_close(s.normals[4], {0, 0, 1});
+  REQUIRE(s.uvs.size() == 6);
+  CHECK(s.uvs[0].y == Approx(1.0f));
+  CHECK(s.uvs[2].x == Approx(0.2f));
+}
+
+TEST_CASE("glTF: camera, resolution and environment", "[renderer][gltf]") {
+  tiny_gltf tiny;
+  tiny.with("nodes", R"([{"mesh": 0}, {"camera": 0, "matrix": [-1,0,0,0, 0,1,0,0, 0,0,-1,0, 1,2,3,1]}])");
+  tiny.with("cameras", R"([{"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1}}])");
+  tiny.with("scenes", R"([{"nodes": [0, 1], "extras": {"resolution": [640, 360],
+                           "environment": {"radiance": [1, 2.5, 3]}}}])");
+  const scene s = tiny.load();
+  CHECK(s.warnings.empty());
+  check_close(s.view.position, {1, 2, 3});
+  check_close(s.view.forward, {0, 0, 1});
+  check_close(s.view.up, {0, 1, 0});
+  CHECK(s.view.vertical_fov == Approx(0.5f));
+  CHECK(s.width == 640);
+  CHECK(s.height == 360);
+  check_close(s.environment, {1.0f, 2.5f, 3.0f});
+
+  tiny.with("scenes", R"([{"nodes": [0, 1], "extras": {"resolution": [0, "x"],
+                           "environment": {"radiance": [1, -2]}}}])");
+  const scene odd = tiny.load();
+  CHECK(warns(odd, "resolution"));
+  CHECK(warns(odd, "radiance"));
+  check_close(odd.environment, vec3(0.0f));
+}
+
+TEST_CASE("glTF: what materials become", "[renderer][gltf]") {
+  const auto read = [](const std::string& json) {
+    return tiny_gltf().with("materials", "[" + json + "]").load().materials.at(0);
+  };
+  const auto conductor = read(R"({"pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0.5,
+               "baseColorFactor": [0.9, 0.5, 0.1, 1]}})");
+  CHECK(conductor.kind == material_kind::conductor);
+  CHECK(conductor.alpha == Approx(0.25f));
+  check_close(conductor.base_color, {0.9f, 0.5f, 0.1f});
+  CHECK(read(R"({"pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0}})").kind ==
+        material_kind::mirror);
+  const auto plastic = read(R"({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0},
+                                "extensions": {"KHR_materials_ior": {"ior": 1.33}}})");
+  CHECK(plastic.kind == material_kind::plastic);
+  CHECK(plastic.alpha == Approx(0.01f));
+  CHECK(plastic.ior == Approx(1.33f));
+  CHECK(read(R"({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.5},
+                 "extensions": {"KHR_materials_specular": {"specularFactor": 0}}})")
+            .kind == material_kind::lambert);
+  CHECK(read(R"({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 1}})").kind ==
+        material_kind::lambert);
+  const auto glass = read(R"({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0},
+      "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_ior": {"ior": 1.7}}})");
+  CHECK(glass.kind == material_kind::dielectric);
+  CHECK(glass.ior == Approx(1.7f));
+  const auto lamp = read(R"({"emissiveFactor": [1, 0.5, 0],
+                             "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 300}}})");
+  check_close(lamp.emission, {300.0f, 150.0f, 0.0f}, 1e-3f);
+}
+
+TEST_CASE("glTF: a base colour texture becomes linear", "[renderer][gltf]") {
+  temporary_folder folder;
+  image picture = render::make_image(2, 1);
+  picture.pixels = {vec3(0.25f, 0.0f, 1.0f), vec3(0.5f)};
+  render::write_png(folder.file("t.png"), picture);
+  const std::string bytes = content_of(folder.file("t.png"));
+  tiny_gltf tiny;
+  tiny.with("images", R"([{"uri": "data:image/png;base64,)" + base64(bytes) + R"("}])");
+  tiny.with("textures", R"([{"source": 0}])");
+  tiny.with("materials", R"([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}},
+                             {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}])");
+  const scene s = tiny.load();
+  REQUIRE(s.textures.size() == 1);
+  CHECK(s.materials[0].base_texture == 0);
+  CHECK(s.materials[1].base_texture == 0);
+  REQUIRE(s.textures[0].texels.size() == 2);
+  check_close(s.textures[0].texels[0], {0.25f, 0.0f, 1.0f}, 0.005f);
+  check_close(s.textures[0].texels[1], vec3(0.5f), 0.005f);
+
+  tiny.with("images", R"([{"uri": "data:image/png;base64,)" + base64(bytes.substr(0, 50)) + R"("}])");
+  CHECK(contains(tiny.error(), "image 0"));
+}
+
+TEST_CASE("glTF: what is not supported is said once", "[renderer][gltf]") {
+  tiny_gltf tiny;
+  tiny.with("meshes", R"([{"primitives": [{"attributes": {"POSITION": 0}, "mode": 1},
+                                          {"attributes": {"POSITION": 0}, "mode": 0}]}])");
+  tiny.with("materials", R"([{"alphaMode": "BLEND"}, {"alphaMode": "MASK"}])");
+  const scene s = tiny.load();
+  CHECK(s.triangles.empty());
+  int lines = 0;
+  for (const std::string& line : s.warnings) lines += contains(line, "alpha") || contains(line, "points");
+  CHECK(lines == 2);
+}
+
+TEST_CASE("glTF: hostile files", "[renderer][gltf][hostile]") {
+  SECTION("missing") {
+    CHECK_THROWS_AS(render::load_gltf("/nonexistent/no.glb"), std::runtime_error);
+    CHECK_THROWS_AS(render::load_gltf("/"), std::runtime_error);
+  }
+  SECTION("empty, noise, wrong version") {
+    CHECK(contains(tiny_gltf::error_of(""), "empty"));
+    tiny_gltf::error_of("not json");
+    tiny_gltf::error_of("{}");
+    tiny_gltf::error_of("[1, 2]");
+    CHECK(contains(tiny_gltf().with("asset", R"({"version": "1.0"})").error(), "version"));
+    CHECK(contains(tiny_gltf().with("extras", std::string(5000, '[') + std::string(5000, ']')).error(),
+                   "nests"));
+  }
+  SECTION("cut off at every byte") {
+    const std::string glb = tiny_gltf().glb(), json = tiny_gltf().json();
+    for (std::size_t size = 0; size < glb.size(); ++size)
+      CHECK(tiny_gltf::error_of(glb.substr(0, size)) != "nothing was thrown");
+    for (std::size_t size = 0; size < json.size(); size += 7)
+      CHECK(tiny_gltf::error_of(json.substr(0, size)) != "nothing was thrown");
+  }
+  SECTION("a GLB chunk that leaves the file") {
+    std::string glb = tiny_gltf().glb();
+    const std::uint32_t huge = 0xfffffff0u;
+    std::memcpy(&glb[12], &huge, 4);
+    CHECK(contains(tiny_gltf::error_of(glb), "chunk"));
+    std::string last = tiny_gltf().glb();
+    const std::uint32_t more = std::uint32_t(tiny_gltf().buffer.size()) + 8;
+    std::memcpy(&last[last.size() - tiny_gltf().buffer.size() - 8], &more, 4);
+    CHECK(contains(tiny_gltf::error_of(last), "chunk"));
+  }
+  SECTION("vertex index out of range") {
+    tiny_gltf tiny;
+    tiny.buffer[36] = 3;
+    CHECK(contains(tiny.error(), "index 3"));
+  }
+  SECTION("accessors that leave their buffer view, views that leave their buffer") {
+    const std::string indices = R"({"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"}])";
+    for (const char* bad : {R"("count": 4)", R"("count": 3, "byteOffset": 4)", R"("count": 2000000000)",
+                            R"("count": 3, "byteOffset": 2000000000)", R"("count": -1)"})
+      CHECK(tiny_gltf()
+                .with("accessors", R"([{"bufferView": 0, "componentType": 5126, "type": "VEC3", )" +
+                                       std::string(bad) + "}, " + indices)
+                .error() != "nothing was thrown");
+    for (const char* bad : {R"("byteLength": 4000)", R"("byteLength": 36, "byteOffset": 4000)",
+                            R"("byteLength": 36, "byteStride": 16)", R"("byteLength": 36, "byteStride": 4)"})
+      CHECK(tiny_gltf()
+                .with("bufferViews", R"([{"buffer": 0, )" + std::string(bad) +
+                                         R"(}, {"buffer": 0, "byteOffset": 36, "byteLength": 6}])")
+                .error() != "nothing was thrown");
+    CHECK(tiny_gltf()
+              .with("bufferViews", R"([{"buffer": 7, "byteLength": 36}, {"buffer": 0, "byteLength": 6}])")
+              .error() != "nothing was thrown");
+  }
+  SECTION("wrong component types and types") {
+    const std::string positions = R"([{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},)";
+    const std::string indices = R"({"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"}])";
+    CHECK(contains(tiny_gltf()
+                       .with("accessors", positions + R"({"bufferView": 1, "componentType": 5126, "count": 1,
+                                                           "type": "SCALAR"}])")
+                       .error(),
+                   "component type"));
+    CHECK(contains(tiny_gltf()
+                       .with("accessors", R"([{"bufferView": 0, "componentType": 5126, "count": 3,
+                                               "type": "VEC2"},)" +
+                                              indices)
+                       .error(),
+                   "wrong type"));
+  }
+  SECTION("references to what does not exist") {
+    for (const auto& [part, json] : std::vector<std::pair<std::string, std::string>>{
+             {"scene", "5"},
+             {"scenes", R"([{"nodes": [3]}])"},
+             {"nodes", R"([{"mesh": 9}])"},
+             {"nodes", R"([{"camera": 0}])"},
+             {"nodes", R"([{"children": [-4]}])"},
+             {"meshes", R"([{"primitives": [{"attributes": {"POSITION": 8}}]}])"},
+             {"meshes", R"([{"primitives": [{"attributes": {"POSITION": 0}, "indices": 8}]}])"},
+             {"meshes", R"([{"primitives": [{"attributes": {"POSITION": 0}, "material": 8}]}])"},
+             {"meshes", R"([{"primitives": [{"attributes": {}}]}])"},
+             {"materials", R"([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 4}}}])"},
+             {"extensionsRequired", R"(["KHR_draco_mesh_compression"])"}}) {
+      INFO(part << " = " << json);
+      CHECK(tiny_gltf().with(part, json).error() != "nothing was thrown");
+    }
+  }
+  SECTION("node graphs that are no trees") {
+    CHECK(contains(tiny_gltf().with("nodes", R"([{"children": [0]}])").error(), "twice"));
+    CHECK(contains(tiny_gltf().with("nodes", R"([{"children": [1]}, {"children": [0]}])").error(), "twice"));
+    CHECK(contains(tiny_gltf().with("nodes", R"([{"children": [1, 1]}, {"mesh": 0}])").error(), "twice"));
+  }
+  SECTION("a hierarchy of a hundred thousand levels is no problem") {
+    std::string nodes = "[";
+    for (int i = 1; i < 100000; ++i) nodes += R"({"children": [)" + std::to_string(i) + "]},";
+    CHECK(tiny_gltf().with("nodes", nodes + R"({"mesh": 0}])").load().triangles.size() == 1);
+  }
+  SECTION("transforms and positions that are not finite") {
+    CHECK(tiny_gltf().with("nodes", R"([{"mesh": 0, "matrix": [1, 2, 3]}])").error() != "nothing was thrown");
+    CHECK(contains(tiny_gltf().with("nodes", R"([{"mesh": 0, "scale": [1e300, 1, 1]}])").error(), "finite"));
+    tiny_gltf tiny;
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    std::memcpy(&tiny.buffer[12], &nan, 4);
+    CHECK(contains(tiny.error(), "finite"));
+  }
+  SECTION("an image whose buffer view leaves the buffer") {
+    tiny_gltf tiny;
+    tiny.with("bufferViews", R"([{"buffer": 0, "byteLength": 36},
+        {"buffer": 0, "byteOffset": 36, "byteLength": 6}, {"buffer": 0, "byteOffset": 900, "byteLength": 900}])");
+    tiny.with("images", R"([{"bufferView": 2, "mimeType": "image/png"}])")
+        .with("textures", R"([{"source": 0}])");
+    tiny.with("materials", R"([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}])");
+    CHECK(contains(tiny.error(), "leaves its buffer"));
+  }
+}

@@ -1,0 +1,236 @@
+// The renderer's pictures, error measures and built-in scenes.
+#include "builtin_scenes.hpp"
+#include "image_io.hpp"
+#include "metrics.hpp"
+#include "support/catch.hpp"
+#include "support/renderer_io.hpp"
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+namespace {
+
+using namespace render_test;
+using render::image;
+using render::material_kind;
+
+image grey(int width, int height, float value) {
+  image picture = render::make_image(width, height);
+  for (vec3& pixel : picture.pixels) pixel = vec3(value);
+  return picture;
+}
+
+std::string error_of_read(const std::string& path) {
+  try {
+    render::read_exr(path);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+}  // namespace
+
+TEST_CASE("OpenEXR: a round trip is exact", "[renderer][exr]") {
+  temporary_folder folder;
+  image picture = render::make_image(7, 5);
+  for (std::size_t i = 0; i < picture.pixels.size(); ++i)
+    picture.pixels[i] = vec3(float(i) / 3.0f, -1.0f / float(i + 1), 1e20f * float(i));
+  picture.pixels[3].y = std::numeric_limits<float>::infinity();
+  render::write_exr(folder.file("a.exr"), picture);
+  const image back = render::read_exr(folder.file("a.exr"));
+  REQUIRE(back.width == 7);
+  REQUIRE(back.height == 5);
+  CHECK(std::memcmp(back.pixels.data(), picture.pixels.data(), 35 * sizeof(vec3)) == 0);
+}
+
+TEST_CASE("OpenEXR: failures name the path", "[renderer][exr]") {
+  temporary_folder folder;
+  CHECK(contains(error_of_read("/nonexistent/x.exr"), "/nonexistent/x.exr: "));
+  const std::string noise = folder.write("noise.exr", std::string(300, 'x'));
+  CHECK(contains(error_of_read(noise), noise + ": "));
+  const std::string whole = folder.file("whole.exr");
+  image picture = render::make_image(16, 64);
+  for (std::size_t i = 0; i < picture.pixels.size(); ++i) picture.pixels[i] = vec3(std::sin(float(i)));
+  render::write_exr(whole, picture);
+  const std::string bytes = content_of(whole);
+  for (std::size_t part : {std::size_t(20), bytes.size() / 3, bytes.size() - 40}) {
+    const std::string cut = folder.write("cut.exr", bytes.substr(0, part));
+    CHECK(contains(error_of_read(cut), cut + ": "));
+  }
+  CHECK_THROWS_AS(render::write_exr("/nonexistent/x.exr", grey(2, 2, 1.0f)), std::runtime_error);
+  CHECK_THROWS_AS(render::write_exr(folder.file("none.exr"), image{}), std::runtime_error);
+  CHECK_THROWS_AS(render::write_png("/nonexistent/x.png", grey(2, 2, 1.0f)), std::runtime_error);
+}
+
+TEST_CASE("The sRGB curve goes both ways", "[renderer][png]") {
+  for (int i = 0; i <= 255; ++i) {
+    const float encoded = float(i) / 255.0f;
+    CHECK(render::linear_to_srgb(render::srgb_to_linear(encoded)) == Approx(encoded).margin(1e-5));
+  }
+  CHECK(render::srgb_to_linear(0.5f) == Approx(0.21404f).margin(1e-4));
+}
+
+TEST_CASE("Pictures side by side", "[renderer][png]") {
+  const image row = render::side_by_side({grey(2, 3, 0.25f), grey(1, 2, 0.5f)}, 2);
+  REQUIRE(row.width == 5);
+  REQUIRE(row.height == 3);
+  check_close(row.pixels[0], vec3(0.25f));
+  check_close(row.pixels[2], vec3(1.0f));
+  check_close(row.pixels[4], vec3(0.5f));
+  check_close(row.pixels[14], vec3(1.0f));
+  CHECK_THROWS_AS(render::side_by_side({}, 2), std::invalid_argument);
+}
+
+TEST_CASE("Errors of hand-made pictures", "[renderer][metrics]") {
+  const render::image_error none = render::compare(grey(4, 4, 2.0f), grey(4, 4, 2.0f));
+  CHECK(none.mse == 0.0);
+  CHECK(none.relmse == 0.0);
+  CHECK(none.mse_reinhard == 0.0);
+
+  const render::image_error one = render::compare(grey(4, 4, 3.0f), grey(4, 4, 1.0f));
+  CHECK(one.mse == Approx(4.0));
+  CHECK(one.relmse == Approx(4.0 / 1.01));
+  CHECK(one.relmse_trimmed == Approx(4.0 / 1.01));
+  CHECK(one.mse_reinhard == Approx(0.0625));
+
+  image channel = grey(2, 1, 0.0f);
+  channel.pixels[1].y = 0.3f;
+  CHECK(render::compare(channel, grey(2, 1, 0.0f)).mse == Approx(0.09 / 6.0));
+  CHECK(render::compare(channel, grey(2, 1, 0.0f)).relmse == Approx(9.0 / 6.0));
+}
+
+TEST_CASE("Trimming drops one pixel in a thousand", "[renderer][metrics]") {
+  image test = grey(50, 40, 1.0f);
+  for (int i : {10, 700}) test.pixels[std::size_t(i)] = vec3(1000.0f);
+  test.pixels[5] = vec3(2.0f);
+  const render::image_error error = render::compare(test, grey(50, 40, 1.0f));
+  CHECK(error.relmse > 900.0);
+  CHECK(error.relmse_trimmed == Approx(1.0 / 1.01 / 1998.0));
+  test.pixels[6] = vec3(1000.0f);
+  CHECK(render::compare(test, grey(50, 40, 1.0f)).relmse_trimmed > 400.0);
+}
+
+TEST_CASE("Pixels that are not finite are not hidden", "[renderer][metrics]") {
+  image test = grey(50, 40, 1.0f);
+  test.pixels[3].x = std::numeric_limits<float>::quiet_NaN();
+  render::image_error error = render::compare(test, grey(50, 40, 1.0f));
+  CHECK(error.non_finite == 1);
+  CHECK(std::isinf(error.mse));
+  CHECK(std::isinf(error.mse_reinhard));
+  for (vec3& pixel : test.pixels) pixel.y = std::numeric_limits<float>::infinity();
+  error = render::compare(grey(50, 40, 1.0f), test);
+  CHECK(error.non_finite == 2000);
+  CHECK(std::isinf(error.relmse_trimmed));
+}
+
+TEST_CASE("Errors refuse what cannot be compared", "[renderer][metrics]") {
+  CHECK_THROWS_AS(render::compare(grey(4, 4, 1.0f), grey(4, 5, 1.0f)), std::invalid_argument);
+  CHECK_THROWS_AS(render::compare(image{}, image{}), std::invalid_argument);
+  CHECK(render::noise_of_halves(grey(4, 4, 3.0f), grey(4, 4, 1.0f)).mse == Approx(1.0));
+}
+
+TEST_CASE("Built-in scenes hold together", "[renderer][builtin]") {
+  for (const std::string& name : render::builtin_scene_names()) {
+    INFO(name);
+    CHECK(render::is_builtin_scene(name));
+    const scene s = render::make_builtin_scene(name);
+    check_consistent(s);
+    CHECK(s.name == name);
+    CHECK(s.max_depth == (name == "thin-wall" ? 6 : 8));
+    int emitters = 0;
+    for (std::size_t t = 0; t < s.triangles.size(); ++t) {
+      const vec3 normal = face_normal(s, t);
+      CHECK(glm::length(normal) == Approx(1.0f));
+      const render::material& m = s.materials[s.triangle_materials[t]];
+      if (m.emission == vec3(0.0f)) continue;
+      ++emitters;
+      if (name == "furnace") continue;
+      check_close(normal, {0.0f, -1.0f, 0.0f});
+      CHECK(m.base_color == vec3(0.0f));
+    }
+    CHECK(emitters == (name == "furnace" ? 12 : 2));
+  }
+  CHECK_FALSE(render::is_builtin_scene("nowhere"));
+  CHECK_THROWS_AS(render::make_builtin_scene("nowhere"), std::invalid_argument);
+}
+
+TEST_CASE("The furnace is closed, faces inwards and has a known answer", "[renderer][builtin]") {
+  const scene s = render::make_builtin_scene("furnace");
+  vec3 area(0.0f);
+  float volume = 0.0f;
+  for (std::size_t t = 0; t < s.triangles.size(); ++t) {
+    const vec3 a = corner(s, t, 0), b = corner(s, t, 1), c = corner(s, t, 2);
+    area += 0.5f * glm::cross(b - a, c - a);
+    volume += glm::dot(a, glm::cross(b, c)) / 6.0f;
+    CHECK(glm::dot(face_normal(s, t), s.view.position - a) > 0.0f);
+    const render::material& m = s.materials[s.triangle_materials[t]];
+    check_close(m.base_color, vec3(0.5f));
+    check_close(m.emission, vec3(1.0f));
+  }
+  check_close(area, vec3(0.0f));
+  CHECK(volume == Approx(-8.0f));  // negative: all sides face inwards
+  CHECK(render::furnace_radiance(0) == 0.0);
+  CHECK(render::furnace_radiance(1) == 1.0);
+  CHECK(render::furnace_radiance(8) == Approx(2.0 - std::pow(2.0, -7)));
+  CHECK(render::furnace_radiance(60) == Approx(2.0));
+}
+
+namespace {
+
+/// Twice the number of edges that some triangles use in one direction and none in the other, by position.
+std::size_t open_edges(const scene& s, material_kind kind) {
+  using key = std::tuple<float, float, float>;
+  std::map<std::pair<key, key>, int> balance;
+  const auto key_of = [](vec3 p) { return key(p.x, p.y, p.z); };
+  for (std::size_t t = 0; t < s.triangles.size(); ++t) {
+    if (s.materials[s.triangle_materials[t]].kind != kind) continue;
+    for (int i = 0; i < 3; ++i) {
+      const key a = key_of(corner(s, t, i)), b = key_of(corner(s, t, (i + 1) % 3));
+      ++balance[{a, b}];
+      --balance[{b, a}];
+    }
+  }
+  std::size_t open = 0;
+  for (const auto& edge : balance) open += edge.second != 0;
+  return open;
+}
+
+}  // namespace
+
+TEST_CASE("The glass around the enclosed lamp is closed and faces outwards", "[renderer][builtin]") {
+  const scene s = render::make_builtin_scene("cornell-enclosed");
+  CHECK(open_edges(s, material_kind::dielectric) == 0);
+  float volume = 0.0f;
+  vec3 lower(1e9f), upper(-1e9f);
+  for (std::size_t t = 0; t < s.triangles.size(); ++t) {
+    if (s.materials[s.triangle_materials[t]].kind != material_kind::dielectric) continue;
+    volume += glm::dot(corner(s, t, 0), glm::cross(corner(s, t, 1), corner(s, t, 2))) / 6.0f;
+    for (int i = 0; i < 3; ++i) {
+      lower = glm::min(lower, corner(s, t, i));
+      upper = glm::max(upper, corner(s, t, i));
+    }
+  }
+  CHECK(volume == Approx(0.70f * 0.24f * 0.60f).epsilon(1e-3));
+  for (std::size_t t = 0; t < s.triangles.size(); ++t)
+    if (s.materials[s.triangle_materials[t]].emission != vec3(0.0f))
+      for (int i = 0; i < 3; ++i) {
+        CHECK(glm::all(glm::greaterThan(corner(s, t, i), lower)));
+        CHECK(glm::all(glm::lessThan(corner(s, t, i), upper)));
+      }
+}
+
+TEST_CASE("The conductor box of ajar is closed", "[renderer][builtin]") {
+  CHECK(open_edges(render::make_builtin_scene("ajar"), material_kind::conductor) == 0);
+}

@@ -1,0 +1,399 @@
+// The octree against one built naively with std::map: nodes, links, levels, look-ups, cones.
+#include "support/catch.hpp"
+#include "support/policies.hpp"
+#include "support/random_meshes.hpp"
+
+#include <wfpg/sparse_voxel_octree.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <vector>
+
+namespace {
+
+using namespace wfpg_test;
+using glm::dvec3;
+using wfpg::invalid_node;
+using wfpg::morton_code;
+using wfpg::node_id;
+using wfpg::uvec3;
+using wfpg::vec3;
+using octree_view = wfpg::sparse_voxel_octree_view;
+
+constexpr std::uint32_t max_depth = octree_view::max_depth;
+
+/// Everything that a view says about a node, one by one.
+struct node_record {
+  std::uint32_t level, is_leaf, child_count;
+  node_id parent, first_child;
+  node_id child[8];
+  node_id ancestor[max_depth + 1];
+  uvec3 coordinates;
+  wfpg::bounds3 bounds;
+};
+
+struct describe_nodes {
+  octree_view tree;
+  wfpg::array_view<node_record> out;
+  void operator()(std::size_t i) const {
+    const auto node = static_cast<node_id>(i);
+    node_record r{};
+    r.level = tree.level_of(node);
+    r.is_leaf = tree.is_leaf(node) ? 1 : 0;
+    r.parent = tree.parent(node);
+    r.first_child = r.is_leaf ? invalid_node : tree.first_child(node);
+    r.child_count = r.is_leaf ? 0 : tree.child_count(node);
+    for (std::uint32_t octant = 0; octant < 8; ++octant)
+      r.child[octant] = r.is_leaf ? invalid_node : tree.child(node, octant);
+    for (std::uint32_t level = 0; level <= max_depth; ++level)
+      r.ancestor[level] = level <= r.level ? tree.ancestor(node, level) : invalid_node;
+    r.coordinates = tree.coordinates(node);
+    r.bounds = tree.bounds(node);
+    out[i] = r;
+  }
+};
+
+/// The octree as it is defined: the distinct prefixes of the leaves' codes, numbered by level, then by code.
+struct naive_octree {
+  std::uint32_t depth = 0;
+  std::vector<std::map<morton_code, node_id>> levels;
+  node_id count = 0;
+
+  naive_octree(const std::vector<morton_code>& codes, std::uint32_t resolution) {
+    while (1u << depth < resolution) ++depth;
+    levels.resize(depth + 1);
+    for (const morton_code code : codes)
+      for (std::uint32_t level = 0; level <= depth; ++level) levels[level][code >> 3 * (depth - level)] = 0;
+    for (auto& level : levels)
+      for (auto& entry : level) entry.second = count++;
+  }
+  node_id find(std::uint32_t level, morton_code code) const {
+    const auto found = levels[level].find(code);
+    return found == levels[level].end() ? invalid_node : found->second;
+  }
+  node_id leaf(uvec3 voxel) const { return find(depth, wfpg::morton_encode(voxel)); }
+};
+
+/// Compares all of a record but its bounds; counts what differs.
+int differences(const naive_octree& naive, std::uint32_t level, morton_code code, const node_record& r) {
+  int wrong = 0;
+  wrong += r.level != level;
+  wrong += r.is_leaf != (level == naive.depth ? 1u : 0u);
+  wrong += r.parent != (level == 0 ? invalid_node : naive.find(level - 1, code >> 3));
+  std::uint32_t children = 0;
+  node_id first = invalid_node;
+  for (std::uint32_t octant = 0; octant < 8; ++octant) {
+    const node_id child = level == naive.depth ? invalid_node : naive.find(level + 1, code << 3 | octant);
+    wrong += r.child[octant] != child;
+    children += child != invalid_node ? 1 : 0;
+    first = std::min(first, child);
+  }
+  wrong += r.child_count != children;
+  wrong += r.first_child != first;
+  for (std::uint32_t up = 0; up <= level; ++up)
+    wrong += r.ancestor[up] != naive.find(up, code >> 3 * (level - up));
+  return wrong + (r.coordinates != wfpg::morton_decode(code));
+}
+
+/// Whether a box is that of integer coordinates at a level, up to rounding.
+bool is_box_of(const wfpg::bounds3& box, const wfpg::voxel_grid& grid, std::uint32_t level, uvec3 at) {
+  const double size = double(grid.side) / (1u << level);
+  const dvec3 lower = dvec3(grid.origin) + dvec3(at) * size;
+  const double tolerance = 1.0e-6 * (grid.side + glm::length(dvec3(grid.origin)));
+  return glm::length(dvec3(box.lower) - lower) < tolerance &&
+         glm::length(dvec3(box.upper) - (lower + size)) < tolerance;
+}
+
+const wfpg::vec3 grid_origin(-3.0f, 10.0f, 0.5f);
+
+/// Fragments of given codes; the areas number them in their order here.
+template <class Exec>
+wfpg::voxel_fragments<Exec> make_fragments(const Exec& exec, const std::vector<morton_code>& codes,
+                                           std::uint32_t resolution) {
+  std::vector<float> areas(codes.size());
+  std::vector<std::uint32_t> normals(codes.size());
+  for (std::size_t i = 0; i < codes.size(); ++i) {
+    areas[i] = static_cast<float>(i);
+    normals[i] = static_cast<std::uint32_t>(7 * i);
+  }
+  wfpg::voxel_fragments<Exec> fragments;
+  fragments.codes = wfpg::buffer<morton_code, Exec>(exec, codes);
+  fragments.areas = wfpg::buffer<float, Exec>(exec, areas);
+  fragments.normals = wfpg::buffer<std::uint32_t, Exec>(exec, normals);
+  fragments.grid = {grid_origin, 2.5f, resolution};
+  return fragments;
+}
+
+/// Codes of n random voxels, some of them repeated, in clusters of a few voxels.
+std::vector<morton_code> random_codes(std::size_t n, std::uint32_t resolution, std::uint64_t seed) {
+  random_numbers random(seed);
+  std::vector<morton_code> codes;
+  while (codes.size() < n) {
+    uvec3 p(random.below(resolution), random.below(resolution), random.below(resolution));
+    for (std::uint32_t i = random.below(8); i < 8 && codes.size() < n; ++i) {
+      codes.push_back(wfpg::morton_encode(p));
+      p = glm::min(p + uvec3(random.below(2), random.below(2), random.below(2)), uvec3(resolution - 1));
+    }
+  }
+  return codes;
+}
+
+struct octree_case {
+  std::vector<morton_code> codes;
+  std::uint32_t resolution;
+};
+
+std::vector<octree_case> cases() {
+  std::vector<octree_case> all;
+  for (const std::uint32_t resolution : {1u, 2u, 4u, 32u, 128u})
+    all.push_back({random_codes(700, resolution, resolution), resolution});
+  all.push_back({random_codes(3000, 1024, 5), 1024});
+  all.push_back({random_codes(500, 4096, 6), 4096});
+  all.push_back({{0}, 1024});
+  all.push_back({{(1u << 30) - 1}, 1024});
+  std::vector<morton_code> full(512);
+  for (std::size_t i = 0; i < 512; ++i) full[i] = 511 - i;
+  all.push_back({full, 8});
+  return all;
+}
+
+template <class Exec>
+void check_nodes(const Exec& exec, const octree_view& view, const naive_octree& naive) {
+  REQUIRE(view.node_count() == naive.count);
+  CHECK(view.depth() == naive.depth);
+  CHECK(view.leaf_count() == naive.levels.back().size());
+  const wfpg::buffer<node_record, Exec> records(exec, view.node_count());
+  exec.for_each(view.node_count(), describe_nodes{view, records.view()});
+  const std::vector<node_record> host = records.to_host(exec);
+  int wrong = 0, wrong_boxes = 0;
+  node_id begin = 0;
+  for (std::uint32_t level = 0; level <= naive.depth; ++level) {
+    CHECK(view.level_begin(level) == begin);
+    begin += static_cast<node_id>(naive.levels[level].size());
+    for (const auto& [code, node] : naive.levels[level]) {
+      wrong += differences(naive, level, code, host[node]);
+      wrong_boxes += is_box_of(host[node].bounds, view.grid(), level, wfpg::morton_decode(code)) ? 0 : 1;
+    }
+  }
+  CHECK(view.level_begin(naive.depth + 1) == begin);
+  CHECK(wrong == 0);
+  CHECK(wrong_boxes == 0);
+}
+
+WFPG_TEST_CASE("nodes and links equal a naive octree's", "[sparse_voxel_octree]") {
+  const Exec exec;
+  for (const octree_case& c : cases()) {
+    auto fragments = make_fragments(exec, c.codes, c.resolution);
+    const wfpg::sparse_voxel_octree<Exec> tree(exec, fragments);
+    const naive_octree naive(c.codes, c.resolution);
+    INFO("resolution " << c.resolution);
+    CHECK(tree.resolution() == c.resolution);
+    CHECK(tree.node_count() == naive.count);
+    CHECK(tree.bytes() <= 4 * tree.leaf_count() + 9 * (tree.node_count() - tree.leaf_count()));
+    check_nodes(exec, tree.view(), naive);
+  }
+}
+
+WFPG_TEST_CASE("the build sorts fragments by voxel and keeps their order inside", "[sparse_voxel_octree]") {
+  const Exec exec;
+  for (const octree_case& c : cases()) {
+    auto fragments = make_fragments(exec, c.codes, c.resolution);
+    wfpg::sparse_voxel_octree<Exec> tree(exec, fragments);
+    std::vector<std::size_t> order(c.codes.size());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return c.codes[a] < c.codes[b]; });
+    const auto codes = fragments.codes.to_host(exec);
+    const auto areas = fragments.areas.to_host(exec);
+    const auto normals = fragments.normals.to_host(exec);
+    std::vector<std::uint32_t> begin;
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      wrong += codes[i] != c.codes[order[i]] || areas[i] != static_cast<float>(order[i]) ||
+               normals[i] != 7 * order[i];
+      if (i == 0 || codes[i] != codes[i - 1]) begin.push_back(static_cast<std::uint32_t>(i));
+    }
+    CHECK(wrong == 0);
+    CHECK((to_host(exec, tree.leaf_fragment_begin()) == begin));
+    tree.release_build_data();
+    CHECK(tree.leaf_fragment_begin().empty());
+  }
+}
+
+/// Points in and around a grid, among them corners of voxels and such as no voxel can hold.
+std::vector<vec3> query_points(const wfpg::voxel_grid& grid, const std::vector<morton_code>& codes) {
+  random_numbers random(9);
+  std::vector<vec3> points;
+  const float voxel = grid.voxel_size();
+  for (int i = 0; i < 1500; ++i) {
+    const uvec3 at = wfpg::morton_decode(codes[random.below(static_cast<std::uint32_t>(codes.size()))]);
+    points.push_back(grid.origin + voxel * (vec3(at) + random.point(-1.5f, 2.5f)));
+    points.push_back(grid.origin + grid.side * random.point(-0.2f, 1.2f));
+  }
+  const float odd[] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
+                       -std::numeric_limits<float>::infinity(), 3.0e38f, -3.0e38f};
+  for (const float value : odd)
+    for (int axis = 0; axis < 3; ++axis) {
+      points.push_back(grid.origin + 0.5f * grid.side);
+      points.back()[axis] = value;
+    }
+  return points;
+}
+
+struct find_leaves {
+  octree_view tree;
+  wfpg::array_view<const vec3> points;
+  wfpg::array_view<node_id> at, nearest;
+  void operator()(std::size_t i) const {
+    at[i] = tree.leaf_at(points[i]);
+    nearest[i] = tree.nearest_leaf(points[i]);
+  }
+};
+
+/// Square distance, in voxels, from a point in grid units to the nearest centre of the leaves in the 27
+/// voxels around it; negative where there is none.
+double nearest_square_distance(const naive_octree& naive, dvec3 g, std::uint32_t resolution) {
+  double best = -1.0;
+  for (int i = 0; i < 27; ++i) {
+    const dvec3 voxel = glm::floor(g) + dvec3(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+    if (glm::any(glm::lessThan(voxel, dvec3(0))) || glm::any(glm::greaterThanEqual(voxel, dvec3(resolution))))
+      continue;
+    if (naive.leaf(uvec3(voxel)) == invalid_node) continue;
+    const dvec3 d = voxel + 0.5 - g;
+    if (best < 0.0 || glm::dot(d, d) < best) best = glm::dot(d, d);
+  }
+  return best;
+}
+
+WFPG_TEST_CASE("points find their leaf, or the nearest of the 26 around", "[sparse_voxel_octree]") {
+  const Exec exec;
+  for (const octree_case& c : cases()) {
+    auto fragments = make_fragments(exec, c.codes, c.resolution);
+    const wfpg::sparse_voxel_octree<Exec> tree(exec, fragments);
+    const naive_octree naive(c.codes, c.resolution);
+    const wfpg::voxel_grid grid = tree.view().grid();
+    const std::vector<vec3> points = query_points(grid, c.codes);
+    const wfpg::buffer<vec3, Exec> device(exec, points);
+    const wfpg::buffer<node_id, Exec> at(exec, points.size()), nearest(exec, points.size());
+    exec.for_each(points.size(), find_leaves{tree.view(), device.view(), at.view(), nearest.view()});
+    const auto at_host = at.to_host(exec), nearest_host = nearest.to_host(exec);
+
+    int wrong = 0, found = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const bool odd = !(glm::length(dvec3(points[i])) < 1.0e6);
+      const dvec3 g = (dvec3(points[i]) - dvec3(grid.origin)) * (double(c.resolution) / grid.side);
+      const dvec3 from_face = glm::abs(g - glm::round(g));
+      if (!odd && glm::any(glm::lessThan(from_face, dvec3(1.0e-2)))) continue;  // rounding decides
+      const bool in_grid =
+          !odd && glm::all(glm::greaterThan(g, dvec3(0))) && glm::all(glm::lessThan(g, dvec3(c.resolution)));
+      const node_id here = in_grid ? naive.leaf(uvec3(g)) : invalid_node;
+      wrong += at_host[i] != here;
+      const double expected = odd ? -1.0 : nearest_square_distance(naive, g, c.resolution);
+      if (nearest_host[i] == invalid_node || here != invalid_node) {
+        wrong += nearest_host[i] != here || (here == invalid_node && expected >= 0.0);
+        continue;
+      }
+      ++found;
+      const dvec3 d = dvec3(tree.view().coordinates(nearest_host[i])) + 0.5 - g;
+      wrong += !tree.view().is_leaf(nearest_host[i]) || std::abs(glm::dot(d, d) - expected) > 1.0e-2;
+    }
+    INFO("resolution " << c.resolution);
+    CHECK(wrong == 0);
+    CHECK((found > 0 || c.resolution == 8));
+  }
+}
+
+WFPG_TEST_CASE("every voxel's look-up agrees with the map", "[sparse_voxel_octree]") {
+  const Exec exec;
+  const std::uint32_t resolution = 16;
+  const auto codes = random_codes(600, resolution, 77);
+  auto fragments = make_fragments(exec, codes, resolution);
+  const wfpg::sparse_voxel_octree<Exec> tree(exec, fragments);
+  const naive_octree naive(codes, resolution);
+  const wfpg::buffer<node_id, Exec> leaves(exec, 4096);
+  exec.for_each(4096, [view = tree.view(), out = leaves.view()](std::size_t code) {
+    out[code] = view.leaf_at(wfpg::morton_decode(code));
+  });
+  const auto host = leaves.to_host(exec);
+  int wrong = 0;
+  for (morton_code code = 0; code < 4096; ++code) wrong += host[code] != naive.find(4, code);
+  CHECK(wrong == 0);
+}
+
+/// How far the face of a node of a level is from a cone's base, in ratio.
+double mismatch(const octree_view& view, std::uint32_t level, double area) {
+  const double size = double(view.grid().side) / (1u << level);
+  return std::abs(std::log(size * size / area));
+}
+
+WFPG_TEST_CASE("a cone reads the level whose face is nearest to its base", "[sparse_voxel_octree]") {
+  const Exec exec;
+  for (const std::uint32_t resolution : {1u, 2u, 128u, 1024u}) {
+    const auto codes = random_codes(50, resolution, 3);
+    auto fragments = make_fragments(exec, codes, resolution);
+    const wfpg::sparse_voxel_octree<Exec> tree(exec, fragments);
+    const octree_view view = tree.view();
+    random_numbers random(4);
+    for (int i = 0; i < 2000; ++i) {
+      const float distance = std::pow(10.0f, random.between(-5.0f, 3.0f));
+      const float solid_angle = std::pow(10.0f, random.between(-5.0f, 1.0f));
+      const std::uint32_t level = view.level_for_cone(distance, solid_angle);
+      REQUIRE(level <= view.depth());
+      double best = 1.0e30;
+      for (std::uint32_t l = 0; l <= view.depth(); ++l)
+        best = std::min(best, mismatch(view, l, double(distance) * distance * solid_angle));
+      REQUIRE(mismatch(view, level, double(distance) * distance * solid_angle) <= best + 1.0e-4);
+      const node_id leaf = view.first_leaf() + random.below(view.leaf_count());
+      REQUIRE(view.node_for_cone(leaf, distance, solid_angle) == view.ancestor(leaf, level));
+    }
+    CHECK(view.level_for_cone(0.0f, 1.0f) == view.depth());
+    CHECK(view.level_for_cone(1.0f, 0.0f) == view.depth());
+    CHECK(view.level_for_cone(1.0e30f, 1.0f) == 0);
+    CHECK(view.level_for_cone(3.0e38f, 12.0f) == 0);
+    CHECK(view.level_for_cone(std::numeric_limits<float>::quiet_NaN(), 1.0f) <= view.depth());
+  }
+}
+
+WFPG_TEST_CASE("an empty scene is a valid octree", "[sparse_voxel_octree]") {
+  const Exec exec;
+  const auto check_empty = [](const wfpg::sparse_voxel_octree<Exec>& tree) {
+    const octree_view view = tree.view();
+    CHECK(view.empty());
+    CHECK(tree.node_count() == 0);
+    CHECK(tree.leaf_count() == 0);
+    CHECK(tree.bytes() == 0);
+    for (const vec3 p : {vec3(0.0f), vec3(0.5f), vec3(-7.0f)}) {
+      CHECK(view.leaf_at(p) == invalid_node);
+      CHECK(view.nearest_leaf(p) == invalid_node);
+    }
+    CHECK(view.leaf_at(uvec3(0u)) == invalid_node);
+    CHECK(view.level_for_cone(1.0f, 1.0f) <= view.depth());
+  };
+  check_empty(wfpg::sparse_voxel_octree<Exec>());
+  for (const std::uint32_t resolution : {1u, 64u, 1024u}) {
+    auto fragments = voxelized(exec, test_mesh(), resolution);
+    check_empty(wfpg::sparse_voxel_octree<Exec>(exec, fragments));
+  }
+}
+
+WFPG_TEST_CASE("an octree of a mesh covers its surface", "[sparse_voxel_octree]") {
+  const Exec exec;
+  const test_mesh mesh = sphere_mesh(20, {5, 6, 7}, 2.0f);
+  auto fragments = voxelized(exec, mesh, 64);
+  const wfpg::sparse_voxel_octree<Exec> tree(exec, fragments);
+  check_nodes(exec, tree.view(), naive_octree(fragments.codes.to_host(exec), 64));
+  random_numbers random(8);
+  int missed = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const std::size_t t = random.below(static_cast<std::uint32_t>(mesh.triangles.size()));
+    const float u = random.unit(), v = random.unit() * (1.0f - u);
+    const vec3 a = mesh.vertex(t, 0), b = mesh.vertex(t, 1), c = mesh.vertex(t, 2);
+    missed += tree.view().nearest_leaf(a + u * (b - a) + v * (c - a)) == invalid_node ? 1 : 0;
+  }
+  CHECK(missed == 0);
+}
+
+}  // namespace
