@@ -45,10 +45,10 @@ WFPG_TEST_CASE("path guider: nothing is allocated after the first guided sample"
   const Exec exec(&resource);
   const box_mesh<Exec> mesh(exec);
   batch_box_caster::log log;
+  // Other bins every time, and a third more of them after the first.
   const auto wave = [](std::uint32_t sample, std::uint32_t depth) {
-    auto surfaces =
-        wall_surfaces(512, 10 * sample + depth);  // other bins every time, and more after the first
-    for (std::size_t i = 0; sample == 0 && i < 60; ++i) surfaces[i] = surfaces[60 + i];
+    auto surfaces = wall_surfaces(512, 10 * sample + depth);
+    for (std::size_t i = 0; sample == 0 && i < 140; ++i) surfaces[i] = surfaces[140];
     return surfaces;
   };
   for (int form = 0; form < 4; ++form) {

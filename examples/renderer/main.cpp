@@ -21,6 +21,7 @@ constexpr int failure = 2;
 
 struct arguments {
   std::string scene, size, output, png, stats, reference;
+  float exposure = 1.0f;  // of the PNG
   render::render_options options;
 };
 
@@ -94,6 +95,9 @@ void add_file_options(CLI::App& app, arguments& given) {
       ->required();
   app.add_option("-o,--output", given.output, "picture, OpenEXR");
   app.add_option("--png", given.png, "picture, sRGB PNG");
+  app.add_option("--exposure", given.exposure, "multiplies the PNG's values (default: 1)")
+      ->check(CLI::PositiveNumber)
+      ->needs("--png");
   app.add_option("--stats", given.stats, "what it cost, JSON");
   app.add_option("--reference", given.reference, "picture to print the error against, OpenEXR");
 }
@@ -132,7 +136,7 @@ void run(arguments& given) {
       render::render(scene, given.options, [&bar](const render::render_progress& p) { bar.show(p); });
   bar.finish();
   if (!given.output.empty()) render::write_exr(given.output, result.picture);
-  if (!given.png.empty()) render::write_png(given.png, result.picture);
+  if (!given.png.empty()) render::write_png(given.png, result.picture, given.exposure);
   std::optional<render::image_error> error;
   if (reference) error = render::compare(result.picture, *reference);
   if (error) print_error(*error);
