@@ -182,6 +182,18 @@ WFPG_TEST_CASE("a side without data reads its first ancestor that has some", "[e
     CHECK(read(voxel, -z) == 0.0f);
 }
 
+WFPG_TEST_CASE("an ancestor is read on the node's side, not on the reader's", "[exitance_cache]") {
+  const vec3 z(0, 0, 1), mostly_x = glm::normalize(vec3(1.0f, 0.0f, 0.1f));
+  cached_scene<Exec> scene(fragments_in_grid<Exec>({{{0, 0, 0}, z, 1.0f}, {{1, 0, 0}, mostly_x, 10.0f}}), 10);
+  deposit_all(scene, {{{1.5f, 0.5f, 0.5f}, mostly_x, 5.0f}, {{1.5f, 0.5f, 0.5f}, -mostly_x, 7.0f}});
+  scene.cache.update(scene.exec);
+  const node_id leaf = scene.octree().leaf_at(uvec3(0, 0, 0));
+  const vec3 grazing = glm::normalize(vec3(-0.9f, 0.0f, 0.3f));  // in front of the leaf, behind its parent
+  CHECK(glm::dot(scene.view().normal(scene.octree().parent(leaf)), grazing) < 0.0f);
+  CHECK(scene.view().read(leaf, grazing) == 5.0f);
+  CHECK(scene.view().read(leaf, -grazing) == 7.0f);
+}
+
 WFPG_TEST_CASE("deposits that cannot be are dropped and counted", "[exitance_cache]") {
   const vec3 z(0, 0, 1), p(1.5f);
   cached_scene<Exec> scene(fragments_in_grid<Exec>({{{1, 1, 1}, z, 1.0f}}), 100);

@@ -222,7 +222,7 @@ cell wrapped(int x, int y, int size) {
 
 TEST_CASE("wrapped cells are neighbours on the sphere", "[octahedral_map]") {
   for (const int size : {2, 4, 5, 8, 16}) {
-    int apart = 0, moved = 0;
+    int apart = 0, moved = 0, stuck = 0;
     const auto compare = [&](int x, int y, int dx, int dy, int corners) {
       const cell a = wrapped(x, y, size), b = wrapped(x + dx, y + dy, size);
       apart += shared_corners(a.x, a.y, b.x, b.y, size) < corners ? 1 : 0;
@@ -231,6 +231,14 @@ TEST_CASE("wrapped cells are neighbours on the sphere", "[octahedral_map]") {
       for (int across = -size; across < 2 * size - 1; ++across) {
         compare(across, along, 1, 0, 2);  // each step crosses one edge, out of the grid and beyond
         compare(along, across, 0, 1, 2);
+      }
+    for (int along = 0; along < size; ++along)
+      for (const int outside : {-1, size}) {  // over an edge, not back through it, but for its middle
+        const int inside = outside < 0 ? 0 : size - 1;
+        const bool middle = 2 * along + 1 == size;
+        stuck += (wrapped(outside, along, size).y == along) != middle ? 1 : 0;
+        stuck += (wrapped(along, outside, size).x == along) != middle ? 1 : 0;
+        apart += wrapped(outside, along, size).x != inside || wrapped(along, outside, size).y != inside;
       }
     for (int x = 0; x < size; ++x)
       for (int y = 0; y < size; ++y) {
@@ -241,6 +249,7 @@ TEST_CASE("wrapped cells are neighbours on the sphere", "[octahedral_map]") {
       }
     INFO("grid " << size);
     CHECK(apart == 0);
+    CHECK(stuck == 0);
     CHECK(moved == 0);
   }
 }

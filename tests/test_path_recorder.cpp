@@ -120,6 +120,10 @@ WFPG_TEST_CASE("the environment counts as scattered by the last vertex", "[path_
     r.finish();
     CHECK(r.leaving(1) == Approx(6.0f));
     CHECK(r.leaving(0) == Approx(3.0f));
+    r.view().vertex(1, 0, place(5), up, vec3(1.0f));
+    r.view().emission(1, 1, vec3(4.0f));  // after one vertex
+    r.finish();
+    CHECK(r.leaving(5) == Approx(4.0f));
     CHECK(r.dropped() == 0);
   }
 }

@@ -48,13 +48,15 @@ struct surface_bsdf<surface<B>> {
 
 }  // namespace detail
 
+// clang-format off
 /// True where B is a BSDF:
-///   float eval(vec3 outgoing, vec3 incident) const;        f |cos|, luminance, per steradian; 0 for delta
-///   lobes float pdf(vec3 outgoing, vec3 incident) const;         of sample(), per steradian; 0 for delta
-///   lobes bsdf_sample sample(vec3 outgoing, vec2 u) const;       u in [0,1)² bool is_delta() const; all of
-///   it is delta lobes: sampled alone, not guided bool transmits() const; light can come from below the
-///   normal
+///   float eval(vec3 outgoing, vec3 incident) const;       f |cos|, luminance, per steradian; 0 for delta lobes
+///   float pdf(vec3 outgoing, vec3 incident) const;        of sample(), per steradian; 0 for delta lobes
+///   bsdf_sample sample(vec3 outgoing, vec2 u) const;      u in [0,1)²
+///   bool is_delta() const;                                all of it is delta lobes: sampled alone, not guided
+///   bool transmits() const;                               light can come from below the normal
 /// eval and pdf are zero, and sample fails, where the BSDF is black. Wherever eval is positive, pdf is too.
+// clang-format on
 template <class B>
 inline constexpr bool is_bsdf_v = detail::is_bsdf<B>::value;
 

@@ -16,7 +16,8 @@
 namespace wfpg {
 
 /// What a kernel sees of the recorder. Calls for one path come from one thread at a time, vertices in order
-/// of depth. A path or depth beyond the capacity, or a vertex that was not recorded, is dropped and counted.
+/// of depth. A path or depth beyond the capacity, a vertex that was not recorded, or a direction that is not
+/// finite is dropped and counted.
 class path_recorder_view {
  public:
   WFPG_HD std::size_t paths() const { return paths_; }
@@ -28,6 +29,7 @@ class path_recorder_view {
   WFPG_HD void vertex(std::size_t path, std::uint32_t depth, vec3 position, vec3 outgoing,
                       vec3 throughput) const {
     if (path >= paths_ || depth >= max_depth_ || depth != lengths_[path]) return drop();
+    if (!detail::is_finite(outgoing)) return drop();
     const std::size_t slot = depth * paths_ + path;
     positions_[slot] = position;
     outgoing_[slot] = pack_direction(outgoing);
@@ -82,10 +84,17 @@ struct deposit_paths {
       const std::size_t slot = depth * paths.paths_ + path;
       arriving += paths.contributions_[slot];
       const vec3 t = paths.throughputs_[slot];
-      const vec3 leaving{t.x > 0.0f ? arriving.x / t.x : 0.0f, t.y > 0.0f ? arriving.y / t.y : 0.0f,
-                         t.z > 0.0f ? arriving.z / t.z : 0.0f};
+      const vec3 leaving{divided(arriving.x, t.x), divided(arriving.y, t.y), divided(arriving.z, t.z)};
       cache.deposit(paths.positions_[slot], unpack_direction(paths.outgoing_[slot]), leaving);
     }
+  }
+
+ private:
+  /// Nothing leaves where nothing can arrive from; a throughput that is not finite stays so, and the cache
+  /// drops it.
+  WFPG_HD static float divided(float arriving, float throughput) {
+    if (throughput > 0.0f) return arriving / throughput;
+    return detail::is_finite(throughput) ? 0.0f : throughput;
   }
 };
 

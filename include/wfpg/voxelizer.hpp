@@ -112,8 +112,8 @@ struct bounds_union {
   }
 };
 
-/// The cube around a box, half a voxel wider on each side so that axis-aligned walls at the box's faces lie
-/// in the middle of their voxels. A point gets a cube that floats can divide.
+/// The cube around a box, about half a voxel wider on each side so that axis-aligned walls at the box's faces
+/// lie in the middle of their voxels. A point gets a cube that floats can divide.
 inline voxel_grid grid_around(const bounds3& box, std::uint32_t resolution) {
   voxel_grid grid;
   grid.resolution = resolution;

@@ -28,10 +28,13 @@ class basic_tbb : public wfpg::detail::cpu_policy<basic_tbb<W>, W> {
 
   template <class F>
   void parallel(std::size_t n, std::size_t grain, const F& f) const {
-    ::tbb::parallel_for(::tbb::blocked_range<std::size_t>(0, n, grain),
-                        [&f](const ::tbb::blocked_range<std::size_t>& range) {
-                          f(range.begin(), range.end(), ::tbb::this_task_arena::current_thread_index());
-                        });
+    // Isolated, since a thread that waits inside f, for a host's own TBB work, must not take up another
+    // range: it would share this one's worker index and scratch.
+    ::tbb::parallel_for(
+        ::tbb::blocked_range<std::size_t>(0, n, grain), [&f](const ::tbb::blocked_range<std::size_t>& range) {
+          ::tbb::this_task_arena::isolate(
+              [&] { f(range.begin(), range.end(), ::tbb::this_task_arena::current_thread_index()); });
+        });
   }
 };
 
