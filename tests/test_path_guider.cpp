@@ -236,10 +236,12 @@ WFPG_TEST_CASE("path guider: what is not finite is dropped and counted, and guid
   recorder.vertex(4, 0, vec3(nan), {0, 1, 0}, vec3(1.0f));
   recorder.vertex(5, 0, surfaces[5].position, vec3(0, 1, 0), vec3(nan));
   recorder.vertex(6, 0, vec3(9.0f), {0, 1, 0}, vec3(1.0f));
+  recorder.vertex(7, 0, surfaces[7].position, vec3(nan), vec3(1.0f));
   const auto before = guider.statistics();
   guider.end_sample();
   const auto after = guider.statistics();
-  CHECK(after.deposits.invalid - before.deposits.invalid == 5);
+  CHECK(after.deposits.invalid - before.deposits.invalid == 6);
+  CHECK(after.dropped_vertices == 1);
   CHECK(after.deposits.outside - before.deposits.outside == 1);
   CHECK(after.deposits.overflow == 0);
   for (float radiance : trace_paths(exec, guider, 1, 64, box_caster{})) CHECK(std::isfinite(radiance));
