@@ -49,7 +49,7 @@ struct weighted {
   double area;
 };
 
-/// Two clusters as DESIGN says: around the first normal and its opposite, by area, at most 8 rounds.
+/// Two clusters: around the first normal and its opposite, by area, at most 8 rounds.
 dvec3 naive_normal(const std::vector<weighted>& members) {
   dvec3 means[2] = {members[0].normal, -members[0].normal};
   double areas[2];

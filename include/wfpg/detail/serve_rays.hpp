@@ -9,7 +9,7 @@
 
 namespace wfpg::detail {
 
-/// The share of guided samples of a bin (DESIGN: more where a field fits its rays well).
+/// The share of guided samples of a bin: more where enough rays share it for its field to fit them.
 struct mixture_fraction {
   float with_enough_rays;
   float with_few_rays;
