@@ -34,6 +34,13 @@ void report_guider(const wfpg::path_guider<Exec>& guider, std::uint64_t segments
     const double bins = static_cast<double>(depth.bins);
     report.bins.push_back({bins / samples, bins > 0.0 ? static_cast<double>(depth.rays) / bins : 0.0});
   }
+  const wfpg::kept_field_statistics& kept = statistics.kept;
+  report.slots.capacity = kept.capacity;
+  report.slots.live = kept.live;
+  report.slots.live_bytes = kept.live * kept.bytes_a_slot;
+  report.slots.born = static_cast<double>(kept.born) / samples;
+  report.slots.freed = static_cast<double>(kept.freed) / samples;
+  report.slots.refreshed = static_cast<double>(kept.refreshed) / samples;
   if (segments > 0) report.cones_per_segment = cones / static_cast<double>(segments);
   for (const auto& [stage, seconds] : statistics.seconds)
     report.seconds.emplace_back("guide " + std::string(stage), seconds);

@@ -40,6 +40,7 @@ CLI::Option* add_choice(CLI::App& app, const std::string& name, T& value,
 
 void add_method_options(CLI::App& app, render::render_options& options) {
   using render::device;
+  using render::fields;
   using render::guiding;
   using render::sampling_method;
   using combine = wfpg::sample_combination;
@@ -49,6 +50,9 @@ void add_method_options(CLI::App& app, render::render_options& options) {
   add_choice<guiding>(app, "--guiding", options.mode,
                       {{"oriented", guiding::oriented}, {"plain", guiding::plain}},
                       "bins by position and normal (default), or by position alone");
+  add_choice<fields>(app, "--fields", options.lifetime,
+                     {{"kept", fields::kept}, {"transient", fields::transient}},
+                     "kept across depths and samples (default), or made anew each time");
   add_choice<device>(app, "--device", options.where,
                      {{"cpu", device::cpu}, {"omp", device::omp}, {"seq", device::seq}},
                      "TBB (default), OpenMP, or one thread");
@@ -81,7 +85,12 @@ void add_guider_options(CLI::App& app, render::render_options& options) {
   app.add_option("--octree-resolution", options.octree_resolution,
                  "voxels a side, a power of two (default: 128)");
   app.add_option("--field-resolution", options.field_resolution,
-                 "cells a side of the first field (default: 32)");
+                 "cells a side of transient fields at the first vertex (default: 32)");
+  app.add_option("--slot-resolution", options.slot_resolution, "cells a side of kept fields (default: 24)");
+  app.add_option("--recast", options.recast, "a refresh casts one cone in so many again (default: 8)")
+      ->check(CLI::Range(1, 1 << 20));
+  app.add_option("--field-budget", options.field_budget, "memory of kept fields, such as 16MiB (the default)")
+      ->transform(CLI::AsSizeValue(false));
   app.add_option("--rays-per-bin", options.rays_per_bin, "rays that a bin should have (default: 64)");
   app.add_option("--min-bin-level", options.min_bin_level, "octree level of the largest bins (default: 3)");
   app.add_option("--guide-fraction", options.guide_fraction,

@@ -16,11 +16,13 @@ namespace render {
 
 enum class sampling_method { pt, wfpg };
 enum class guiding { oriented, plain };
+enum class fields { kept, transient };
 enum class device { cpu, omp, seq };  ///< TBB, OpenMP, one thread
 
 struct render_options {
   sampling_method method = sampling_method::wfpg;
   guiding mode = guiding::oriented;
+  fields lifetime = fields::kept;
   device where = device::cpu;
   int spp = 64;          ///< samples a pixel, positive; not used where `seconds` is
   double seconds = 0.0;  ///< time for samples, building not counted; the last may use more; 0: spp decides
@@ -30,17 +32,30 @@ struct render_options {
   bool nee = true;    ///< next-event estimation toward area lights, with MIS
   std::uint64_t seed = 0;
   std::uint32_t octree_resolution = 128;  ///< voxels a side, a power of two
-  std::uint32_t field_resolution = 32;    ///< cells a side at the first vertex
+  std::uint32_t field_resolution = 32;    ///< cells a side of transient fields at the first vertex
+  std::uint32_t slot_resolution = 24;     ///< cells a side of kept fields
+  std::uint32_t recast = 8;               ///< a refresh casts one cone in so many again
+  std::size_t field_budget = std::size_t(16) << 20;  ///< bytes of kept fields
   std::uint32_t rays_per_bin = 64;        ///< c_ray
   std::uint32_t min_bin_level = 3;        ///< l_min, from the root
   float guide_fraction = 0.0f;            ///< in [0, 1]; 0: the mode's own
   wfpg::sample_combination combine = wfpg::sample_combination::pt_first;
 };
 
-/// Bins of one depth, means over the samples that were guided.
+/// Bins of one depth, means over the samples that were guided; of kept fields, those made or refreshed.
 struct bin_report {
   double count = 0.0;
   double mean_rays = 0.0;
+};
+
+/// Kept fields.
+struct slot_report {
+  std::uint32_t capacity = 0;  ///< that the budget holds; 0: fields are transient
+  std::uint32_t live = 0;      ///< at the end
+  std::size_t live_bytes = 0;
+  double born = 0.0;       ///< a guided sample
+  double freed = 0.0;      ///< a guided sample
+  double refreshed = 0.0;  ///< a guided sample
 };
 
 struct octree_report {
@@ -61,6 +76,7 @@ struct render_report {
   std::size_t transient_bytes = 0;
   octree_report octree;
   std::vector<bin_report> bins;  ///< by depth
+  slot_report slots;
   double cones_per_segment = 0.0;
 };
 

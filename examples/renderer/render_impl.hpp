@@ -69,7 +69,11 @@ void take_samples(path_tracer<Exec, embree_caster>& tracer, Guider& guider, cons
 inline wfpg::guider_options guider_options_of(const render_options& options) {
   wfpg::guider_options guided;
   guided.octree_resolution = options.octree_resolution;
+  guided.fields = options.lifetime == fields::kept ? wfpg::field_lifetime::kept : wfpg::field_lifetime::transient;
   guided.field_resolution = options.field_resolution;
+  guided.kept.resolution = options.slot_resolution;
+  guided.kept.recast = options.recast;
+  guided.kept.budget_bytes = options.field_budget;
   guided.rays_per_bin = options.rays_per_bin;
   guided.min_bin_level = options.min_bin_level;
   guided.mode = options.mode == guiding::plain ? wfpg::guiding_mode::plain : wfpg::guiding_mode::oriented;

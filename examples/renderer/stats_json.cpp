@@ -33,6 +33,15 @@ json octree_of(const octree_report& octree) {
           {"build_seconds", octree.build_seconds}};
 }
 
+json slots_of(const slot_report& slots) {
+  return {{"capacity", slots.capacity},
+          {"live", slots.live},
+          {"live_bytes", slots.live_bytes},
+          {"born_per_sample", slots.born},
+          {"freed_per_sample", slots.freed},
+          {"refreshed_per_sample", slots.refreshed}};
+}
+
 json error_of(const image_error& error) {
   return {{"mse", error.mse},
           {"relmse", error.relmse},
@@ -52,6 +61,7 @@ void write_stats(const std::string& path, const render_report& report,
   stats["bins"] = json::array();
   for (const bin_report& depth : report.bins)
     stats["bins"].push_back({{"count", depth.count}, {"mean_rays", depth.mean_rays}});
+  if (report.slots.capacity > 0) stats["slots"] = slots_of(report.slots);
   stats["cones_per_segment"] = report.cones_per_segment;
   if (error) stats["error"] = error_of(*error);
 

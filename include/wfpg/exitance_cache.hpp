@@ -47,18 +47,20 @@ class exitance_cache_view {
     return leaf_counts_[slot] ? static_cast<float>(leaf_means_[slot]) : -1.0f;
   }
 
-  /// Outgoing radiance of the side that faces `toward`, of the node or else of its first ancestor with data
-  /// for that side; 0 where none has. No cosine: radiance is stored as independent of the view.
-  WFPG_HD float read(node_id node, vec3 toward) const {
-    while (node != invalid_node) {
-      const vec3 n = normal(node);
-      const bool front = glm::dot(n, toward) >= 0.0f;
-      const float value = radiance(node, front ? 0u : 1u);
-      if (value >= 0.0f) return value;
-      toward = front ? n : -n;  // an ancestor's N may be this node's -N
-      node = tree_.parent(node);
+  /// Outgoing radiance of a node's side, or else of the same side of its first ancestor with data; 0 where
+  /// none has. No cosine: radiance is stored as independent of the view. Precondition: a node of the octree.
+  WFPG_HD float read(node_id node, std::uint32_t side) const {
+    float value = radiance(node, side);
+    for (node_id up = tree_.parent(node); value < 0.0f && up != invalid_node; up = tree_.parent(up)) {
+      side = side_facing(up, side == 0 ? normal(node) : -normal(node));  // an ancestor's N may be this -N
+      node = up;
+      value = radiance(node, side);
     }
-    return 0.0f;
+    return detail::max(value, 0.0f);
+  }
+  /// The same of the side that faces `toward`; 0 of invalid_node.
+  WFPG_HD float read(node_id node, vec3 toward) const {
+    return node == invalid_node ? 0.0f : read(node, side_facing(node, toward));
   }
 
   /// Queues the radiance that leaves `position` toward `direction` (unit length). Any number of threads at

@@ -1,6 +1,6 @@
-// Fields made resident for one depth of a wave, as the renderer's own kernels see them: for renderers whose
-// BSDFs exist only inside their material kernels. Made by path_guider::prepare; the fused form draws the same
-// directions from the same random numbers.
+// The fields of one depth of a wave, as the renderer's own kernels see them: for renderers whose BSDFs exist
+// only inside their material kernels. Made by path_guider::prepare, from kept fields or from transient ones
+// that were made resident; the fused form draws the same directions from the same random numbers.
 #pragma once
 
 #include <wfpg/mis.hpp>
@@ -8,10 +8,10 @@
 
 namespace wfpg {
 
-/// What a resident field is, beside its distribution.
+/// What a field in memory is, beside its distribution.
 struct resident_field {
   vec3 normal{0.0f};
-  float fraction = 0.0f;  ///< of guided samples in the mixture
+  float fraction = 0.0f;  ///< of guided samples in the mixture; 0: not there yet, and guides nothing
   bool hemisphere = false;
 };
 
@@ -27,7 +27,8 @@ class guide_view {
 
   /// Whether the ray has a field; without one it is its BSDF's.
   WFPG_HD bool guides(std::uint32_t ray) const {
-    return ray < field_of_ray_.size() && field_of_ray_[ray] != no_field;
+    return ray < field_of_ray_.size() && field_of_ray_[ray] != no_field &&
+           fields_[field_of_ray_[ray]].fraction > 0.0f;
   }
 
   /// The ray's mixture of field and BSDF; of a ray without field, the BSDF alone.

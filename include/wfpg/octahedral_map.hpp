@@ -55,6 +55,12 @@ WFPG_HD inline vec3 square_to_hemisphere(vec2 uv) {
   return detail::diamond_to_hemisphere({uv.x + uv.y - 1.0f, uv.x - uv.y});
 }
 
+/// The z of square_to_hemisphere, without its trigonometry.
+WFPG_HD inline float square_to_hemisphere_z(vec2 uv) {
+  const float r = detail::max(fabsf(2.0f * uv.x - 1.0f), fabsf(2.0f * uv.y - 1.0f));
+  return 1.0f - r * r;
+}
+
 /// The inverse of square_to_hemisphere, for unit directions with z >= 0.
 WFPG_HD inline vec2 hemisphere_to_square(vec3 d) {
   const vec2 p = detail::hemisphere_to_diamond(d);

@@ -14,6 +14,7 @@
 #include <wfpg/detail/serve_rays.hpp>
 #include <wfpg/exec/policy.hpp>
 #include <wfpg/exitance_cache.hpp>
+#include <wfpg/field_store.hpp>
 #include <wfpg/guide_view.hpp>
 #include <wfpg/path_recorder.hpp>
 #include <wfpg/radiance_field.hpp>
@@ -27,19 +28,29 @@
 
 namespace wfpg {
 
+/// How long fields live.
+enum class field_lifetime : std::uint8_t {
+  kept,      ///< in slots under a budget, across depths and samples, refreshed in part: wfpg's own
+  transient  ///< made anew for every bin, depth and sample: the paper's
+};
+
 /// What a guider can be told. Every field has a default; ranges are checked when a guider is made.
 struct guider_options {
   std::uint32_t octree_resolution =
       128;  ///< voxels along the scene's longest side; a power of two in [1, 4096]
   guiding_mode mode = guiding_mode::oriented;
+  field_lifetime fields = field_lifetime::kept;
+  kept_field_options kept;  ///< resolution, budget and refresh of kept fields
   std::uint32_t min_bin_level = 3;  ///< l_min: no bin is larger than a node of this level (root 0)
-  std::uint32_t rays_per_bin = 64;  ///< c_ray: rays that make a node a bin, at least 1
+  std::uint32_t rays_per_bin =
+      64;  ///< c_ray: rays that make a node a bin, at least 1; in a wave, or with kept fields in a sample
   std::uint32_t field_resolution =
-      32;  ///< cells along a field's side at depth 0, in [2, 128]; halves at each depth
+      32;  ///< cells along a transient field's side at depth 0, in [2, 128]; halves at each depth
   std::uint32_t min_field_resolution = 16;  ///< down to this, in [2, 128]
   field_options field;                      ///< filter and floor
   float guide_fraction =
-      0.0f;  ///< share of guided samples, (0, 1]; 0: 0.5 in plain mode, 0.7 in oriented bins of c_ray rays
+      0.0f;  ///< share of guided samples, (0, 1]; 0: 0.5 in plain mode, 0.7 in oriented mode; 0.5 in transient
+             ///< oriented bins of less than c_ray rays
   bool include_emission =
       true;  ///< guide toward emitters themselves; false where next-event estimation finds them
   std::uint32_t unguided_samples =
@@ -81,14 +92,26 @@ class path_guider {
   void sample_directions(const wave<Surfaces, Random>& w, const Caster& caster,
                          array_view<sampled_direction> directions, const Queries& queries = {});
 
-  /// The same in two steps: makes the wave's fields resident and returns what the renderer's kernels sample
-  /// from. `w.random` is not read. Holds until the next call. Memory: 4 (F² + F) bytes a bin of
-  /// the wave with most bins, and half more.
+  /// The same in two steps: what the renderer's kernels sample from. `w.random` is not read. Holds until the
+  /// next call. Kept fields are only refreshed for it. Transient ones are made resident, in 4 (F² + F) bytes a
+  /// bin of the wave with most bins, and half more.
   template <class Surfaces, class Random, class Caster>
   guide_view prepare(const wave<Surfaces, Random>& w, const Caster& caster);
 
   /// Deposits what was recorded and updates the cache.
   void end_sample();
+
+  /// Geometry moved inside `bounds` (world space, old and new place): kept fields that may see it are cast anew
+  /// when they are next used. Until the octree is built anew the cache knows the old geometry only.
+  void invalidate(const bounds3& bounds) {
+    if (keeps_fields()) store_.invalidate(exec_, bounds);
+  }
+  /// The same of all fields.
+  void invalidate_all() {
+    if (keeps_fields()) store_.invalidate_all(exec_);
+  }
+  /// Forgets all cached light: for lights that moved. Kept fields follow without being cast anew.
+  void forget_light() { cache_.clear(exec_); }
 
   /// Where the renderer's kernels record their paths.
   path_recorder_view recorder() const { return recorder_.view(); }
@@ -108,10 +131,19 @@ class path_guider {
   static const guider_options& checked(const guider_options& options);
   static guider_options with_capacities(guider_options options);
 
+  bool keeps_fields() const { return options_.fields == field_lifetime::kept; }
+  template <class Surfaces, class Random, class Caster>
+  guide_view keep_wave(const wave<Surfaces, Random>& w, const Caster& caster);
+  template <class Surfaces, class Random, class Caster>
+  guide_view make_resident(const wave<Surfaces, Random>& w, const Caster& caster);
+  template <class Surfaces, class Random, class Caster, class Serve>
+  void serve_transient(const wave<Surfaces, Random>& w, const Caster& caster, const Serve& serve);
   template <class Surfaces, class Random>
   detail::bin_fields<Surfaces> bin_wave(const wave<Surfaces, Random>& w);
   detail::mixture_fraction fraction() const;
-  void count_bins(std::uint32_t depth, const bins_view& bins);
+  depth_statistics* depth_counts(std::uint32_t depth) {
+    return counts_.data() + detail::min(depth, options_.max_depth - 1);
+  }
   /// New memory, whose old content is lost.
   template <class T>
   void reallocate(buffer<T, Exec>& memory, std::size_t size) {
@@ -130,11 +162,12 @@ class path_guider {
   std::unique_ptr<retaining_resource> working_memory_;  // of everything below
   Exec exec_;                                           // allocates there
   path_recorder<Exec> recorder_;
-  spatial_binner<Exec> binner_;
-  buffer<depth_statistics, Exec> counts_;
+  field_store<Exec> store_;      // of kept fields
+  spatial_binner<Exec> binner_;  // of transient ones, and what follows
   buffer<std::uint32_t, Exec> resident_words_;
   buffer<resident_field, Exec> resident_fields_;
   buffer<std::uint32_t, Exec> field_of_ray_;
+  buffer<depth_statistics, Exec> counts_;
   std::uint32_t samples_ = 0;
 };
 

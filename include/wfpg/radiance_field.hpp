@@ -37,6 +37,32 @@ struct field_origin {
 
 namespace detail {
 
+/// What a cone found, in 4 bytes: a side of a node, or radiance of the environment. One that landed outside
+/// every voxel found darkness.
+class cone_hit {
+ public:
+  cone_hit() = default;
+  /// Precondition: node < 2³⁰, side is 0 or 1.
+  WFPG_HD static cone_hit surface(node_id node, std::uint32_t side) { return cone_hit(2 * node + side); }
+  /// What is not finite or negative is darkness.
+  WFPG_HD static cone_hit environment(float radiance) {
+    return is_finite(radiance) && radiance > 0.0f ? cone_hit(escaped | float_bits(radiance)) : cone_hit();
+  }
+
+  /// What the cone sees in the cache as it is now; finite, at most 1e30.
+  WFPG_HD float radiance(const exitance_cache_view& cache) const {
+    const float value = word_ & escaped ? bits_float(word_ & ~escaped) : cache.read(word_ / 2, word_ % 2);
+    return is_finite(value) ? min(value, 1.0e30f) : 0.0f;
+  }
+
+ private:
+  static constexpr std::uint32_t escaped = 0x80000000u;  // the sign, which radiance does not need
+
+  WFPG_HD explicit cone_hit(std::uint32_t word) : word_(word) {}
+
+  std::uint32_t word_ = escaped;
+};
+
 /// One field's cells: which direction they look, what they see.
 struct field_cells {
   field_origin origin;
@@ -57,19 +83,26 @@ struct field_cells {
     return result;
   }
 
-  WFPG_HD float value(const exitance_cache_view& cache, const ray& cone, const ray_hit& hit) const {
-    const float radiance = hit.is_hit() ? read(cache, cone, hit.distance) : hit.radiance;
-    const float cosine = origin.cosine ? max(glm::dot(cone.direction, origin.normal), 0.0f) : 1.0f;
-    const float value = radiance * cosine;
-    return is_finite(value) ? clamp(value, 0.0f, 1.0e30f) : 0.0f;
+  /// What a cone found: the node of its footprint's size where it landed.
+  WFPG_HD cone_hit find(const exitance_cache_view& cache, const ray& cone, const ray_hit& hit) const {
+    if (!hit.is_hit()) return cone_hit::environment(hit.radiance);
+    const sparse_voxel_octree_view& tree = cache.octree();
+    const node_id leaf = tree.nearest_leaf(cone.origin + hit.distance * cone.direction);
+    if (leaf == invalid_node) return {};
+    const node_id node = tree.node_for_cone(leaf, hit.distance, domain.cell_solid_angle());
+    return cone_hit::surface(node, cache.side_facing(node, -cone.direction));
   }
 
- private:
-  WFPG_HD float read(const exitance_cache_view& cache, const ray& cone, float distance) const {
-    const node_id leaf = cache.octree().nearest_leaf(cone.origin + distance * cone.direction);
-    if (leaf == invalid_node) return 0.0f;
-    const float solid_angle = domain.cell_solid_angle();
-    return cache.read(cache.octree().node_for_cone(leaf, distance, solid_angle), -cone.direction);
+  /// The cosine at a cell's centre; 1 where cells carry none. Precondition: cosine only over a hemisphere.
+  WFPG_HD float central_cosine(std::uint32_t cell) const {
+    if (!origin.cosine) return 1.0f;
+    const vec2 corner(static_cast<float>(cell % resolution), static_cast<float>(cell / resolution));
+    return square_to_hemisphere_z((corner + 0.5f) / static_cast<float>(resolution));
+  }
+
+  /// A cell's value from the radiance that it saw and the direction in which it saw that.
+  WFPG_HD float weigh(float radiance, vec3 direction) const {
+    return origin.cosine ? radiance * max(glm::dot(direction, origin.normal), 0.0f) : radiance;
   }
 };
 
@@ -144,6 +177,21 @@ WFPG_HD grid_distribution finish_field(const Block& block, const cell_words& cel
   return build_distribution(block, cells, resolution, floor);
 }
 
+/// A surface's shading normal on the outgoing side.
+template <class Bsdf>
+WFPG_HD vec3 facing_normal(const surface<Bsdf>& s) {
+  return glm::dot(s.normal, s.outgoing) >= 0.0f ? s.normal : -s.normal;
+}
+
+/// Where cones from a surface start: off it, on the outgoing side.
+template <class Bsdf>
+WFPG_HD vec3 off_surface(const surface<Bsdf>& s, const sparse_voxel_octree_view& tree) {
+  const vec3 off =
+      glm::dot(s.geometric_normal, s.outgoing) >= 0.0f ? s.geometric_normal : -s.geometric_normal;
+  const float magnitude = max(fabsf(s.position.x), max(fabsf(s.position.y), fabsf(s.position.z)));
+  return s.position + off * max(1.0e-4f * magnitude, 1.0e-3f * tree.grid().voxel_size());
+}
+
 /// The fields of a wave's bins: a functor of blocks that fills each bin's field and hands it to `sink`.
 ///   Surfaces  (std::uint32_t ray) -> surface<Bsdf>
 ///   Hits      (std::size_t bin, std::uint32_t cell, const ray&) -> ray_hit
@@ -159,27 +207,18 @@ struct bin_fields {
   std::uint32_t resolution;
   std::uint64_t seed;  // of the sample and depth
 
-  /// The bin's origin: one of its rays, drawn anew in each sample, off its surface on the outgoing side.
+  /// The bin's origin: one of its rays, drawn anew in each sample.
   WFPG_HD field_origin origin(std::size_t bin) const {
     const std::uint64_t bits = hash(seed, bins.key(bin));
     const std::uint64_t rank = (bits >> 32) * bins.size(bin) >> 32;
     const auto s = surfaces(bins.permutation[bins.begin(bin) + rank]);
-    const vec3 off =
-        glm::dot(s.geometric_normal, s.outgoing) >= 0.0f ? s.geometric_normal : -s.geometric_normal;
-    const float magnitude = max(fabsf(s.position.x), max(fabsf(s.position.y), fabsf(s.position.z)));
     field_origin result;
-    result.position =
-        s.position + off * max(1.0e-4f * magnitude, 1.0e-3f * cache.octree().grid().voxel_size());
+    result.position = off_surface(s, cache.octree());
     result.normal = facing_normal(s);
     result.hemisphere = mode == guiding_mode::oriented && bins.orientation(bin) < orientation_transmits;
     result.cosine = result.hemisphere;
     result.seed = hash(bits, 1);
     return result;
-  }
-
-  template <class S>
-  WFPG_HD static vec3 facing_normal(const S& s) {
-    return glm::dot(s.normal, s.outgoing) >= 0.0f ? s.normal : -s.normal;
   }
 
   template <class Block, class Hits, class Sink>
@@ -191,7 +230,7 @@ struct bin_fields {
     block.for_each(size * size, [&](int i) {
       const auto cell = static_cast<std::uint32_t>(i);
       const ray cone = cells.cone(cell);
-      words.set(i, cells.value(cache, cone, hits(bin, cell, cone)));
+      words.set(i, cells.weigh(cells.find(cache, cone, hits(bin, cell, cone)).radiance(cache), cone.direction));
     });
     block.sync();
     const bool hemisphere = cells.origin.hemisphere;

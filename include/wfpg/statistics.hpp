@@ -2,6 +2,7 @@
 #pragma once
 
 #include <wfpg/exitance_cache.hpp>
+#include <wfpg/field_store.hpp>
 #include <wfpg/voxelizer.hpp>
 
 #include <chrono>
@@ -13,9 +14,9 @@ namespace wfpg {
 
 /// Sums over the guided samples so far, of one depth.
 struct depth_statistics {
-  std::uint64_t bins = 0;
+  std::uint64_t bins = 0;      ///< whose fields were made; of kept fields, made or refreshed
   std::uint64_t rays = 0;      ///< in bins
-  std::uint64_t unbinned = 0;  ///< active rays outside every voxel, sampled by their BSDF alone
+  std::uint64_t unbinned = 0;  ///< active rays outside every voxel or without room for a field: their BSDF alone
   std::uint64_t cones = 0;
 };
 
@@ -29,6 +30,7 @@ struct guider_statistics {
   std::uint32_t samples = 0;         ///< begun
   std::uint32_t guided_samples = 0;  ///< of them, with fields
   std::vector<depth_statistics> depths;
+  kept_field_statistics kept;          ///< zero where fields are transient
   dropped_deposits deposits;           ///< that the cache dropped
   std::uint32_t dropped_vertices = 0;  ///< recorder calls with a path, depth or order out of range
   build_report build;
@@ -60,7 +62,7 @@ struct memory_report {
 namespace detail {
 
 /// The stages that a guider times.
-enum class stage : std::uint32_t { bin, fields, unbinned, record, cache, count };
+enum class stage : std::uint32_t { bin, fields, serve, record, cache, count };
 
 /// Accumulates the host's time by stage.
 class stage_clock {
@@ -81,7 +83,7 @@ class stage_clock {
   scope time(stage s) { return scope(*this, s); }
 
   std::vector<stage_time> report() const {
-    static constexpr const char* names[] = {"bin", "fields", "unbinned", "record", "cache"};
+    static constexpr const char* names[] = {"bin", "fields", "serve", "record", "cache"};
     std::vector<stage_time> result;
     for (int i = 0; i < static_cast<int>(stage::count); ++i) result.push_back({names[i], seconds_[i]});
     return result;

@@ -9,6 +9,7 @@
 #include <wfpg/exec/seq.hpp>
 #include <wfpg/exitance_cache.hpp>
 #include <wfpg/field_sampler.hpp>
+#include <wfpg/field_store.hpp>
 #include <wfpg/guide_view.hpp>
 #include <wfpg/mis.hpp>
 #include <wfpg/morton.hpp>

@@ -16,4 +16,62 @@ WFPG_HD inline std::uint32_t atomic_add(std::uint32_t* target, std::uint32_t val
 #endif
 }
 
+/// *target as it is at some moment.
+WFPG_HD inline std::uint32_t atomic_load(const std::uint32_t* target) {
+#if defined(__CUDA_ARCH__)
+  return *static_cast<const volatile std::uint32_t*>(target);
+#else
+  return __atomic_load_n(target, __ATOMIC_RELAXED);
+#endif
+}
+WFPG_HD inline std::uint64_t atomic_load(const std::uint64_t* target) {
+#if defined(__CUDA_ARCH__)
+  return *static_cast<const volatile std::uint64_t*>(target);
+#else
+  return __atomic_load_n(target, __ATOMIC_RELAXED);
+#endif
+}
+
+/// *target = value.
+WFPG_HD inline void atomic_store(std::uint32_t* target, std::uint32_t value) {
+#if defined(__CUDA_ARCH__)
+  *static_cast<volatile std::uint32_t*>(target) = value;
+#else
+  __atomic_store_n(target, value, __ATOMIC_RELAXED);
+#endif
+}
+
+/// *target = value where it was `expected`; returns the value before.
+WFPG_HD inline std::uint32_t atomic_compare_exchange(std::uint32_t* target, std::uint32_t expected,
+                                                     std::uint32_t value) {
+#if defined(__CUDA_ARCH__)
+  return atomicCAS(target, expected, value);
+#else
+  __atomic_compare_exchange_n(target, &expected, value, false, __ATOMIC_RELAXED, __ATOMIC_RELAXED);
+  return expected;
+#endif
+}
+
+/// *target = the lesser of itself and value.
+WFPG_HD inline void atomic_min(std::uint32_t* target, std::uint32_t value) {
+#if defined(__CUDA_ARCH__)
+  atomicMin(target, value);
+#else
+  std::uint32_t before = atomic_load(target);
+  while (value < before && !__atomic_compare_exchange_n(target, &before, value, true, __ATOMIC_RELAXED,
+                                                        __ATOMIC_RELAXED)) {
+  }
+#endif
+}
+WFPG_HD inline void atomic_min(std::uint64_t* target, std::uint64_t value) {
+#if defined(__CUDA_ARCH__)
+  atomicMin(reinterpret_cast<unsigned long long*>(target), static_cast<unsigned long long>(value));
+#else
+  std::uint64_t before = atomic_load(target);
+  while (value < before && !__atomic_compare_exchange_n(target, &before, value, true, __ATOMIC_RELAXED,
+                                                        __ATOMIC_RELAXED)) {
+  }
+#endif
+}
+
 }  // namespace wfpg::detail

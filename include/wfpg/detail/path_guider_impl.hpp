@@ -21,6 +21,20 @@ struct add_counts {
   }
 };
 
+/// The same of a wave whose fields are kept.
+struct add_kept_counts {
+  const field_store_state* wave;
+  std::uint32_t cells;
+  std::uint32_t refresh_cones;
+  depth_statistics* sums;
+  WFPG_HD void operator()(std::size_t) const {
+    sums->bins += wave->all + wave->part;
+    sums->rays += wave->served;
+    sums->unbinned += wave->unbinned + wave->unserved;
+    sums->cones += std::uint64_t(wave->all) * cells + std::uint64_t(wave->part) * refresh_cones;
+  }
+};
+
 }  // namespace detail
 
 template <class Exec>
@@ -64,8 +78,12 @@ path_guider<Exec>::path_guider(const Exec& exec, voxel_fragments<Exec> fragments
       working_memory_(std::make_unique<retaining_resource>(exec.resource())),
       exec_(exec.with_resource(working_memory_.get())),
       recorder_(exec_, options_.max_paths, options_.max_depth, options_.include_emission),
-      binner_(exec_, octree_.view(), {options_.min_bin_level, options_.rays_per_bin}, options_.max_rays),
       counts_(exec_, options_.max_depth) {
+  const binning_options binning{options_.min_bin_level, options_.rays_per_bin};
+  if (keeps_fields())
+    store_ = field_store<Exec>(exec_, octree_.view(), binning, options_.kept, options_.max_rays);
+  else
+    binner_ = spatial_binner<Exec>(exec_, octree_.view(), binning, options_.max_rays);
   octree_.release_build_data();
   ::thrust::fill_n(exec_.thrust(), counts_.data(), counts_.size(), depth_statistics{});
 }
@@ -74,6 +92,7 @@ template <class Exec>
 void path_guider<Exec>::begin_sample() {
   ++samples_;
   recorder_.clear(exec_);
+  if (keeps_fields()) store_.begin_sample(exec_, samples_);
 }
 
 template <class Exec>
@@ -84,6 +103,7 @@ void path_guider<Exec>::end_sample() {
   }
   const auto timed = clock_.time(detail::stage::cache);
   cache_.update(exec_);
+  if (keeps_fields()) store_.end_sample(exec_);
 }
 
 template <class Exec>
@@ -105,21 +125,15 @@ detail::bin_fields<Surfaces> path_guider<Exec>::bin_wave(const wave<Surfaces, Ra
   const auto timed = clock_.time(detail::stage::bin);
   const bins_view bins =
       binner_.bin(exec_, w.ray_count, detail::wave_rays<Surfaces>{w.surfaces, options_.mode});
-  count_bins(w.depth, bins);
+  const std::uint32_t size = field_resolution(w.depth);
+  exec_.for_each(1, detail::add_counts{bins, binner_.unbinned(), size * size, depth_counts(w.depth)});
   return {bins,
           w.surfaces,
           cache_.view(),
           options_.field,
           options_.mode,
-          field_resolution(w.depth),
+          size,
           wave_seed(w.depth)};
-}
-
-template <class Exec>
-void path_guider<Exec>::count_bins(std::uint32_t depth, const bins_view& bins) {
-  const std::uint32_t slot = detail::min(depth, options_.max_depth - 1);
-  const std::uint32_t size = field_resolution(depth);
-  exec_.for_each(1, detail::add_counts{bins, binner_.unbinned(), size * size, counts_.data() + slot});
 }
 
 template <class Exec>
@@ -140,20 +154,11 @@ void path_guider<Exec>::sample_directions(const wave<Surfaces, Random>& w, const
     detail::require(queries.densities.size() >= w.ray_count, "size of densities", queries.densities.size(),
                     "ray_count or more");
 
-  using serve_type = detail::serve_ray<Surfaces, Random, Queries>;
-  const serve_type serve{w.surfaces, w.random, queries, directions};
-  detail::serve_unbinned<serve_type> rest{serve, {}};
-  if (guided()) {
-    const auto fields = bin_wave(w);
-    rest.ray_keys = fields.bins.ray_keys;
-    const auto timed = clock_.time(detail::stage::fields);
-    const detail::transient_sink<serve_type> sink{fields.bins, serve, fraction(), fields.resolution};
-    detail::for_each_field(exec_, fields, caster, sink,
-                           4 * detail::distribution_words(fields.resolution) + 16,
-                           options_.caster_buffer_bytes);
-  }
-  const auto timed = clock_.time(detail::stage::unbinned);
-  exec_.for_each(w.ray_count, rest);
+  const detail::serve_ray<Surfaces, Random, Queries> serve{w.surfaces, w.random, queries, directions};
+  if (!keeps_fields()) return serve_transient(w, caster, serve);
+  const guide_view view = keep_wave(w, caster);
+  const auto timed = clock_.time(detail::stage::serve);
+  exec_.for_each(w.ray_count, detail::serve_view<decltype(serve)>{serve, view});
 }
 
 template <class Exec>
@@ -164,6 +169,50 @@ guide_view path_guider<Exec>::prepare(const wave<Surfaces, Random>& w, const Cas
   static_assert(is_ray_caster_v<Caster, Exec>,
                 "caster: needs ray_hit operator()(const ray&) const, or cast(exec, rays, hits) const");
   detail::require(w.ray_count <= options_.max_rays, "ray_count", w.ray_count, "at most max_rays");
+  return keeps_fields() ? keep_wave(w, caster) : make_resident(w, caster);
+}
+
+/// Kept fields: found, made and refreshed.
+template <class Exec>
+template <class Surfaces, class Random, class Caster>
+guide_view path_guider<Exec>::keep_wave(const wave<Surfaces, Random>& w, const Caster& caster) {
+  const auto timed = clock_.time(detail::stage::fields);
+  if (!guided()) {
+    store_.count(exec_, w.ray_count, detail::wave_rays<Surfaces>{w.surfaces, options_.mode});
+    return {};
+  }
+  const kept_field_wave<Surfaces> wave{w.ray_count,   w.surfaces,    cache_.view(),
+                                       options_.field, options_.mode, fraction().with_enough_rays,
+                                       wave_seed(w.depth)};
+  const guide_view view = store_.prepare(exec_, wave, caster, options_.caster_buffer_bytes);
+  exec_.for_each(1, detail::add_kept_counts{store_.state(), store_.resolution() * store_.resolution(),
+                                            store_.refresh_cones(), depth_counts(w.depth)});
+  return view;
+}
+
+/// Transient fields in scratch memory.
+template <class Exec>
+template <class Surfaces, class Random, class Caster, class Serve>
+void path_guider<Exec>::serve_transient(const wave<Surfaces, Random>& w, const Caster& caster,
+                                        const Serve& serve) {
+  detail::serve_unbinned<Serve> rest{serve, {}};
+  if (guided()) {
+    const auto fields = bin_wave(w);
+    rest.ray_keys = fields.bins.ray_keys;
+    const auto timed = clock_.time(detail::stage::fields);
+    const detail::transient_sink<Serve> sink{fields.bins, serve, fraction(), fields.resolution};
+    detail::for_each_field(exec_, fields, caster, sink,
+                           4 * detail::distribution_words(fields.resolution) + 16,
+                           options_.caster_buffer_bytes);
+  }
+  const auto timed = clock_.time(detail::stage::serve);
+  exec_.for_each(w.ray_count, rest);
+}
+
+/// Transient fields in memory of their own.
+template <class Exec>
+template <class Surfaces, class Random, class Caster>
+guide_view path_guider<Exec>::make_resident(const wave<Surfaces, Random>& w, const Caster& caster) {
   if (!guided()) return {};
   const auto fields = bin_wave(w);
   const auto timed = clock_.time(detail::stage::fields);
@@ -193,6 +242,7 @@ guider_statistics path_guider<Exec>::statistics() const {
                               : 0;
   result.depths = counts_.to_host(exec_);
   result.deposits = cache_.dropped(exec_);
+  if (keeps_fields()) result.kept = store_.statistics(exec_);
   result.dropped_vertices = recorder_.dropped(exec_);
   result.build = build_;
   result.seconds = clock_.report();
@@ -202,10 +252,13 @@ guider_statistics path_guider<Exec>::statistics() const {
 template <class Exec>
 memory_report path_guider<Exec>::memory() const {
   const std::size_t resident = resident_words_.bytes() + resident_fields_.bytes() + field_of_ray_.bytes();
-  const std::size_t binning = binner_.bytes() + counts_.bytes();
-  const std::size_t named = recorder_.bytes() + binning + resident;
+  const std::size_t binning = binner_.bytes() + store_.wave_bytes() + counts_.bytes();
+  const std::size_t named =
+      recorder_.bytes() + binning + resident + store_.slot_bytes() + store_.level_bytes();
   return {{{"octree", octree_.bytes(), true},
            {"cache", cache_.persistent_bytes(), true},
+           {"kept fields", store_.slot_bytes(), true},
+           {"levels", store_.level_bytes(), true},
            {"deposits", cache_.transient_bytes(), false},
            {"paths", recorder_.bytes(), false},
            {"binning", binning, false},

@@ -47,6 +47,17 @@ struct serve_ray {
   }
 };
 
+/// Rays whose fields are in memory.
+template <class Serve>
+struct serve_view {
+  Serve serve;
+  guide_view view;
+  WFPG_HD void operator()(std::size_t i) const {
+    const auto ray = static_cast<std::uint32_t>(i);
+    serve(ray, view.mixture(ray));
+  }
+};
+
 /// Rays without a bin: their BSDF alone.
 template <class Serve>
 struct serve_unbinned {
@@ -115,7 +126,7 @@ struct wave_rays {
     result.position = s.position;
     if (mode == guiding_mode::oriented)
       result.orientation = s.bsdf.transmits() ? static_cast<std::uint32_t>(orientation_transmits)
-                                              : dominant_axis(bin_fields<Surfaces>::facing_normal(s));
+                                              : dominant_axis(facing_normal(s));
     return result;
   }
 };

@@ -1,0 +1,110 @@
+// Which node of the octree a ray's kept field belongs to: Algorithm 2 of the paper over running counts. Rays
+// of all depths and samples are counted at their leaves; from time to time counts are summed upward, and each
+// leaf learns its deepest ancestor with enough rays a sample. Kept fields need bins that stay, and these do.
+//
+// Memory: 8 bytes a leaf, 4 an inner node. Count: O(1). Mark: O(nodes).
+#pragma once
+
+#include <wfpg/buffer.hpp>
+#include <wfpg/detail/atomic.hpp>
+#include <wfpg/detail/thrust.hpp>
+#include <wfpg/sparse_voxel_octree.hpp>
+#include <wfpg/spatial_binner.hpp>
+
+#include <thrust/fill.h>
+
+namespace wfpg::detail {
+
+/// What a kernel sees of the marks.
+struct bin_marks_view {
+  // Counts stop about here, so that 32 bits do not overflow; no threshold is higher.
+  static constexpr std::uint32_t most = 0x80000000u;
+
+  node_id first_leaf = 0;
+  std::uint32_t* counts = nullptr;  // a node: rays, of inner nodes as of the last marking
+  node_id* bins = nullptr;          // a leaf: its deepest marked ancestor or itself
+
+  WFPG_HD node_id bin(node_id leaf) const { return bins[leaf - first_leaf]; }
+  WFPG_HD void count(node_id leaf) const {
+    if (atomic_load(counts + leaf) < most) atomic_add(counts + leaf, 1);
+  }
+};
+
+struct sum_counts {
+  sparse_voxel_octree_view tree;
+  node_id level_begin;
+  std::uint32_t* counts;
+  WFPG_HD void operator()(std::size_t i) const {
+    const node_id node = level_begin + static_cast<node_id>(i);
+    const node_id first = tree.first_child(node);
+    std::uint64_t sum = 0;
+    for (std::uint32_t c = 0; c < tree.child_count(node); ++c) sum += counts[first + c];
+    counts[node] = static_cast<std::uint32_t>(min<std::uint64_t>(sum, 0xffffffffull));
+  }
+};
+
+/// How many rays mark a node: c_ray a sample, or as many more as it takes for the marked nodes' fields to fit
+/// the room that there is.
+struct mark_threshold {
+  std::uint32_t rays_per_bin;
+  std::uint32_t samples;
+  std::uint64_t room;             // bins
+  const std::uint32_t* pressure;  // bins of average size that the room is asked for, on the device
+
+  WFPG_HD std::uint64_t operator()(std::uint32_t rays) const {
+    const std::uint64_t wanted = std::uint64_t(rays_per_bin) * samples;
+    const std::uint64_t affordable = room > 0 ? std::uint64_t(rays) * *pressure / room : wanted;
+    return min<std::uint64_t>(max(wanted, affordable), bin_marks_view::most);
+  }
+};
+
+struct mark_leaves {
+  sparse_voxel_octree_view tree;
+  bin_marks_view marks;
+  std::uint32_t min_level;
+  mark_threshold threshold;
+  WFPG_HD void operator()(std::size_t i) const {
+    const std::uint64_t enough = threshold(marks.counts[0]);
+    const node_id least_end = tree.level_begin(min_level + 1);
+    node_id node = marks.first_leaf + static_cast<node_id>(i);
+    while (marks.counts[node] < enough && node >= least_end) node = tree.parent(node);
+    marks.bins[i] = node;
+  }
+};
+
+/// Owns the counts and marks of an octree. Before the first marking every leaf's bin is its ancestor of the
+/// least level.
+template <class Exec>
+class bin_marks {
+ public:
+  bin_marks() = default;
+  bin_marks(const Exec& exec, const sparse_voxel_octree_view& tree, const binning_options& options)
+      : tree_(tree), options_(options), counts_(exec, tree.node_count()), bins_(exec, tree.leaf_count()) {
+    options_.min_level = min(options_.min_level, tree.depth());
+    ::thrust::fill_n(exec.thrust(), counts_.data(), counts_.size(), 0u);
+    mark_bins(exec, {1, 1, 0, nullptr});
+  }
+
+  bin_marks_view view() const { return {tree_.first_leaf(), counts_.data(), bins_.data()}; }
+  std::size_t bytes() const { return counts_.bytes() + bins_.bytes(); }
+
+  /// Marks anew after `samples` samples. `room`: bins that can have fields; `pressure`: on the device.
+  void mark(const Exec& exec, std::uint32_t samples, std::size_t room, const std::uint32_t* pressure) {
+    for (std::uint32_t level = tree_.depth(); level-- > 0;)
+      exec.for_each(tree_.level_begin(level + 1) - tree_.level_begin(level),
+                    sum_counts{tree_, tree_.level_begin(level), counts_.data()});
+    mark_bins(exec, {options_.rays_per_bin, samples, room, pressure});
+  }
+
+ private:
+  void mark_bins(const Exec& exec, const mark_threshold& threshold) {
+    exec.for_each(bins_.size(), mark_leaves{tree_, view(), options_.min_level, threshold});
+  }
+
+  sparse_voxel_octree_view tree_;
+  binning_options options_;
+  buffer<std::uint32_t, Exec> counts_;
+  buffer<node_id, Exec> bins_;
+};
+
+}  // namespace wfpg::detail

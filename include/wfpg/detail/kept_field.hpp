@@ -1,0 +1,152 @@
+// One kept field: which of its cells are cast, what they find, how it becomes a distribution.
+#pragma once
+
+#include <wfpg/detail/field_slots.hpp>
+#include <wfpg/guide_view.hpp>
+#include <wfpg/radiance_field.hpp>
+
+namespace wfpg::detail {
+
+/// Cones of a refresh that casts one cell in `recast`.
+WFPG_HD constexpr std::uint32_t refresh_cones(std::uint32_t resolution, std::uint32_t recast) {
+  return (resolution * resolution + recast - 1) / recast;
+}
+
+/// The cell of a refresh's cone: one in each run of `recast` cells, another each time, and shifted from run to
+/// run by the golden ratio so that rows are covered evenly. After `recast` refreshes every cell has been cast.
+WFPG_HD constexpr std::uint32_t refreshed_cell(std::uint32_t cone, std::uint32_t refresh,
+                                               std::uint32_t resolution, std::uint32_t recast) {
+  const std::uint32_t begin = cone * recast;
+  const std::uint32_t length = min(recast, resolution * resolution - begin);
+  const std::uint32_t shift = (5 * recast + 4) / 8;
+  return begin + (refresh + shift * (cone % recast)) % length;
+}
+
+/// Where the slots' fields are.
+struct kept_fields_view {
+  array_view<field_slot> slots;
+  resident_field* fields;
+  std::uint32_t* words;
+  cone_hit* hits;
+  std::uint32_t resolution;
+  std::uint32_t recast;
+  std::uint32_t sample;
+};
+
+/// Builds fields for a wave's rays.
+template <class Wave>
+struct kept_field_builder {
+  Wave wave;
+  kept_fields_view kept;
+
+  WFPG_HD std::uint32_t cone_count(bool whole) const {
+    return whole ? kept.resolution * kept.resolution : refresh_cones(kept.resolution, kept.recast);
+  }
+  WFPG_HD std::uint32_t cell(std::uint32_t slot, bool whole, std::uint32_t cone) const {
+    return whole ? cone : refreshed_cell(cone, kept.slots[slot].builds, kept.resolution, kept.recast);
+  }
+
+  /// Cones start from the ray that was picked; a field's frame is that of the ray that it was first cast for.
+  WFPG_HD field_cells cells(std::uint32_t slot, bool whole) const {
+    const field_slot& state = kept.slots[slot];
+    const auto s = wave.surfaces(static_cast<std::uint32_t>(state.origin));
+    field_origin origin;
+    origin.position = off_surface(s, wave.cache.octree());
+    origin.hemisphere =
+        wave.mode == guiding_mode::oriented && state.key % orientations < orientation_transmits;
+    origin.cosine = origin.hemisphere;
+    origin.normal = whole ? facing_normal(s) : kept.fields[slot].normal;
+    origin.seed = hash(wave.seed, state.key);
+    return {origin, kept.resolution};
+  }
+
+  /// Reads every cell through its hit, and makes the distribution.
+  template <class Block>
+  WFPG_HD void finish(Block& block, std::uint32_t slot, const field_cells& cells) const {
+    const auto size = static_cast<int>(kept.resolution);
+    const cone_hit* const hits = kept.hits + std::size_t(slot) * kept.resolution * kept.resolution;
+    const cell_words words{kept.words + slot * distribution_words(kept.resolution)};
+    float* const scratch = block.template scratch<float>(std::size_t(size) * std::size_t(size));
+    block.for_each(size * size, [&](int cell) {
+      const float radiance = hits[cell].radiance(wave.cache);
+      words.set(cell, radiance * cells.central_cosine(static_cast<std::uint32_t>(cell)));
+    });
+    block.sync();
+    const bool hemisphere = cells.origin.hemisphere;
+    finish_field(block, words, scratch, size, hemisphere, wave.options);
+    block.for_each(1, [&](int) {
+      kept.fields[slot] = {cells.origin.normal, wave.fraction, hemisphere};
+      field_slot& state = kept.slots[slot];
+      state.last_built = kept.sample;
+      ++state.builds;
+      state.origin = field_slot::unpicked;
+    });
+  }
+};
+
+/// Casts a part of the listed slots' cones, or all, and finishes their fields.
+template <class Builder, class Hits>
+struct build_kept_fields {
+  Builder builder;
+  Hits hits;
+  const std::uint32_t* list;
+  bool whole;
+
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t i) const {
+    const std::uint32_t slot = list[i];
+    const field_cells cells = builder.cells(slot, whole);
+    const std::uint32_t n = builder.kept.resolution * builder.kept.resolution;
+    cone_hit* const kept = builder.kept.hits + std::size_t(slot) * n;
+    block.for_each(static_cast<int>(builder.cone_count(whole)), [&](int c) {
+      const auto cone = static_cast<std::uint32_t>(c);
+      const std::uint32_t cell = builder.cell(slot, whole, cone);
+      const ray r = cells.cone(cell);
+      kept[cell] = cells.find(builder.wave.cache, r, hits(i, cone, r));
+    });
+    block.sync();
+    builder.finish(block, slot, cells);
+  }
+};
+
+/// The cones of listed slots, for a batch caster.
+template <class Builder>
+struct write_kept_cones {
+  Builder builder;
+  array_view<ray> cones;
+  const std::uint32_t* list;
+  bool whole;
+
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t i) const {
+    const field_cells cells = builder.cells(list[i], whole);
+    const std::uint32_t n = builder.cone_count(whole);
+    block.for_each(static_cast<int>(n), [&](int c) {
+      const auto cone = static_cast<std::uint32_t>(c);
+      cones[i * n + cone] = cells.cone(builder.cell(list[i], whole, cone));
+    });
+  }
+};
+
+/// Marks fields to be cast anew from which `bounds` may be seen: those whose node is inside, and those with a
+/// part of the bounding sphere above their horizon, from anywhere in their node.
+struct invalidate_fields {
+  array_view<field_slot> slots;
+  const resident_field* fields;
+  sparse_voxel_octree_view tree;
+  bounds3 bounds;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    if (slots[i].key != no_key && may_see(slots[i].key / orientations, fields[i])) slots[i].builds = 0;
+  }
+
+ private:
+  WFPG_HD bool may_see(node_id node, const resident_field& field) const {
+    if (!field.hemisphere) return true;
+    const bounds3 box = tree.bounds(node);
+    const float reach = 0.5f * (glm::length(bounds.extent()) + glm::length(box.extent()));
+    return glm::dot(bounds.centre() - box.centre(), field.normal) >= -reach;
+  }
+};
+
+}  // namespace wfpg::detail

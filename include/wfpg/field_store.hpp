@@ -1,0 +1,153 @@
+// Kept fields: incident radiance fields that live on across depths and samples, in slots under a byte budget,
+// keyed by (octree node, orientation). A slot remembers what each cell's cone hit; a refresh reads the cache
+// anew through those hits and casts only a part of the cones again. Fields are the paper's (section 3.3), and
+// their nodes are chosen as its bins are (Algorithm 2); that they are kept is wfpg's own.
+//
+// A sample:  begin_sample, then for each wave prepare, then end_sample. Nothing is read back to the host with
+// an inline caster.
+//
+// Cost of a wave of n rays: O(n · depth) look-ups; F² cones a new slot, F²/R a refreshed one; O(F²) either;
+// scans over the slots. Memory: the budget, 8 bytes a ray, 8 bytes a leaf and 4 an inner node.
+#pragma once
+
+#include <wfpg/detail/bin_marks.hpp>
+#include <wfpg/detail/field_slots.hpp>
+#include <wfpg/detail/kept_field.hpp>
+#include <wfpg/detail/serve_rays.hpp>
+#include <wfpg/guide_view.hpp>
+#include <wfpg/radiance_field.hpp>
+
+#include <thrust/fill.h>
+#include <thrust/iterator/counting_iterator.h>
+#include <thrust/transform_scan.h>
+
+namespace wfpg {
+
+/// How fields are kept.
+struct kept_field_options {
+  std::uint32_t resolution = 24;                     ///< cells along a field's side, in [2, 128]
+  std::uint32_t recast = 8;                          ///< R: a refresh casts one cone in so many again, at least 1
+  std::size_t budget_bytes = std::size_t(16) << 20;  ///< of the slots; one takes about 8 F² + 4 F bytes
+  std::uint64_t max_wave_cones = ~0ull;  ///< cones of a wave; what would need more waits, or goes unguided
+  std::uint32_t idle_samples = 16;       ///< a slot that no ray used for so many is freed, at least 1
+};
+
+/// What a field store tells of itself, since it was made.
+struct kept_field_statistics {
+  std::uint32_t capacity = 0;       ///< slots that the budget holds
+  std::uint32_t live = 0;           ///< slots in use
+  std::size_t bytes_a_slot = 0;     ///< of the budget
+  std::uint64_t born = 0;           ///< slots taken
+  std::uint64_t freed = 0;          ///< slots given back
+  std::uint64_t refreshed = 0;      ///< builds that cast a part of a field's cones
+  std::uint32_t refused = 0;        ///< births refused in the last sample, for want of a free slot
+};
+
+/// What fields are made for in one wave.
+///   Surfaces  (std::uint32_t ray) -> surface<Bsdf>
+template <class Surfaces>
+struct kept_field_wave {
+  std::size_t ray_count = 0;
+  Surfaces surfaces;
+  exitance_cache_view cache;
+  field_options options;
+  guiding_mode mode = guiding_mode::oriented;
+  float fraction = 0.7f;   ///< of guided samples in the mixture
+  std::uint64_t seed = 0;  ///< of the sample and depth
+};
+
+/// Owns the slots, in the memory of `Exec`. The octree must outlive it. Results do not depend on the number
+/// of threads.
+template <class Exec>
+class field_store {
+ public:
+  field_store() = default;
+  /// Serves waves of up to `max_rays` rays. Throws out_of_memory; std::invalid_argument where an option is
+  /// out of its range, or the octree has 2²⁹ nodes or more.
+  field_store(const Exec& exec, const sparse_voxel_octree_view& tree, const binning_options& binning,
+              const kept_field_options& options, std::size_t max_rays);
+
+  /// Begins a sample, counted from 1: frees slots that are no longer used.
+  void begin_sample(const Exec& exec, std::uint32_t sample);
+
+  /// Counts a wave's rays and guides none. `Rays`: (std::size_t) -> ray_to_bin.
+  template <class Rays>
+  void count(const Exec& exec, std::size_t n, const Rays& rays) {
+    exec.for_each(n, detail::count_rays<Rays>{rays, tree_, marks_.view()});
+  }
+
+  /// Finds or makes the fields of a wave's rays, and refreshes those that are due; what kernels sample from,
+  /// until the next call. A ray without room for its field has its nearest ancestor's, or none. A batch caster
+  /// gets at most `caster_buffer_bytes` of cones at once, and the host reads how many fields are built. Throws
+  /// std::invalid_argument beyond max_rays; what a caster throws, and then the wave's fields are built again.
+  template <class Surfaces, class Caster>
+  guide_view prepare(const Exec& exec, const kept_field_wave<Surfaces>& wave, const Caster& caster,
+                     std::size_t caster_buffer_bytes);
+
+  /// Ends the sample; after samples 1, 2, 4, 8, ... chooses the nodes anew by the rays counted so far.
+  void end_sample(const Exec& exec);
+
+  /// Geometry moved inside `bounds`, or light in a way that hits do not tell: fields from which they may be
+  /// seen are cast anew when they are next used. Light that changes on surfaces needs no call.
+  void invalidate(const Exec& exec, const bounds3& bounds) {
+    exec.for_each(capacity_, detail::invalidate_fields{slots_.view(), fields_.data(), tree_, bounds});
+  }
+  void invalidate_all(const Exec& exec) { invalidate(exec, {vec3(-1.0e18f), vec3(1.0e18f)}); }
+
+  /// Counts of the last wave and of all, on the device.
+  const detail::field_store_state* state() const { return state_.data(); }
+  std::uint32_t resolution() const { return options_.resolution; }
+  /// Cones of a refresh.
+  std::uint32_t refresh_cones() const { return detail::refresh_cones(options_.resolution, options_.recast); }
+  /// Waits for the work before it.
+  kept_field_statistics statistics(const Exec& exec) const;
+  /// Of the slots and all that finds them.
+  std::size_t slot_bytes() const;
+  /// Of what decides the level: running counts and bins.
+  std::size_t level_bytes() const { return marks_.bytes(); }
+  /// Of a wave in flight.
+  std::size_t wave_bytes() const { return field_of_ray_.bytes() + missing_keys_.bytes() + state_.bytes(); }
+
+  /// Bytes of the budget that one slot takes at a resolution.
+  static std::size_t bytes_a_slot(std::uint32_t resolution) {
+    const std::size_t cells = std::size_t(resolution) * resolution;
+    return sizeof(detail::cone_hit) * cells + 4 * detail::distribution_words(resolution) +
+           sizeof(detail::field_slot) + sizeof(resident_field) + words_a_slot * sizeof(std::uint32_t);
+  }
+
+ private:
+  // Through-counts (2), list of builds (2), free list, and at most 4 entries each of the table and of wanted
+  // keys with their own through-counts.
+  static constexpr std::size_t words_a_slot = 2 + 2 + 1 + 4 + 4 + 4;
+
+  static const kept_field_options& checked(const kept_field_options& options, std::uint32_t nodes);
+  detail::field_slots_view view() const { return {slots_.view(), table_.data(), mask()}; }
+  detail::wanted_keys wanted() const { return {wanted_.data(), mask()}; }
+  std::uint32_t mask() const { return static_cast<std::uint32_t>(table_.size() - 1); }
+
+  template <class Surfaces>
+  void find(const Exec& exec, const kept_field_wave<Surfaces>& wave);
+  void bear(const Exec& exec);
+  void list(const Exec& exec, std::uint64_t seed);
+  template <class Builder, class Caster>
+  void build(const Exec& exec, const Builder& builder, const Caster& caster, std::size_t buffer_bytes);
+
+  sparse_voxel_octree_view tree_;
+  kept_field_options options_;
+  std::size_t capacity_ = 0;  // slots
+  std::uint32_t sample_ = 0;
+  detail::bin_marks<Exec> marks_;
+  buffer<detail::field_slot, Exec> slots_;
+  buffer<resident_field, Exec> fields_;            // a slot
+  buffer<std::uint32_t, Exec> words_;              // a slot: its distribution
+  buffer<detail::cone_hit, Exec> hits_;            // a slot: its cells
+  buffer<std::uint32_t, Exec> table_, wanted_, wanted_through_;
+  buffer<std::uint32_t, Exec> free_slots_, list_;  // list: to cast whole, then to refresh
+  buffer<std::uint64_t, Exec> through_;            // a slot: scans
+  buffer<std::uint32_t, Exec> field_of_ray_, missing_keys_;
+  buffer<detail::field_store_state, Exec> state_;
+};
+
+}  // namespace wfpg
+
+#include <wfpg/detail/field_store_impl.hpp>
