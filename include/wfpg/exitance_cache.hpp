@@ -1,9 +1,10 @@
 // What light leaves each node of the octree: mean outgoing radiance (exitance / pi, luminance, W/(m² sr)) for
 // either side of a voxel (paper, section 3.2). Two normals a voxel by k-means; deposits through a queue that
-// update() sorts and folds into running means, so that any order of arrival gives the same bits; averages
-// bottom-up.
+// update() sums exactly and folds into running means, so that any order of arrival gives the same bits;
+// averages bottom-up.
 //
-// Memory: 26 bytes a leaf, 10 an inner node, and 8 a deposit of the queue's capacity.
+// Memory: 26 bytes a leaf, 11 an inner node; while samples are in flight 8 more a leaf, and 8 a deposit of the
+// queue's capacity.
 #pragma once
 
 #include <wfpg/buffer.hpp>
@@ -14,7 +15,8 @@
 #include <wfpg/types.hpp>
 
 #include <thrust/fill.h>
-#include <thrust/sort.h>
+
+#include <cmath>
 
 namespace wfpg {
 
@@ -27,6 +29,15 @@ struct dropped_deposits {
   std::uint64_t total() const { return std::uint64_t(invalid) + outside + overflow; }
 };
 
+namespace detail {
+
+/// No deposit of a leaf's side yet.
+inline constexpr std::uint32_t no_deposit = 0xffffffffu;
+/// With a leaf's side: its first deposit since the last update.
+inline constexpr std::uint32_t oldest_deposit = 0x80000000u;
+
+}  // namespace detail
+
 /// What a kernel sees of the cache.
 class exitance_cache_view {
  public:
@@ -37,7 +48,12 @@ class exitance_cache_view {
 
   /// The side of a node that faces a direction: 0 where N does, 1 where -N does.
   WFPG_HD std::uint32_t side_facing(node_id node, vec3 direction) const {
-    return glm::dot(normal(node), direction) >= 0.0f ? 0u : 1u;
+    return glm::dot(detail::unpack_voxel_direction(normals_[node]), direction) >= 0.0f ? 0u : 1u;
+  }
+
+  /// The side of an inner node's c-th child that faces as the node's own does; and the reverse.
+  WFPG_HD std::uint32_t matching_side(node_id node, std::uint32_t c, std::uint32_t side) const {
+    return side ^ (static_cast<std::uint32_t>(swapped_sides_[node]) >> c & 1u);
   }
 
   /// Mean outgoing radiance of a node's side; negative where it has no data.
@@ -52,7 +68,7 @@ class exitance_cache_view {
   WFPG_HD float read(node_id node, std::uint32_t side) const {
     float value = radiance(node, side);
     for (node_id up = tree_.parent(node); value < 0.0f && up != invalid_node; up = tree_.parent(up)) {
-      side = side_facing(up, side == 0 ? normal(node) : -normal(node));  // an ancestor's N may be this -N
+      side = matching_side(up, node - tree_.first_child(up), side);
       node = up;
       value = radiance(node, side);
     }
@@ -82,8 +98,10 @@ class exitance_cache_view {
       detail::atomic_add(counters_ + counter_overflow, 1);
       return;
     }
-    const std::uint64_t key = 2 * std::uint64_t(leaf - tree_.first_leaf()) + side_facing(leaf, direction);
-    queue_[slot] = key << 32 | detail::float_bits(radiance + 0.0f);  // + 0: no negative zero
+    const std::uint32_t key = 2 * (leaf - tree_.first_leaf()) + side_facing(leaf, direction);
+    const std::uint32_t before = detail::atomic_exchange(newest_ + key, slot);
+    const std::uint32_t link = before == detail::no_deposit ? detail::oldest_deposit | key : before;
+    queue_[slot] = std::uint64_t(detail::float_bits(radiance + 0.0f)) << 32 | link;  // + 0: no negative zero
   }
   WFPG_HD void deposit(vec3 position, vec3 direction, vec3 rgb) const {
     deposit(position, direction, luminance(rgb));
@@ -95,18 +113,18 @@ class exitance_cache_view {
   enum : std::uint32_t { counter_invalid, counter_outside, counter_overflow, counter_queued, counters };
 
   sparse_voxel_octree_view tree_;
-  const std::uint16_t* normals_ = nullptr;      // a node
+  const std::uint16_t* normals_ = nullptr;       // a node
+  const std::uint8_t* swapped_sides_ = nullptr;  // an inner node: a bit a child
   const double* leaf_means_ = nullptr;          // a leaf and side
   const std::uint32_t* leaf_counts_ = nullptr;  // a leaf and side
   const float* inner_radiance_ = nullptr;       // an inner node and side; negative: no data
-  std::uint64_t* queue_ = nullptr;              // leaf and side above, bits of the radiance below
+  std::uint64_t* queue_ = nullptr;   // bits of the radiance above, of the same side's deposit before below
+  std::uint32_t* newest_ = nullptr;  // a leaf and side: its last deposit
   std::uint32_t* counters_ = nullptr;
   std::uint32_t capacity_ = 0;
 };
 
 namespace detail {
-
-inline constexpr std::uint64_t no_deposit = ~0ull;
 
 /// Adds `n` values that sum to `sum` to a mean of `count` values. The count stays at its largest value when
 /// it is reached: from then on old values fade, and nothing overflows.
@@ -116,19 +134,59 @@ WFPG_HD inline void add_to_mean(double& mean, std::uint32_t& count, double sum, 
   count = static_cast<std::uint32_t>(min<std::uint64_t>(total, 0xffffffffull));
 }
 
-/// The first of each run of equal leaf and side adds the run to the mean, in sorted order.
+/// The exact sum of non-negative finite floats in any order: integers in units of the largest one's last
+/// bits, of which 39 lie below its own and make room for n to carry.
+class exact_sum {
+ public:
+  /// `largest`: the bits of the largest value; n > 0 values follow.
+  WFPG_HD exact_sum(std::uint32_t largest, std::uint32_t n) : exponent_(exponent(largest)), shift_(39) {
+    while (shift_ > 0 && 1ull << (39 - shift_) < n) --shift_;
+  }
+  WFPG_HD void add(std::uint32_t bits) {
+    const std::uint64_t mantissa = bits >> 23 ? (bits & 0x7fffffu) | 0x800000u : bits;
+    const int left = shift_ + exponent(bits) - exponent_;
+    sum_ += left >= 0 ? mantissa << left : (left > -32 ? mantissa >> -left : 0);
+  }
+  WFPG_HD double value() const { return ldexp(static_cast<double>(sum_), exponent_ - 150 - shift_); }
+
+ private:
+  WFPG_HD static int exponent(std::uint32_t bits) { return max(static_cast<int>(bits >> 23), 1); }
+
+  int exponent_;
+  int shift_;
+  std::uint64_t sum_ = 0;
+};
+
+/// The first deposit of each side adds all of them to the mean.
 struct fold_deposits {
-  array_view<const std::uint64_t> sorted;
+  array_view<const std::uint64_t> queue;
+  std::uint32_t* newest;
   double* means;
   std::uint32_t* counts;
+
   WFPG_HD void operator()(std::size_t i) const {
-    const std::uint64_t key = sorted[i] >> 32;
-    if (sorted[i] == no_deposit || (i > 0 && sorted[i - 1] >> 32 == key)) return;
-    double sum = 0.0;
-    std::size_t end = i;
-    for (; end < sorted.size() && sorted[end] >> 32 == key; ++end)
-      sum += static_cast<double>(bits_float(static_cast<std::uint32_t>(sorted[end])));
-    add_to_mean(means[key], counts[key], sum, end - i);
+    if (!(queue[i] & oldest_deposit)) return;
+    const std::uint32_t key = static_cast<std::uint32_t>(queue[i]) & ~oldest_deposit;
+    std::uint32_t n = 0, largest = 0;
+    for_each_deposit(key, [&](std::uint32_t bits) {
+      ++n;
+      largest = max(largest, bits);
+    });
+    exact_sum sum(largest, n);
+    for_each_deposit(key, [&](std::uint32_t bits) { sum.add(bits); });
+    newest[key] = no_deposit;
+    add_to_mean(means[key], counts[key], sum.value(), n);
+  }
+
+ private:
+  template <class F>
+  WFPG_HD void for_each_deposit(std::uint32_t key, const F& f) const {
+    for (std::uint32_t entry = newest[key];;) {
+      const std::uint64_t word = queue[entry];
+      f(static_cast<std::uint32_t>(word >> 32));
+      entry = static_cast<std::uint32_t>(word);
+      if (entry & oldest_deposit) return;
+    }
   }
 };
 
@@ -142,13 +200,11 @@ struct average_children {
     const node_id first = cache.octree().first_child(node);
     const node_id end = first + cache.octree().child_count(node);
     for (std::uint32_t side = 0; side < 2; ++side) {
-      const vec3 facing = side == 0 ? cache.normal(node) : -cache.normal(node);
       float sum = 0.0f, n = 0.0f;
       for (node_id child = first; child < end; ++child) {
-        const float value = cache.radiance(child, cache.side_facing(child, facing));
-        if (value < 0.0f) continue;
-        sum += value;
-        n += 1.0f;
+        const float value = cache.radiance(child, cache.matching_side(node, child - first, side));
+        sum += max(value, 0.0f);
+        n += value < 0.0f ? 0.0f : 1.0f;
       }
       inner_radiance[2 * std::size_t(node) + side] = n > 0.0f ? sum / n : -1.0f;
     }
@@ -165,52 +221,58 @@ class exitance_cache {
 
   /// An empty cache over an octree just built from `fragments` (which the octree sorted). `queue_capacity`
   /// bounds the deposits between two updates. Throws out_of_memory, std::invalid_argument where the capacity
-  /// is 2³² or more.
+  /// is more than 2³¹, or the octree has 2³⁰ leaves or more.
   exitance_cache(const Exec& exec, const sparse_voxel_octree<Exec>& tree,
                  const voxel_fragments<Exec>& fragments, std::size_t queue_capacity)
       : normals_(exec, tree.node_count()),
+        swapped_sides_(exec, tree.node_count() - checked_leaves(tree.leaf_count())),
         leaf_means_(exec, 2 * std::size_t(tree.leaf_count())),
         leaf_counts_(exec, 2 * std::size_t(tree.leaf_count())),
         inner_radiance_(exec, 2 * std::size_t(tree.node_count() - tree.leaf_count())),
         queue_(exec, checked(queue_capacity)),
+        newest_(exec, 2 * std::size_t(tree.leaf_count())),
         counters_(exec, exitance_cache_view::counters) {
     view_.tree_ = tree.view();
     view_.normals_ = normals_.data();
     view_.leaf_means_ = leaf_means_.data();
     view_.leaf_counts_ = leaf_counts_.data();
     view_.inner_radiance_ = inner_radiance_.data();
+    view_.swapped_sides_ = swapped_sides_.data();
     view_.queue_ = queue_.data();
+    view_.newest_ = newest_.data();
     view_.counters_ = counters_.data();
     view_.capacity_ = static_cast<std::uint32_t>(queue_capacity);
     detail::build_voxel_normals(exec, tree, fragments, normals_.view());
+    exec.for_each(swapped_sides_.size(),
+                  detail::match_sides{view_.tree_, normals_.view(), swapped_sides_.view()});
     ::thrust::fill_n(exec.thrust(), counters_.data(), counters_.size(), 0u);
     clear(exec);
   }
 
   exitance_cache_view view() const { return view_; }
   std::size_t persistent_bytes() const {
-    return normals_.bytes() + leaf_means_.bytes() + leaf_counts_.bytes() + inner_radiance_.bytes();
+    return normals_.bytes() + swapped_sides_.bytes() + leaf_means_.bytes() + leaf_counts_.bytes() + inner_radiance_.bytes();
   }
-  std::size_t transient_bytes() const { return queue_.bytes() + counters_.bytes(); }
+  std::size_t transient_bytes() const { return queue_.bytes() + newest_.bytes() + counters_.bytes(); }
 
   /// Forgets all light, and what is queued.
   void clear(const Exec& exec) {
     ::thrust::fill_n(exec.thrust(), leaf_means_.data(), leaf_means_.size(), 0.0);
     ::thrust::fill_n(exec.thrust(), leaf_counts_.data(), leaf_counts_.size(), 0u);
     ::thrust::fill_n(exec.thrust(), inner_radiance_.data(), inner_radiance_.size(), -1.0f);
-    empty_queue(exec);
+    ::thrust::fill_n(exec.thrust(), newest_.data(), newest_.size(), detail::no_deposit);
+    ::thrust::fill_n(exec.thrust(), counters_.data() + exitance_cache_view::counter_queued, 1, 0u);
   }
 
-  /// Folds queued deposits into the leaves and averages bottom-up. O(c log c + nodes), c the queue's
-  /// capacity.
+  /// Folds queued deposits into the leaves and averages bottom-up. O(deposits + nodes).
   void update(const Exec& exec) {
-    ::thrust::sort(exec.thrust(), queue_.data(), queue_.data() + queue_.size());
-    exec.for_each(queue_.size(),
-                  detail::fold_deposits{queue_.view(), leaf_means_.data(), leaf_counts_.data()});
+    const std::uint32_t* const queued = counters_.data() + exitance_cache_view::counter_queued;
+    exec.for_each(exec::device_count{queued, queue_.size()},
+                  detail::fold_deposits{queue_.view(), newest_.data(), leaf_means_.data(), leaf_counts_.data()});
     for (std::uint32_t level = view_.tree_.depth(); level-- > 0;)
       exec.for_each(view_.tree_.level_begin(level + 1) - view_.tree_.level_begin(level),
                     detail::average_children{view_, view_.tree_.level_begin(level), inner_radiance_.data()});
-    empty_queue(exec);
+    ::thrust::fill_n(exec.thrust(), counters_.data() + exitance_cache_view::counter_queued, 1, 0u);
   }
 
   /// Deposits dropped since the cache was built; waits for the work before it.
@@ -223,21 +285,22 @@ class exitance_cache {
  private:
   // Before memory is asked for.
   static std::size_t checked(std::size_t queue_capacity) {
-    detail::require(queue_capacity <= 0xffffffffull, "deposit queue capacity", queue_capacity,
-                    "less than 2^32");
+    detail::require(queue_capacity <= detail::oldest_deposit, "deposit queue capacity", queue_capacity,
+                    "at most 2^31");
     return queue_capacity;
   }
-
-  void empty_queue(const Exec& exec) {
-    ::thrust::fill_n(exec.thrust(), queue_.data(), queue_.size(), detail::no_deposit);
-    ::thrust::fill_n(exec.thrust(), counters_.data() + exitance_cache_view::counter_queued, 1, 0u);
+  static std::uint32_t checked_leaves(std::uint32_t leaves) {
+    detail::require(leaves < detail::oldest_deposit / 2, "number of leaves", leaves, "less than 2^30");
+    return leaves;
   }
 
   buffer<std::uint16_t, Exec> normals_;
+  buffer<std::uint8_t, Exec> swapped_sides_;
   buffer<double, Exec> leaf_means_;
   buffer<std::uint32_t, Exec> leaf_counts_;
   buffer<float, Exec> inner_radiance_;
   buffer<std::uint64_t, Exec> queue_;
+  buffer<std::uint32_t, Exec> newest_;
   buffer<std::uint32_t, Exec> counters_;
   exitance_cache_view view_;
 };

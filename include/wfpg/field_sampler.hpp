@@ -32,9 +32,15 @@ class grid_distribution {
   /// A point of [0,1)² from u in [0,1)². Monotone in each coordinate inside a row: stratified u stay
   /// stratified.
   WFPG_HD vec2 sample(vec2 u) const {
+    float density;
+    return sample(u, density);
+  }
+  /// The same, and pdf() of the point: of the cell that the search ended in.
+  WFPG_HD vec2 sample(vec2 u, float& density) const {
     vec2 fraction;
     const std::uint32_t y = find(marginal_, u.y, fraction.y);
     const std::uint32_t x = find(rows_ + y * resolution_, u.x, fraction.x);
+    density = cell_pdf(x, y);
     return vec2{static_cast<float>(x) + fraction.x, static_cast<float>(y) + fraction.y} /
            static_cast<float>(resolution_);
   }
@@ -46,11 +52,14 @@ class grid_distribution {
         static_cast<std::uint32_t>(detail::clamp(uv.x * static_cast<float>(resolution_), 0.0f, last));
     const auto y =
         static_cast<std::uint32_t>(detail::clamp(uv.y * static_cast<float>(resolution_), 0.0f, last));
-    const auto cells = static_cast<float>(resolution_ * resolution_);
-    return static_cast<float>(weight(x, y)) / static_cast<float>(total()) * cells;
+    return cell_pdf(x, y);
   }
 
  private:
+  WFPG_HD float cell_pdf(std::uint32_t x, std::uint32_t y) const {
+    const auto cells = static_cast<float>(resolution_ * resolution_);
+    return static_cast<float>(weight(x, y)) / static_cast<float>(total()) * cells;
+  }
   WFPG_HD static std::uint32_t width(const std::uint32_t* sums, std::uint32_t i) {
     return sums[i] - (i ? sums[i - 1] : 0u);
   }
@@ -111,6 +120,12 @@ class directional_field {
 
   /// A unit direction from u in [0,1)². Precondition: not empty.
   WFPG_HD vec3 sample(vec2 u) const { return direction(grid_.sample(u)); }
+  /// The same, and pdf() of the direction.
+  WFPG_HD vec3 sample(vec2 u, float& density) const {
+    const vec2 uv = grid_.sample(u, density);
+    density /= domain();
+    return direction(uv);
+  }
 
   /// The density of a unit direction, per steradian; 0 outside the hemisphere. Precondition: not empty.
   WFPG_HD float pdf(vec3 d) const {

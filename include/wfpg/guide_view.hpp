@@ -43,9 +43,10 @@ class guide_view {
 
   /// A direction and its density from the field alone. Precondition: guides(ray).
   WFPG_HD sampled_direction sample(std::uint32_t ray, vec2 u) const {
-    const directional_field field = mixture(ray).field;
-    const vec3 direction = field.sample(u);
-    return {direction, field.pdf(direction), sampling_technique::guide};
+    sampled_direction result;
+    result.direction = mixture(ray).field.sample(u, result.pdf);
+    result.technique = sampling_technique::guide;
+    return result;
   }
   /// The field's density of a unit direction, per steradian. Precondition: guides(ray).
   WFPG_HD float pdf(std::uint32_t ray, vec3 direction) const { return mixture(ray).field.pdf(direction); }

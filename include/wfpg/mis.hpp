@@ -51,8 +51,9 @@ struct guide_mixture {
       if (guides() && result.pdf > 0.0f) result.pdf = pdf(s, result.direction);
       return result;
     }
-    const vec3 direction = field.sample(u);
-    return {direction, pdf(s, direction), sampling_technique::guide};
+    float from_field;
+    const vec3 direction = field.sample(u, from_field);
+    return {direction, mixed(from_field, s.bsdf.pdf(s.outgoing, direction)), sampling_technique::guide};
   }
 
   /// The density with which sample() draws a unit direction, per steradian; 0 on delta BSDFs.
@@ -60,10 +61,13 @@ struct guide_mixture {
   WFPG_HD float pdf(const surface<Bsdf>& s, vec3 direction) const {
     if (s.bsdf.is_delta()) return 0.0f;
     const float from_bsdf = s.bsdf.pdf(s.outgoing, direction);
-    return guides() ? fraction * field.pdf(direction) + (1.0f - fraction) * from_bsdf : from_bsdf;
+    return guides() ? mixed(field.pdf(direction), from_bsdf) : from_bsdf;
   }
 
  private:
+  WFPG_HD float mixed(float from_field, float from_bsdf) const {
+    return fraction * from_field + (1.0f - fraction) * from_bsdf;
+  }
   WFPG_HD bool guides() const { return fraction > 0.0f && !field.empty(); }
 
   template <class Bsdf>

@@ -3,7 +3,7 @@
 // Construction of BVHs, Octrees, and k-d Trees"). Structure only; what light leaves a node is
 // exitance_cache.hpp's.
 //
-// Memory: 4 bytes a leaf, 9 an inner node. Build: a sort of the fragments and O(nodes).
+// Memory: 4 bytes a leaf, 9 an inner node, and up to 128 KiB where descents begin. Build: a sort of the fragments and O(nodes).
 #pragma once
 
 #include <wfpg/buffer.hpp>
@@ -13,6 +13,7 @@
 #include <wfpg/types.hpp>
 #include <wfpg/voxelizer.hpp>
 
+#include <thrust/fill.h>
 #include <thrust/iterator/zip_iterator.h>
 #include <thrust/scan.h>
 #include <thrust/sort.h>
@@ -65,9 +66,9 @@ class sparse_voxel_octree_view {
   /// The leaf at voxel coordinates below resolution, or invalid_node. O(depth).
   WFPG_HD node_id leaf_at(uvec3 voxel) const {
     if (empty()) return invalid_node;
-    node_id node = 0;
-    for (std::uint32_t level = depth_; level > 0 && node != invalid_node; --level)
-      node = child(node, octant(voxel, level - 1));
+    std::uint32_t level = depth_ - top_level(depth_);
+    node_id node = top_[top_index(voxel >> level, top_level(depth_))];
+    for (; level > 0 && node != invalid_node; --level) node = child(node, octant(voxel, level - 1));
     return node;
   }
   /// The leaf that holds a point, or invalid_node. O(depth).
@@ -121,6 +122,18 @@ class sparse_voxel_octree_view {
   template <class Exec>
   friend class sparse_voxel_octree;
 
+  /// The level that a table leads to from coordinates, so that a descent begins there: two above the leaves',
+  /// and no deeper than a table of 128 KiB allows.
+  WFPG_HD static constexpr std::uint32_t top_level(std::uint32_t depth) {
+    return depth < 2 ? 0u : detail::min(depth - 2u, 5u);
+  }
+  WFPG_HD static constexpr std::size_t top_size(std::uint32_t depth) {
+    return std::size_t(1) << 3 * top_level(depth);
+  }
+  WFPG_HD static std::uint32_t top_index(uvec3 p, std::uint32_t level) {
+    return p.x | p.y << level | p.z << 2 * level;
+  }
+
   WFPG_HD static std::uint32_t octant(uvec3 voxel, std::uint32_t bit) {
     return (voxel.x >> bit & 1u) | (voxel.y >> bit & 1u) << 1 | (voxel.z >> bit & 1u) << 2;
   }
@@ -160,6 +173,7 @@ class sparse_voxel_octree_view {
   const node_id* parents_ = nullptr;         // a node
   const node_id* first_children_ = nullptr;  // an inner node
   const std::uint8_t* child_masks_ = nullptr;
+  const node_id* top_ = nullptr;  // coordinates at the top level: the node there, or invalid_node
 };
 
 namespace detail {
@@ -204,6 +218,18 @@ struct link_nodes {
       mask |= 1u << (codes[j] & 7u);
     first_children[up] = static_cast<node_id>(level_begin + i);
     child_masks[up] = static_cast<std::uint8_t>(mask);
+  }
+};
+
+/// A level's nodes by their coordinates.
+struct fill_top {
+  array_view<const morton_code> codes;
+  node_id level_begin;
+  std::uint32_t level;
+  node_id* top;
+  WFPG_HD void operator()(std::size_t i) const {
+    const uvec3 p = morton_decode(codes[i]);
+    top[p.x | p.y << level | p.z << 2 * level] = level_begin + static_cast<node_id>(i);
   }
 };
 
@@ -258,7 +284,9 @@ class sparse_voxel_octree {
   std::uint32_t resolution() const { return view_.grid_.resolution; }
   std::uint32_t node_count() const { return view_.node_count(); }
   std::uint32_t leaf_count() const { return view_.leaf_count(); }
-  std::size_t bytes() const { return parents_.bytes() + first_children_.bytes() + child_masks_.bytes(); }
+  std::size_t bytes() const { 
+    return parents_.bytes() + first_children_.bytes() + child_masks_.bytes() + top_.bytes();
+  }
 
   /// Where each leaf's fragments begin in the sorted order, until release_build_data(); a leaf's index counts
   /// from the first leaf.
@@ -291,6 +319,10 @@ class sparse_voxel_octree {
                     detail::link_nodes{level_codes[level], up[level - 1].through.view(),
                                        view_.level_begin_[level], view_.level_begin_[level - 1],
                                        parents_.data(), first_children_.data(), child_masks_.data()});
+    const std::uint32_t top = view_.top_level(depth);
+    ::thrust::fill_n(exec.thrust(), top_.data(), top_.size(), invalid_node);
+    exec.for_each(level_codes[top].size(),
+                  detail::fill_top{level_codes[top], view_.level_begin_[top], top, top_.data()});
   }
 
   void allocate(const Exec& exec) {
@@ -300,6 +332,8 @@ class sparse_voxel_octree {
     view_.parents_ = parents_.data();
     view_.first_children_ = first_children_.data();
     view_.child_masks_ = child_masks_.data();
+    top_ = buffer<node_id, Exec>(exec, view_.top_size(view_.depth_));
+    view_.top_ = top_.data();
     if (view_.node_count() == 0) return;
     const node_id none = invalid_node;
     exec.copy_from_host(parents_.data(), &none, sizeof none);
@@ -308,6 +342,7 @@ class sparse_voxel_octree {
   buffer<node_id, Exec> parents_;
   buffer<node_id, Exec> first_children_;
   buffer<std::uint8_t, Exec> child_masks_;
+  buffer<node_id, Exec> top_;
   detail::code_groups<Exec> leaf_fragments_;
   sparse_voxel_octree_view view_;
 };

@@ -41,6 +41,15 @@ WFPG_HD inline void atomic_store(std::uint32_t* target, std::uint32_t value) {
 #endif
 }
 
+/// *target = value; returns the value before.
+WFPG_HD inline std::uint32_t atomic_exchange(std::uint32_t* target, std::uint32_t value) {
+#if defined(__CUDA_ARCH__)
+  return atomicExch(target, value);
+#else
+  return __atomic_exchange_n(target, value, __ATOMIC_RELAXED);
+#endif
+}
+
 /// *target = value where it was `expected`; returns the value before.
 WFPG_HD inline std::uint32_t atomic_compare_exchange(std::uint32_t* target, std::uint32_t expected,
                                                      std::uint32_t value) {

@@ -12,14 +12,18 @@ namespace wfpg::detail {
 
 /// A unit direction in 16 bits, at most 1 degree away; the axes are exact.
 WFPG_HD inline std::uint16_t pack_voxel_normal(vec3 n) {
-  const vec2 uv = sphere_to_square(n);
-  const auto x = static_cast<std::uint32_t>(uv.x * 254.0f + 0.5f);
-  const auto y = static_cast<std::uint32_t>(uv.y * 254.0f + 0.5f);
+  const vec2 p = direction_to_octahedron(n);
+  const auto x = static_cast<std::uint32_t>(p.x * 127.0f + 127.5f);
+  const auto y = static_cast<std::uint32_t>(p.y * 127.0f + 127.5f);
   return static_cast<std::uint16_t>(x | y << 8);
 }
+/// The direction, of any length.
+WFPG_HD inline vec3 unpack_voxel_direction(std::uint16_t packed) {
+  return octahedron_to_direction({(static_cast<float>(packed & 0xffu) - 127.0f) * (1.0f / 127.0f),
+                                  (static_cast<float>(packed >> 8) - 127.0f) * (1.0f / 127.0f)});
+}
 WFPG_HD inline vec3 unpack_voxel_normal(std::uint16_t packed) {
-  return square_to_sphere({static_cast<float>(packed & 0xffu) * (1.0f / 254.0f),
-                           static_cast<float>(packed >> 8) * (1.0f / 254.0f)});
+  return glm::normalize(unpack_voxel_direction(packed));
 }
 
 /// A normal with the area that has it.
@@ -99,6 +103,21 @@ struct inner_normals {
     for (std::uint32_t c = 0; c < n; ++c) area += areas[first + c];
     normals[node] = pack_voxel_normal(dominant_normal(member, n));
     areas[node] = area;
+  }
+};
+
+/// Which children's sides are swapped: those whose N faces away from their parent's.
+struct match_sides {
+  sparse_voxel_octree_view tree;
+  array_view<const std::uint16_t> normals;
+  array_view<std::uint8_t> swapped;
+  WFPG_HD void operator()(std::size_t node) const {
+    const auto id = static_cast<node_id>(node);
+    const vec3 n = unpack_voxel_direction(normals[id]);
+    std::uint32_t bits = 0;
+    for (std::uint32_t c = 0; c < tree.child_count(id); ++c)
+      if (glm::dot(n, unpack_voxel_direction(normals[tree.first_child(id) + c])) < 0.0f) bits |= 1u << c;
+    swapped[id] = static_cast<std::uint8_t>(bits);
   }
 };
 
