@@ -16,8 +16,6 @@
 
 #include <thrust/fill.h>
 
-#include <cmath>
-
 namespace wfpg {
 
 /// Deposits that were not stored, since the cache was built.
@@ -35,6 +33,12 @@ namespace detail {
 inline constexpr std::uint32_t no_deposit = 0xffffffffu;
 /// With a leaf's side: its first deposit since the last update.
 inline constexpr std::uint32_t oldest_deposit = 0x80000000u;
+
+/// What a leaf has received, by side; together, since they are read together.
+struct leaf_exitance {
+  double means[2] = {0.0, 0.0};
+  std::uint32_t counts[2] = {0, 0};
+};
 
 }  // namespace detail
 
@@ -59,8 +63,8 @@ class exitance_cache_view {
   /// Mean outgoing radiance of a node's side; negative where it has no data.
   WFPG_HD float radiance(node_id node, std::uint32_t side) const {
     if (!tree_.is_leaf(node)) return inner_radiance_[2 * std::size_t(node) + side];
-    const std::size_t slot = 2 * std::size_t(node - tree_.first_leaf()) + side;
-    return leaf_counts_[slot] ? static_cast<float>(leaf_means_[slot]) : -1.0f;
+    const detail::leaf_exitance& leaf = leaves_[node - tree_.first_leaf()];
+    return leaf.counts[side] ? static_cast<float>(leaf.means[side]) : -1.0f;
   }
 
   /// Outgoing radiance of a node's side, or else of the same side of its first ancestor with data; 0 where
@@ -115,8 +119,7 @@ class exitance_cache_view {
   sparse_voxel_octree_view tree_;
   const std::uint16_t* normals_ = nullptr;       // a node
   const std::uint8_t* swapped_sides_ = nullptr;  // an inner node: a bit a child
-  const double* leaf_means_ = nullptr;          // a leaf and side
-  const std::uint32_t* leaf_counts_ = nullptr;  // a leaf and side
+  const detail::leaf_exitance* leaves_ = nullptr;
   const float* inner_radiance_ = nullptr;       // an inner node and side; negative: no data
   std::uint64_t* queue_ = nullptr;   // bits of the radiance above, of the same side's deposit before below
   std::uint32_t* newest_ = nullptr;  // a leaf and side: its last deposit
@@ -147,7 +150,12 @@ class exact_sum {
     const int left = shift_ + exponent(bits) - exponent_;
     sum_ += left >= 0 ? mantissa << left : (left > -32 ? mantissa >> -left : 0);
   }
-  WFPG_HD double value() const { return ldexp(static_cast<double>(sum_), exponent_ - 150 - shift_); }
+  WFPG_HD double value() const {
+    const std::uint64_t unit = static_cast<std::uint64_t>(1023 + exponent_ - 150 - shift_) << 52;  // a power of 2
+    double scale;
+    memcpy(&scale, &unit, sizeof scale);
+    return static_cast<double>(sum_) * scale;
+  }
 
  private:
   WFPG_HD static int exponent(std::uint32_t bits) { return max(static_cast<int>(bits >> 23), 1); }
@@ -161,8 +169,7 @@ class exact_sum {
 struct fold_deposits {
   array_view<const std::uint64_t> queue;
   std::uint32_t* newest;
-  double* means;
-  std::uint32_t* counts;
+  leaf_exitance* leaves;
 
   WFPG_HD void operator()(std::size_t i) const {
     if (!(queue[i] & oldest_deposit)) return;
@@ -175,7 +182,8 @@ struct fold_deposits {
     exact_sum sum(largest, n);
     for_each_deposit(key, [&](std::uint32_t bits) { sum.add(bits); });
     newest[key] = no_deposit;
-    add_to_mean(means[key], counts[key], sum.value(), n);
+    leaf_exitance& leaf = leaves[key / 2];
+    add_to_mean(leaf.means[key % 2], leaf.counts[key % 2], sum.value(), n);
   }
 
  private:
@@ -226,16 +234,14 @@ class exitance_cache {
                  const voxel_fragments<Exec>& fragments, std::size_t queue_capacity)
       : normals_(exec, tree.node_count()),
         swapped_sides_(exec, tree.node_count() - checked_leaves(tree.leaf_count())),
-        leaf_means_(exec, 2 * std::size_t(tree.leaf_count())),
-        leaf_counts_(exec, 2 * std::size_t(tree.leaf_count())),
+        leaves_(exec, tree.leaf_count()),
         inner_radiance_(exec, 2 * std::size_t(tree.node_count() - tree.leaf_count())),
         queue_(exec, checked(queue_capacity)),
         newest_(exec, 2 * std::size_t(tree.leaf_count())),
         counters_(exec, exitance_cache_view::counters) {
     view_.tree_ = tree.view();
     view_.normals_ = normals_.data();
-    view_.leaf_means_ = leaf_means_.data();
-    view_.leaf_counts_ = leaf_counts_.data();
+    view_.leaves_ = leaves_.data();
     view_.inner_radiance_ = inner_radiance_.data();
     view_.swapped_sides_ = swapped_sides_.data();
     view_.queue_ = queue_.data();
@@ -251,14 +257,13 @@ class exitance_cache {
 
   exitance_cache_view view() const { return view_; }
   std::size_t persistent_bytes() const {
-    return normals_.bytes() + swapped_sides_.bytes() + leaf_means_.bytes() + leaf_counts_.bytes() + inner_radiance_.bytes();
+    return normals_.bytes() + swapped_sides_.bytes() + leaves_.bytes() + inner_radiance_.bytes();
   }
   std::size_t transient_bytes() const { return queue_.bytes() + newest_.bytes() + counters_.bytes(); }
 
   /// Forgets all light, and what is queued.
   void clear(const Exec& exec) {
-    ::thrust::fill_n(exec.thrust(), leaf_means_.data(), leaf_means_.size(), 0.0);
-    ::thrust::fill_n(exec.thrust(), leaf_counts_.data(), leaf_counts_.size(), 0u);
+    ::thrust::fill_n(exec.thrust(), leaves_.data(), leaves_.size(), detail::leaf_exitance{});
     ::thrust::fill_n(exec.thrust(), inner_radiance_.data(), inner_radiance_.size(), -1.0f);
     ::thrust::fill_n(exec.thrust(), newest_.data(), newest_.size(), detail::no_deposit);
     ::thrust::fill_n(exec.thrust(), counters_.data() + exitance_cache_view::counter_queued, 1, 0u);
@@ -268,7 +273,7 @@ class exitance_cache {
   void update(const Exec& exec) {
     const std::uint32_t* const queued = counters_.data() + exitance_cache_view::counter_queued;
     exec.for_each(exec::device_count{queued, queue_.size()},
-                  detail::fold_deposits{queue_.view(), newest_.data(), leaf_means_.data(), leaf_counts_.data()});
+                  detail::fold_deposits{queue_.view(), newest_.data(), leaves_.data()});
     for (std::uint32_t level = view_.tree_.depth(); level-- > 0;)
       exec.for_each(view_.tree_.level_begin(level + 1) - view_.tree_.level_begin(level),
                     detail::average_children{view_, view_.tree_.level_begin(level), inner_radiance_.data()});
@@ -296,8 +301,7 @@ class exitance_cache {
 
   buffer<std::uint16_t, Exec> normals_;
   buffer<std::uint8_t, Exec> swapped_sides_;
-  buffer<double, Exec> leaf_means_;
-  buffer<std::uint32_t, Exec> leaf_counts_;
+  buffer<detail::leaf_exitance, Exec> leaves_;
   buffer<float, Exec> inner_radiance_;
   buffer<std::uint64_t, Exec> queue_;
   buffer<std::uint32_t, Exec> newest_;

@@ -70,14 +70,8 @@ class grid_distribution {
     const std::uint32_t total = sums[resolution_ - 1];
     const auto scaled = static_cast<std::uint64_t>(u * 0x1p24f) * total;  // exact: u has 24 bits
     const auto target = detail::min(static_cast<std::uint32_t>(scaled >> 24), total - 1u);
-    std::uint32_t low = 0, high = resolution_ - 1;
-    while (low < high) {
-      const std::uint32_t middle = (low + high) / 2;
-      if (sums[middle] > target)
-        high = middle;
-      else
-        low = middle + 1;
-    }
+    std::uint32_t low = 0;
+    for (std::uint32_t n = resolution_; n > 1; n -= n / 2) low += sums[low + n / 2 - 1] > target ? 0 : n / 2;
     const std::uint32_t before = low ? sums[low - 1] : 0u;
     const float rest = static_cast<float>(scaled & 0xffffffu) * 0x1p-24f;
     fraction = (static_cast<float>(target - before) + rest) / static_cast<float>(sums[low] - before);

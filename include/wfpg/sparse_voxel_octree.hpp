@@ -90,11 +90,10 @@ class sparse_voxel_octree_view {
   }
   WFPG_HD std::uint32_t level_for_cone(float distance, float solid_angle) const {
     const float area = distance * distance * solid_angle;
-    const float root = grid_.side * grid_.side;
-    const float deepest = static_cast<float>(depth_);
-    if (!(area > 0.0f)) return depth_;
-    const float level = 0.5f * log2f(root / area) + 0.5f;
-    return static_cast<std::uint32_t>(detail::clamp(level, 0.0f, deepest));
+    std::uint32_t level = depth_;
+    float face = grid_.voxel_size() * grid_.voxel_size();
+    for (; level > 0 && area > 2.0f * face; --level) face *= 4.0f;  // 2: halfway to 4, in ratio
+    return level;
   }
 
   /// Voxel coordinates of a node at its own level. O(level).

@@ -43,8 +43,9 @@ struct sum_counts {
   }
 };
 
-/// How many rays mark a node: c_ray a sample, or as many more as it takes for the marked nodes' fields to fit
-/// the room that there is.
+/// How many rays mark a node: so many that bins hold about c_ray a sample; or as many more as it takes for the
+/// marked nodes' fields to fit the room that there is. A surface has four times the rays one level up, so that
+/// nodes marked by half of c_ray and more hold, in ratio, about c_ray.
 struct mark_threshold {
   std::uint32_t rays_per_bin;
   std::uint32_t samples;
@@ -52,7 +53,7 @@ struct mark_threshold {
   const std::uint32_t* pressure;  // bins of average size that the room is asked for, on the device
 
   WFPG_HD std::uint64_t operator()(std::uint32_t rays) const {
-    const std::uint64_t wanted = std::uint64_t(rays_per_bin) * samples;
+    const std::uint64_t wanted = (std::uint64_t(rays_per_bin) * samples + 1) / 2;
     const std::uint64_t affordable = room > 0 ? std::uint64_t(rays) * *pressure / room : wanted;
     return min<std::uint64_t>(max(wanted, affordable), bin_marks_view::most);
   }
