@@ -26,8 +26,8 @@ struct arguments {
 };
 
 // CLI11's own checked transformer accepts the numbers behind the names too; names are all that is documented.
-template <class T>
-CLI::Option* add_choice(CLI::App& app, const std::string& name, T& value,
+template <class T, class Value>
+CLI::Option* add_choice(CLI::App& app, const std::string& name, Value& value,
                         const std::map<std::string, T>& choices, const std::string& help) {
   std::vector<std::string> names;
   for (const auto& choice : choices) names.push_back(choice.first);
@@ -59,13 +59,14 @@ void add_method_options(CLI::App& app, render::render_options& options) {
   add_choice<bool>(app, "--nee", options.nee, {{"on", true}, {"off", false}},
                    "next-event estimation toward area lights (default: on)");
   add_choice<combine>(app, "--combine", options.combine,
-                      {{"pt-first", combine::pt_first},
+                      {{"pt-linear", combine::pt_linear},
+                       {"pt-first", combine::pt_first},
                        {"constant", combine::constant},
                        {"linear", combine::linear},
                        {"quadratic", combine::quadratic},
                        {"one-two", combine::one_two},
                        {"discard-first", combine::discard_first}},
-                      "how samples add up (default: pt-first)");
+                      "how samples add up (default: pt-linear; constant for pt)");
 }
 
 void add_budget_options(CLI::App& app, arguments& given) {

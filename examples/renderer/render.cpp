@@ -32,7 +32,7 @@ render_options completed(const scene& scene, render_options options) {
   require(options.max_depth > 0 && options.max_depth <= largest_depth, "max_depth", options.max_depth,
           "1 to 1024");
   require(options.seconds >= 0.0, "seconds", options.seconds, "0 or more");
-  const int least = options.combine == wfpg::sample_combination::discard_first ? 2 : 1;
+  const int least = combination_of(options) == wfpg::sample_combination::discard_first ? 2 : 1;
   require(options.seconds > 0.0 || options.spp >= least, "spp", options.spp,
           least == 2 ? "at least 2, as the first sample is discarded" : "at least 1");
   return options;

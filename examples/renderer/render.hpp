@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -39,7 +40,7 @@ struct render_options {
   std::uint32_t rays_per_bin = 64;        ///< c_ray
   std::uint32_t min_bin_level = 3;        ///< l_min, from the root
   float guide_fraction = 0.0f;            ///< in [0, 1]; 0: the mode's own
-  wfpg::sample_combination combine = wfpg::sample_combination::pt_first;
+  std::optional<wfpg::sample_combination> combine;  ///< unset: pt_linear, and all alike for path tracing
 };
 
 /// Bins of one depth, means over the samples that were guided; of kept fields, those made or refreshed.
@@ -79,6 +80,13 @@ struct render_report {
   slot_report slots;
   double cones_per_segment = 0.0;
 };
+
+/// How the samples of these options are combined.
+inline wfpg::sample_combination combination_of(const render_options& options) {
+  using wfpg::sample_combination;
+  return options.combine.value_or(options.method == sampling_method::pt ? sample_combination::constant
+                                                                        : sample_combination::pt_linear);
+}
 
 struct render_result {
   image picture;

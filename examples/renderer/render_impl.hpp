@@ -32,7 +32,7 @@ class sample_budget {
   explicit sample_budget(const render_options& options)
       : spp_(options.spp),
         seconds_(options.seconds),
-        least_(options.combine == wfpg::sample_combination::discard_first ? 2 : 1) {}
+        least_(combination_of(options) == wfpg::sample_combination::discard_first ? 2 : 1) {}
 
   int samples() const { return samples_; }
   bool is_spent() const { return samples_ >= least_ && fraction() >= 1.0; }
@@ -58,7 +58,7 @@ void take_samples(path_tracer<Exec, embree_caster>& tracer, Guider& guider, cons
   sample_budget budget(options);
   while (!budget.is_spent()) {
     const auto sample = static_cast<std::uint32_t>(budget.samples());
-    const float weight = wfpg::sample_weight(options.combine, sample + 1);
+    const float weight = wfpg::sample_weight(combination_of(options), sample + 1);
     tracer.render_sample(guider, camera, sample, weight);
     budget.count();
     if (progress) progress(budget.progress());
@@ -79,7 +79,7 @@ inline wfpg::guider_options guider_options_of(const render_options& options) {
   guided.mode = options.mode == guiding::plain ? wfpg::guiding_mode::plain : wfpg::guiding_mode::oriented;
   guided.guide_fraction = options.guide_fraction;
   guided.include_emission = !options.nee;
-  guided.unguided_samples = wfpg::unguided_samples(options.combine);
+  guided.unguided_samples = wfpg::unguided_samples(combination_of(options));
   guided.seed = options.seed;
   guided.max_paths = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
   guided.max_depth = static_cast<std::uint32_t>(options.max_depth);

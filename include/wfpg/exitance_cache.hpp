@@ -34,6 +34,9 @@ inline constexpr std::uint32_t no_deposit = 0xffffffffu;
 /// With a leaf's side: its first deposit since the last update.
 inline constexpr std::uint32_t oldest_deposit = 0x80000000u;
 
+/// An entry of the queue that is nobody's.
+inline constexpr std::uint64_t dropped_deposit = 0x7fffffffull;
+
 /// What a leaf has received, by side; together, since they are read together.
 struct leaf_exitance {
   double means[2] = {0.0, 0.0};
@@ -87,28 +90,41 @@ class exitance_cache_view {
   /// once. Seen by reads after exitance_cache::update(). What is not finite or negative, lies outside every
   /// voxel, or does not fit the queue is dropped and counted.
   WFPG_HD void deposit(vec3 position, vec3 direction, float radiance) const {
-    if (!detail::is_finite(radiance) || radiance < 0.0f || !detail::is_finite(position) ||
-        !detail::is_finite(direction)) {
-      detail::atomic_add(counters_ + counter_invalid, 1);
-      return;
-    }
-    const node_id leaf = tree_.nearest_leaf(position);
-    if (leaf == invalid_node) {
-      detail::atomic_add(counters_ + counter_outside, 1);
-      return;
-    }
-    const std::uint32_t slot = detail::atomic_add(counters_ + counter_queued, 1);
-    if (slot >= capacity_) {
-      detail::atomic_add(counters_ + counter_overflow, 1);
-      return;
-    }
-    const std::uint32_t key = 2 * (leaf - tree_.first_leaf()) + side_facing(leaf, direction);
-    const std::uint32_t before = detail::atomic_exchange(newest_ + key, slot);
-    const std::uint32_t link = before == detail::no_deposit ? detail::oldest_deposit | key : before;
-    queue_[slot] = std::uint64_t(detail::float_bits(radiance + 0.0f)) << 32 | link;  // + 0: no negative zero
+    const std::uint32_t entry = reserve(1);
+    write(entry, position, direction, radiance);
+    link(entry);
   }
   WFPG_HD void deposit(vec3 position, vec3 direction, vec3 rgb) const {
     deposit(position, direction, luminance(rgb));
+  }
+
+  /// The same for several deposits of one thread: reserve() gives the first of n entries in a row; all are
+  /// written, then all are linked. Writing first lets a processor overlap look-ups, which the atomics of linking
+  /// would put in order.
+  WFPG_HD std::uint32_t reserve(std::uint32_t n) const {
+    return detail::atomic_add(counters_ + counter_queued, n);
+  }
+  WFPG_HD void write(std::uint32_t entry, vec3 position, vec3 direction, float radiance) const {
+    const bool valid = detail::is_finite(radiance) && radiance >= 0.0f && detail::is_finite(position) &&
+                       detail::is_finite(direction);
+    const node_id leaf = valid ? tree_.nearest_leaf(position) : invalid_node;
+    const bool fits = entry < capacity_;
+    std::uint64_t word = detail::dropped_deposit;
+    if (leaf != invalid_node && fits) {
+      const std::uint32_t key = 2 * (leaf - tree_.first_leaf()) + side_facing(leaf, direction);
+      word = std::uint64_t(detail::float_bits(radiance + 0.0f)) << 32 | key;  // + 0: no negative zero
+    } else {
+      const auto reason = !valid ? counter_invalid : leaf == invalid_node ? counter_outside : counter_overflow;
+      detail::atomic_add(counters_ + reason, 1);
+    }
+    if (fits) queue_[entry] = word;
+  }
+  WFPG_HD void link(std::uint32_t entry) const {
+    if (entry >= capacity_ || queue_[entry] == detail::dropped_deposit) return;
+    const auto key = static_cast<std::uint32_t>(queue_[entry]);
+    const std::uint32_t before = detail::atomic_exchange(newest_ + key, entry);
+    const std::uint32_t to = before == detail::no_deposit ? detail::oldest_deposit | key : before;
+    queue_[entry] = (queue_[entry] & ~0xffffffffull) | to;
   }
 
  private:

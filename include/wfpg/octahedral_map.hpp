@@ -11,14 +11,38 @@
 namespace wfpg {
 namespace detail {
 
+/// cos and sin of t · pi/2, t in [0,1], to 1e-7 (polynomials of Moshier's Cephes library, sinf.c, on half the
+/// range).
+WFPG_HD inline vec2 quarter_turn(float t) {
+  const bool upper = t > 0.5f;
+  const float x = (upper ? 1.0f - t : t) * (0.5f * pi), z = x * x;
+  const float sine = x + x * z * (-1.6666654611e-1f + z * (8.3321608736e-3f + z * -1.9515295891e-4f));
+  const float cosine =
+      1.0f - 0.5f * z + z * z * (4.166664568e-2f + z * (-1.388731625e-3f + z * 2.443315712e-5f));
+  return upper ? vec2{sine, cosine} : vec2{cosine, sine};
+}
+
+/// The inverse: the angle of (x, y), both at least 0 and not both 0, in quarter turns (Cephes, atanf.c).
+WFPG_HD inline float quarters_of(float x, float y) {
+  const bool upper = y > x;
+  const float r = upper ? x / y : y / x;           // tan of the angle to the nearer axis, in [0,1]
+  const bool steep = r > 0.41421356f;              // tan(pi/8)
+  const float a = steep ? (r - 1.0f) / (r + 1.0f) : r, z = a * a;
+  const float angle =
+      a + a * z * (-3.33329491539e-1f +
+                   z * (1.99777106478e-1f + z * (-1.38776856032e-1f + z * 8.05374449538e-2f)));
+  const float quarters = angle * (2.0f / pi) + (steep ? 0.5f : 0.0f);
+  return upper ? 1.0f - quarters : quarters;
+}
+
 /// A point of the diamond |p.x| + |p.y| <= 1 to the direction above it, z >= 0.
 WFPG_HD inline vec3 diamond_to_hemisphere(vec2 p) {
   const float ax = fabsf(p.x);
   const float ay = fabsf(p.y);
   const float r = min(ax + ay, 1.0f);
-  const float phi = r > 0.0f ? ay / (ax + ay) * (0.5f * pi) : 0.0f;
+  const vec2 turn = quarter_turn(r > 0.0f ? ay / (ax + ay) : 0.0f);
   const float scale = r * sqrtf(2.0f - r * r);
-  return {copysignf(scale * cosf(phi), p.x), copysignf(scale * sinf(phi), p.y), 1.0f - r * r};
+  return {copysignf(scale * turn.x, p.x), copysignf(scale * turn.y, p.y), 1.0f - r * r};
 }
 
 /// The inverse, for d.z >= 0.
@@ -26,7 +50,7 @@ WFPG_HD inline vec2 hemisphere_to_diamond(vec3 d) {
   const float ax = fabsf(d.x);
   const float ay = fabsf(d.y);
   const float r = min(sqrtf((ax * ax + ay * ay) / (1.0f + d.z)), 1.0f);
-  const float y = r > 0.0f ? atan2f(ay, ax) * (2.0f / pi) * r : 0.0f;
+  const float y = r > 0.0f ? quarters_of(ax, ay) * r : 0.0f;
   return {copysignf(r - y, d.x), copysignf(y, d.y)};
 }
 

@@ -79,14 +79,19 @@ struct deposit_paths {
   path_recorder_view paths;
   exitance_cache_view cache;
   WFPG_HD void operator()(std::size_t path) const {
+    const std::uint32_t length = paths.lengths_[path];
+    if (length == 0) return;
+    const std::uint32_t first = cache.reserve(length);
     vec3 arriving(0.0f);
-    for (std::uint32_t depth = paths.lengths_[path]; depth-- > 0;) {
+    for (std::uint32_t depth = length; depth-- > 0;) {
       const std::size_t slot = depth * paths.paths_ + path;
       arriving += paths.contributions_[slot];
       const vec3 t = paths.throughputs_[slot];
       const vec3 leaving{divided(arriving.x, t.x), divided(arriving.y, t.y), divided(arriving.z, t.z)};
-      cache.deposit(paths.positions_[slot], unpack_direction(paths.outgoing_[slot]), leaving);
+      const vec3 outgoing = unpack_direction(paths.outgoing_[slot]);
+      cache.write(first + depth, paths.positions_[slot], outgoing, luminance(leaving));
     }
+    for (std::uint32_t depth = 0; depth < length; ++depth) cache.link(first + depth);
   }
 
  private:

@@ -8,7 +8,7 @@
 
 namespace wfpg {
 
-/// The paper's six ways to combine samples of growing quality.
+/// The paper's six ways to combine samples of growing quality, and one of wfpg's own.
 enum class sample_combination : std::uint8_t {
   constant,       ///< all alike
   linear,         ///< 1, 2, 3, 4, 5, 5, ...
@@ -16,6 +16,7 @@ enum class sample_combination : std::uint8_t {
   one_two,        ///< 1, 2, 2, ...
   discard_first,  ///< 0, 1, 1, ...
   pt_first,       ///< all alike, and the first sample is not guided
+  pt_linear,      ///< linear, and the first sample is not guided: the best of both
 };
 
 /// h(i) of sample i, counted from 1.
@@ -23,6 +24,7 @@ WFPG_HD inline float sample_weight(sample_combination combination, std::uint32_t
   const float rank = i < 5 ? static_cast<float>(i) : 5.0f;
   switch (combination) {
     case sample_combination::linear:
+    case sample_combination::pt_linear:
       return rank;
     case sample_combination::quadratic:
       return rank * rank;
@@ -39,7 +41,7 @@ WFPG_HD inline float sample_weight(sample_combination combination, std::uint32_t
 
 /// Samples at the beginning that a combination wants unguided.
 WFPG_HD inline std::uint32_t unguided_samples(sample_combination combination) {
-  return combination == sample_combination::pt_first ? 1 : 0;
+  return combination == sample_combination::pt_first || combination == sample_combination::pt_linear ? 1 : 0;
 }
 
 }  // namespace wfpg

@@ -15,31 +15,41 @@
 
 namespace wfpg::detail {
 
+/// A leaf's rays, and its deepest marked ancestor or itself; together, since a ray reads both.
+struct leaf_mark {
+  std::uint32_t rays = 0;
+  node_id bin = 0;
+};
+
 /// What a kernel sees of the marks.
 struct bin_marks_view {
   // Counts stop about here, so that 32 bits do not overflow; no threshold is higher.
   static constexpr std::uint32_t most = 0x80000000u;
 
   node_id first_leaf = 0;
-  std::uint32_t* counts = nullptr;  // a node: rays, of inner nodes as of the last marking
-  node_id* bins = nullptr;          // a leaf: its deepest marked ancestor or itself
+  leaf_mark* leaves = nullptr;
+  std::uint32_t* inner = nullptr;  // an inner node: rays, as of the last marking
 
-  WFPG_HD node_id bin(node_id leaf) const { return bins[leaf - first_leaf]; }
+  WFPG_HD node_id bin(node_id leaf) const { return leaves[leaf - first_leaf].bin; }
+  WFPG_HD std::uint32_t rays(node_id node) const {
+    return node < first_leaf ? inner[node] : leaves[node - first_leaf].rays;
+  }
   WFPG_HD void count(node_id leaf) const {
-    if (atomic_load(counts + leaf) < most) atomic_add(counts + leaf, 1);
+    std::uint32_t* const rays = &leaves[leaf - first_leaf].rays;
+    if (atomic_load(rays) < most) atomic_add(rays, 1);
   }
 };
 
 struct sum_counts {
   sparse_voxel_octree_view tree;
   node_id level_begin;
-  std::uint32_t* counts;
+  bin_marks_view marks;
   WFPG_HD void operator()(std::size_t i) const {
     const node_id node = level_begin + static_cast<node_id>(i);
     const node_id first = tree.first_child(node);
     std::uint64_t sum = 0;
-    for (std::uint32_t c = 0; c < tree.child_count(node); ++c) sum += counts[first + c];
-    counts[node] = static_cast<std::uint32_t>(min<std::uint64_t>(sum, 0xffffffffull));
+    for (std::uint32_t c = 0; c < tree.child_count(node); ++c) sum += marks.rays(first + c);
+    marks.inner[node] = static_cast<std::uint32_t>(min<std::uint64_t>(sum, 0xffffffffull));
   }
 };
 
@@ -65,11 +75,11 @@ struct mark_leaves {
   std::uint32_t min_level;
   mark_threshold threshold;
   WFPG_HD void operator()(std::size_t i) const {
-    const std::uint64_t enough = threshold(marks.counts[0]);
+    const std::uint64_t enough = threshold(marks.rays(0));
     const node_id least_end = tree.level_begin(min_level + 1);
     node_id node = marks.first_leaf + static_cast<node_id>(i);
-    while (marks.counts[node] < enough && node >= least_end) node = tree.parent(node);
-    marks.bins[i] = node;
+    while (marks.rays(node) < enough && node >= least_end) node = tree.parent(node);
+    marks.leaves[i].bin = node;
   }
 };
 
@@ -80,32 +90,33 @@ class bin_marks {
  public:
   bin_marks() = default;
   bin_marks(const Exec& exec, const sparse_voxel_octree_view& tree, const binning_options& options)
-      : tree_(tree), options_(options), counts_(exec, tree.node_count()), bins_(exec, tree.leaf_count()) {
+      : tree_(tree), options_(options), leaves_(exec, tree.leaf_count()), inner_(exec, tree.first_leaf()) {
     options_.min_level = min(options_.min_level, tree.depth());
-    ::thrust::fill_n(exec.thrust(), counts_.data(), counts_.size(), 0u);
+    ::thrust::fill_n(exec.thrust(), leaves_.data(), leaves_.size(), leaf_mark{});
+    ::thrust::fill_n(exec.thrust(), inner_.data(), inner_.size(), 0u);
     mark_bins(exec, {1, 1, 0, nullptr});
   }
 
-  bin_marks_view view() const { return {tree_.first_leaf(), counts_.data(), bins_.data()}; }
-  std::size_t bytes() const { return counts_.bytes() + bins_.bytes(); }
+  bin_marks_view view() const { return {tree_.first_leaf(), leaves_.data(), inner_.data()}; }
+  std::size_t bytes() const { return leaves_.bytes() + inner_.bytes(); }
 
   /// Marks anew after `samples` samples. `room`: bins that can have fields; `pressure`: on the device.
   void mark(const Exec& exec, std::uint32_t samples, std::size_t room, const std::uint32_t* pressure) {
     for (std::uint32_t level = tree_.depth(); level-- > 0;)
       exec.for_each(tree_.level_begin(level + 1) - tree_.level_begin(level),
-                    sum_counts{tree_, tree_.level_begin(level), counts_.data()});
+                    sum_counts{tree_, tree_.level_begin(level), view()});
     mark_bins(exec, {options_.rays_per_bin, samples, room, pressure});
   }
 
  private:
   void mark_bins(const Exec& exec, const mark_threshold& threshold) {
-    exec.for_each(bins_.size(), mark_leaves{tree_, view(), options_.min_level, threshold});
+    exec.for_each(leaves_.size(), mark_leaves{tree_, view(), options_.min_level, threshold});
   }
 
   sparse_voxel_octree_view tree_;
   binning_options options_;
-  buffer<std::uint32_t, Exec> counts_;
-  buffer<node_id, Exec> bins_;
+  buffer<leaf_mark, Exec> leaves_;
+  buffer<std::uint32_t, Exec> inner_;
 };
 
 }  // namespace wfpg::detail
