@@ -1,8 +1,9 @@
-// wfpg-demo: path tracing and guided path tracing at equal samples, beside a reference, as pictures and a
-// table.
+// wfpg-demo: path tracing and path tracing guided by transient and by kept fields at equal samples, beside a
+// reference, as pictures, a table, and plots of error over time.
 #include "builtin_scenes.hpp"
 #include "image_io.hpp"
 #include "metrics.hpp"
+#include "plot.hpp"
 #include "progress_bar.hpp"
 #include "render.hpp"
 
@@ -35,8 +36,17 @@ struct demo_scene {
   int reference_pt;  // samples of the reference's two halves, chosen to take about as long
   int reference_wfpg;
 };
-constexpr demo_scene demo_scenes[] = {{"cornell-enclosed", false, 1.0f, 1024, 192},
-                                      {"ajar", true, 1.0f, 1024, 128}};
+constexpr demo_scene demo_scenes[] = {{"cornell-enclosed", false, 1.0f, 1024, 384},
+                                      {"ajar", true, 1.0f, 1024, 384}};
+
+struct demo_method {
+  const char* name;
+  sampling_method method;
+  render::fields lifetime;
+};
+constexpr demo_method demo_methods[] = {{"pt", sampling_method::pt, render::fields::kept},
+                                        {"transient", sampling_method::wfpg, render::fields::transient},
+                                        {"kept", sampling_method::wfpg, render::fields::kept}};
 
 struct method_result {
   const char* method;
@@ -85,14 +95,26 @@ image_error without_noise(image_error error, const image_error& noise) {
   return error;
 }
 
-method_result run_method(const demo_scene& demo, sampling_method method, const reference& truth) {
+method_result run_method(const demo_scene& demo, const demo_method& method, const reference& truth) {
   render_options options;
-  options.method = method;
+  options.method = method.method;
+  options.lifetime = method.lifetime;
   options.spp = samples;
-  const char* name = method == sampling_method::pt ? "pt" : "wfpg";
-  method_result result{name, render_once(demo, name, options), {}};
+  options.checkpoints = true;
+  method_result result{method.name, render_once(demo, method.name, options), {}};
   result.error = without_noise(render::compare(result.rendering.picture, truth.picture), truth.noise);
   return result;
+}
+
+/// Error after 4, 8, 16, ... samples over the seconds that they took.
+render::curve error_over_time(const method_result& result, const reference& truth) {
+  render::curve curve{result.method, {}};
+  for (const render::checkpoint& at : result.rendering.checkpoints) {
+    if (at.samples < 4) continue;
+    const image_error error = without_noise(render::compare(at.picture, truth.picture), truth.noise);
+    curve.points.emplace_back(at.seconds, error.mse_reinhard);
+  }
+  return curve;
 }
 
 image enlarged(const image& picture) {
@@ -110,7 +132,11 @@ double bins_of(const render::render_report& report) {
   return bins;
 }
 
-nlohmann::ordered_json row(const method_result& result, const image_error& pt) {
+double seconds_of(const method_result& result) {
+  return result.rendering.checkpoints.back().seconds;
+}
+
+nlohmann::ordered_json row(const method_result& result, const image_error& pt, double pt_seconds) {
   const render::render_report& report = result.rendering.report;
   return {{"method", result.method},
           {"spp", report.spp},
@@ -118,38 +144,54 @@ nlohmann::ordered_json row(const method_result& result, const image_error& pt) {
           {"ratio_to_pt", pt.mse_reinhard / result.error.mse_reinhard},
           {"relmse_trimmed", result.error.relmse_trimmed},
           {"relmse_trimmed_ratio_to_pt", pt.relmse_trimmed / result.error.relmse_trimmed},
+          {"equal_time_ratio_to_pt",
+           pt_seconds * pt.mse_reinhard / (seconds_of(result) * result.error.mse_reinhard)},
           {"persistent_bytes", report.persistent_bytes},
           {"transient_bytes", report.transient_bytes},
-          {"seconds", report.total_seconds},
+          {"seconds", seconds_of(result)},
           {"bins_a_sample", bins_of(report)},
           {"cones_per_segment", report.cones_per_segment}};
 }
 
 void print_row(const char* scene, const nlohmann::ordered_json& row) {
-  std::printf("%-17s %-6s %4d  %10.3e %6.2f  %10.3e %6.2f  %8.2f %8.2f  %7.1f  %6.0f  %6.2f\n", scene,
+  std::printf("%-17s %-9s %4d  %10.3e %6.2f  %10.3e %6.2f  %8.2f %8.2f  %7.1f %6.2f  %6.0f  %6.2f\n", scene,
               row["method"].get<std::string>().c_str(), row["spp"].get<int>(),
               row["mse_reinhard"].get<double>(), row["ratio_to_pt"].get<double>(),
               row["relmse_trimmed"].get<double>(), row["relmse_trimmed_ratio_to_pt"].get<double>(),
               row["persistent_bytes"].get<double>() / 1048576.0,
               row["transient_bytes"].get<double>() / 1048576.0, row["seconds"].get<double>(),
-              row["bins_a_sample"].get<double>(), row["cones_per_segment"].get<double>());
+              row["equal_time_ratio_to_pt"].get<double>(), row["bins_a_sample"].get<double>(),
+              row["cones_per_segment"].get<double>());
 }
 
 nlohmann::ordered_json run_scene(const demo_scene& demo, const std::filesystem::path& directory) {
+  const auto path = [&](const std::string& what) { return (directory / (demo.name + what)).string(); };
   const reference truth = make_reference(demo);
-  const method_result pt = run_method(demo, sampling_method::pt, truth);
-  const method_result guided = run_method(demo, sampling_method::wfpg, truth);
-  const image strip = render::side_by_side(
-      {enlarged(pt.rendering.picture), enlarged(guided.rendering.picture), enlarged(truth.picture)}, 4);
-  render::write_png((directory / (std::string(demo.name) + ".png")).string(), strip, demo.exposure);
-  render::write_exr((directory / (std::string(demo.name) + "-pt.exr")).string(), pt.rendering.picture);
-  render::write_exr((directory / (std::string(demo.name) + "-wfpg.exr")).string(), guided.rendering.picture);
-  render::write_exr((directory / (std::string(demo.name) + "-reference.exr")).string(), truth.picture);
+  render::write_exr(path("-reference.exr"), truth.picture);
+  std::vector<image> strip;
+  image_error pt;
+  double pt_seconds = 0.0;
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  render::plot plot{demo.name, "seconds", "mean squared error after c / (1 + c)", {}};
+  for (const demo_method& method : demo_methods) {
+    const method_result result = run_method(demo, method, truth);
+    if (method.method == sampling_method::pt) {
+      pt = result.error;
+      pt_seconds = seconds_of(result);
+    }
+    render::write_exr(path(std::string("-") + method.name + ".exr"), result.rendering.picture);
+    strip.push_back(enlarged(result.rendering.picture));
+    rows.push_back(row(result, pt, pt_seconds));
+    plot.curves.push_back(error_over_time(result, truth));
+  }
+  strip.push_back(enlarged(truth.picture));
+  render::write_png(path(".png"), render::side_by_side(strip, 4), demo.exposure);
+  render::write_svg(path("-error.svg"), plot);
   return {{"scene", demo.name},
           {"nee", demo.nee},
           {"size", size},
           {"reference_noise_mse_reinhard", truth.noise.mse_reinhard},
-          {"methods", {row(pt, pt.error), row(guided, pt.error)}}};
+          {"methods", rows}};
 }
 
 void run(const std::filesystem::path& directory) {
@@ -157,17 +199,21 @@ void run(const std::filesystem::path& directory) {
   nlohmann::ordered_json summary = nlohmann::ordered_json::array();
   for (const demo_scene& demo : demo_scenes) summary.push_back(run_scene(demo, directory));
 
-  std::printf("\n%-17s %-6s %4s  %10s %6s  %10s %6s  %8s %8s  %7s  %6s  %6s\n", "scene", "method", "spp",
-              "error", "ratio", "relmse", "ratio", "kept MiB", "temp MiB", "seconds", "bins", "cones");
+  std::printf("\n%-17s %-9s %4s  %10s %6s  %10s %6s  %8s %8s  %7s %6s  %6s  %6s\n", "scene", "method", "spp",
+              "error", "ratio", "relmse", "ratio", "held MiB", "temp MiB", "seconds", "equal", "bins",
+              "cones");
   for (const auto& scene : summary)
     for (const auto& method : scene["methods"]) print_row(scene["scene"].get<std::string>().c_str(), method);
   std::printf(
       "\nerror: MSE after c / (1 + c); relmse: relative MSE without the worst 0.1%% of pixels; both less "
       "the\n"
-      "reference's own noise. ratio: error of pt / error. kept, temp: memory for guiding, across samples "
-      "and\n"
-      "while one is in flight. bins: a sample, all depths. cones: a path segment.\n"
-      "Pictures, left to right pt, wfpg, reference: %s\n",
+      "reference's own noise. ratio: error of pt / error; equal: the same at equal time. held, temp: memory "
+      "for\n"
+      "guiding, across samples and while one is in flight. bins: a sample, all depths, whose fields were "
+      "made.\n"
+      "cones: a path segment. Pictures, left to right pt, transient, kept, reference, and plots of error "
+      "over "
+      "time: %s\n",
       directory.string().c_str());
   std::ofstream file(directory / "summary.json");
   file << summary.dump(2) << '\n';

@@ -32,15 +32,16 @@ struct render_options {
   int max_depth = 0;  ///< segments of a path, positive; 0: the scene's own
   bool nee = true;    ///< next-event estimation toward area lights, with MIS
   std::uint64_t seed = 0;
-  std::uint32_t octree_resolution = 128;  ///< voxels a side, a power of two
-  std::uint32_t field_resolution = 32;    ///< cells a side of transient fields at the first vertex
-  std::uint32_t slot_resolution = 24;     ///< cells a side of kept fields
-  std::uint32_t recast = 8;               ///< a refresh casts one cone in so many again
+  std::uint32_t octree_resolution = 128;             ///< voxels a side, a power of two
+  std::uint32_t field_resolution = 32;               ///< cells a side of transient fields at the first vertex
+  std::uint32_t slot_resolution = 24;                ///< cells a side of kept fields
+  std::uint32_t recast = 8;                          ///< a refresh casts one cone in so many again
   std::size_t field_budget = std::size_t(16) << 20;  ///< bytes of kept fields
-  std::uint32_t rays_per_bin = 64;        ///< c_ray
-  std::uint32_t min_bin_level = 3;        ///< l_min, from the root
-  float guide_fraction = 0.0f;            ///< in [0, 1]; 0: the mode's own
-  std::optional<wfpg::sample_combination> combine;  ///< unset: pt_linear, and all alike for path tracing
+  std::uint32_t rays_per_bin = 64;                   ///< c_ray
+  std::uint32_t min_bin_level = 3;                   ///< l_min, from the root
+  float guide_fraction = 0.0f;                       ///< in [0, 1]; 0: the mode's own
+  bool checkpoints = false;                          ///< keep the pictures after samples 1, 2, 4, 8, ...
+  std::optional<wfpg::sample_combination> combine;   ///< unset: pt_linear, and all alike for path tracing
 };
 
 /// Bins of one depth, means over the samples that were guided; of kept fields, those made or refreshed.
@@ -88,8 +89,16 @@ inline wfpg::sample_combination combination_of(const render_options& options) {
                                                                         : sample_combination::pt_linear);
 }
 
+/// A picture on the way.
+struct checkpoint {
+  int samples = 0;
+  double seconds = 0.0;  ///< of samples so far
+  image picture;
+};
+
 struct render_result {
   image picture;
+  std::vector<checkpoint> checkpoints;  ///< where options ask for them
   render_report report;
 };
 

@@ -35,6 +35,7 @@ class sample_budget {
         least_(combination_of(options) == wfpg::sample_combination::discard_first ? 2 : 1) {}
 
   int samples() const { return samples_; }
+  double seconds() const { return clock_.seconds(); }
   bool is_spent() const { return samples_ >= least_ && fraction() >= 1.0; }
   void count() { ++samples_; }
   render_progress progress() const { return {samples_, std::min(1.0, fraction()), clock_.seconds()}; }
@@ -54,22 +55,27 @@ class sample_budget {
 /// The samples of one rendering, whatever their directions come from.
 template <class Exec, class Guider>
 void take_samples(path_tracer<Exec, embree_caster>& tracer, Guider& guider, const pinhole& camera,
-                  const render_options& options, const progress_callback& progress, render_report& report) {
+                  const render_options& options, const progress_callback& progress, render_result& result) {
   sample_budget budget(options);
   while (!budget.is_spent()) {
     const auto sample = static_cast<std::uint32_t>(budget.samples());
     const float weight = wfpg::sample_weight(combination_of(options), sample + 1);
     tracer.render_sample(guider, camera, sample, weight);
     budget.count();
+    const bool is_power_of_two = (budget.samples() & (budget.samples() - 1)) == 0;
+    if (options.checkpoints && is_power_of_two)
+      result.checkpoints.push_back(
+          {budget.samples(), budget.seconds(), {options.width, options.height, tracer.picture()}});
     if (progress) progress(budget.progress());
   }
-  report.spp = budget.samples();
+  result.report.spp = budget.samples();
 }
 
 inline wfpg::guider_options guider_options_of(const render_options& options) {
   wfpg::guider_options guided;
   guided.octree_resolution = options.octree_resolution;
-  guided.fields = options.lifetime == fields::kept ? wfpg::field_lifetime::kept : wfpg::field_lifetime::transient;
+  guided.fields =
+      options.lifetime == fields::kept ? wfpg::field_lifetime::kept : wfpg::field_lifetime::transient;
   guided.field_resolution = options.field_resolution;
   guided.kept.resolution = options.slot_resolution;
   guided.kept.recast = options.recast;
@@ -105,14 +111,14 @@ render_result render_on(const Exec& exec, const scene& scene, const render_optio
   const pinhole camera(scene.view, options.width, options.height);
   if (options.method == sampling_method::pt) {
     unguided<Exec> guider(exec);
-    take_samples(tracer, guider, camera, options, progress, report);
+    take_samples(tracer, guider, camera, options, progress, result);
   } else {
     const wfpg::triangle_mesh_view mesh{geometry.view().positions, geometry.view().triangles};
     const stopwatch build;
     wfpg::path_guider<Exec> guider(exec, mesh, guider_options_of(options));
     building.add("octree", build.seconds());
     report.octree.build_seconds = build.seconds();
-    take_samples(tracer, guider, camera, options, progress, report);
+    take_samples(tracer, guider, camera, options, progress, result);
     report_guider(guider, tracer.segments(), report);
   }
   result.picture = {options.width, options.height, tracer.picture()};

@@ -34,12 +34,9 @@ json octree_of(const octree_report& octree) {
 }
 
 json slots_of(const slot_report& slots) {
-  return {{"capacity", slots.capacity},
-          {"live", slots.live},
-          {"live_bytes", slots.live_bytes},
-          {"born_per_sample", slots.born},
-          {"freed_per_sample", slots.freed},
-          {"refreshed_per_sample", slots.refreshed}};
+  return {{"capacity", slots.capacity},      {"live", slots.live},
+          {"live_bytes", slots.live_bytes},  {"born_per_sample", slots.born},
+          {"freed_per_sample", slots.freed}, {"refreshed_per_sample", slots.refreshed}};
 }
 
 json error_of(const image_error& error) {

@@ -3,8 +3,8 @@
 // update() sums exactly and folds into running means, so that any order of arrival gives the same bits;
 // averages bottom-up.
 //
-// Memory: 26 bytes a leaf, 11 an inner node; while samples are in flight 8 more a leaf, and 8 a deposit of the
-// queue's capacity.
+// Memory: 26 bytes a leaf, 11 an inner node; while samples are in flight 8 more a leaf, and 8 a deposit of
+// the queue's capacity.
 #pragma once
 
 #include <wfpg/buffer.hpp>
@@ -99,8 +99,8 @@ class exitance_cache_view {
   }
 
   /// The same for several deposits of one thread: reserve() gives the first of n entries in a row; all are
-  /// written, then all are linked. Writing first lets a processor overlap look-ups, which the atomics of linking
-  /// would put in order.
+  /// written, then all are linked. Writing first lets a processor overlap look-ups, which the atomics of
+  /// linking would put in order.
   WFPG_HD std::uint32_t reserve(std::uint32_t n) const {
     return detail::atomic_add(counters_ + counter_queued, n);
   }
@@ -114,7 +114,9 @@ class exitance_cache_view {
       const std::uint32_t key = 2 * (leaf - tree_.first_leaf()) + side_facing(leaf, direction);
       word = std::uint64_t(detail::float_bits(radiance + 0.0f)) << 32 | key;  // + 0: no negative zero
     } else {
-      const auto reason = !valid ? counter_invalid : leaf == invalid_node ? counter_outside : counter_overflow;
+      const auto reason = !valid                 ? counter_invalid
+                          : leaf == invalid_node ? counter_outside
+                                                 : counter_overflow;
       detail::atomic_add(counters_ + reason, 1);
     }
     if (fits) queue_[entry] = word;
@@ -136,7 +138,7 @@ class exitance_cache_view {
   const std::uint16_t* normals_ = nullptr;       // a node
   const std::uint8_t* swapped_sides_ = nullptr;  // an inner node: a bit a child
   const detail::leaf_exitance* leaves_ = nullptr;
-  const float* inner_radiance_ = nullptr;       // an inner node and side; negative: no data
+  const float* inner_radiance_ = nullptr;  // an inner node and side; negative: no data
   std::uint64_t* queue_ = nullptr;   // bits of the radiance above, of the same side's deposit before below
   std::uint32_t* newest_ = nullptr;  // a leaf and side: its last deposit
   std::uint32_t* counters_ = nullptr;
@@ -167,7 +169,8 @@ class exact_sum {
     sum_ += left >= 0 ? mantissa << left : (left > -32 ? mantissa >> -left : 0);
   }
   WFPG_HD double value() const {
-    const std::uint64_t unit = static_cast<std::uint64_t>(1023 + exponent_ - 150 - shift_) << 52;  // a power of 2
+    const std::uint64_t unit = static_cast<std::uint64_t>(1023 + exponent_ - 150 - shift_)
+                               << 52;  // a power of 2
     double scale;
     memcpy(&scale, &unit, sizeof scale);
     return static_cast<double>(sum_) * scale;

@@ -25,8 +25,8 @@ namespace wfpg {
 
 /// How fields are kept.
 struct kept_field_options {
-  std::uint32_t resolution = 24;                     ///< cells along a field's side, in [2, 128]
-  std::uint32_t recast = 8;                          ///< R: a refresh casts one cone in so many again, at least 1
+  std::uint32_t resolution = 24;  ///< cells along a field's side, in [2, 128]
+  std::uint32_t recast = 8;       ///< R: a refresh casts one cone in so many again, at least 1
   std::size_t budget_bytes = std::size_t(16) << 20;  ///< of the slots; one takes about 8 F² + 4 F bytes
   std::uint64_t max_wave_cones = ~0ull;  ///< cones of a wave; what would need more waits, or goes unguided
   std::uint32_t idle_samples = 16;       ///< a slot that no ray used for so many is freed, at least 1
@@ -34,13 +34,13 @@ struct kept_field_options {
 
 /// What a field store tells of itself, since it was made.
 struct kept_field_statistics {
-  std::uint32_t capacity = 0;       ///< slots that the budget holds
-  std::uint32_t live = 0;           ///< slots in use
-  std::size_t bytes_a_slot = 0;     ///< of the budget
-  std::uint64_t born = 0;           ///< slots taken
-  std::uint64_t freed = 0;          ///< slots given back
-  std::uint64_t refreshed = 0;      ///< builds that cast a part of a field's cones
-  std::uint32_t refused = 0;        ///< births refused in the last sample, for want of a free slot
+  std::uint32_t capacity = 0;    ///< slots that the budget holds
+  std::uint32_t live = 0;        ///< slots in use
+  std::size_t bytes_a_slot = 0;  ///< of the budget
+  std::uint64_t born = 0;        ///< slots taken
+  std::uint64_t freed = 0;       ///< slots given back
+  std::uint64_t refreshed = 0;   ///< builds that cast a part of a field's cones
+  std::uint32_t refused = 0;     ///< births refused in the last sample, for want of a free slot
 };
 
 /// What fields are made for in one wave.
@@ -77,9 +77,10 @@ class field_store {
   }
 
   /// Finds or makes the fields of a wave's rays, and refreshes those that are due; what kernels sample from,
-  /// until the next call. A ray without room for its field has its nearest ancestor's, or none. A batch caster
-  /// gets at most `caster_buffer_bytes` of cones at once, and the host reads how many fields are built. Throws
-  /// std::invalid_argument beyond max_rays; what a caster throws, and then the wave's fields are built again.
+  /// until the next call. A ray without room for its field has its nearest ancestor's, or none. A batch
+  /// caster gets at most `caster_buffer_bytes` of cones at once, and the host reads how many fields are
+  /// built. Throws std::invalid_argument beyond max_rays; what a caster throws, and then the wave's fields
+  /// are built again.
   template <class Surfaces, class Caster>
   guide_view prepare(const Exec& exec, const kept_field_wave<Surfaces>& wave, const Caster& caster,
                      std::size_t caster_buffer_bytes);
@@ -138,9 +139,9 @@ class field_store {
   std::uint32_t sample_ = 0;
   detail::bin_marks<Exec> marks_;
   buffer<detail::field_slot, Exec> slots_;
-  buffer<resident_field, Exec> fields_;            // a slot
-  buffer<std::uint32_t, Exec> words_;              // a slot: its distribution
-  buffer<detail::cone_hit, Exec> hits_;            // a slot: its cells
+  buffer<resident_field, Exec> fields_;  // a slot
+  buffer<std::uint32_t, Exec> words_;    // a slot: its distribution
+  buffer<detail::cone_hit, Exec> hits_;  // a slot: its cells
   buffer<std::uint32_t, Exec> table_, wanted_, wanted_through_;
   buffer<std::uint32_t, Exec> free_slots_, list_;  // list: to cast whole, then to refresh
   buffer<std::uint64_t, Exec> through_;            // a slot: scans

@@ -25,12 +25,12 @@ WFPG_HD inline vec2 quarter_turn(float t) {
 /// The inverse: the angle of (x, y), both at least 0 and not both 0, in quarter turns (Cephes, atanf.c).
 WFPG_HD inline float quarters_of(float x, float y) {
   const bool upper = y > x;
-  const float r = upper ? x / y : y / x;           // tan of the angle to the nearer axis, in [0,1]
-  const bool steep = r > 0.41421356f;              // tan(pi/8)
+  const float r = upper ? x / y : y / x;  // tan of the angle to the nearer axis, in [0,1]
+  const bool steep = r > 0.41421356f;     // tan(pi/8)
   const float a = steep ? (r - 1.0f) / (r + 1.0f) : r, z = a * a;
-  const float angle =
-      a + a * z * (-3.33329491539e-1f +
-                   z * (1.99777106478e-1f + z * (-1.38776856032e-1f + z * 8.05374449538e-2f)));
+  const float angle = a + a * z *
+                              (-3.33329491539e-1f +
+                               z * (1.99777106478e-1f + z * (-1.38776856032e-1f + z * 8.05374449538e-2f)));
   const float quarters = angle * (2.0f / pi) + (steep ? 0.5f : 0.0f);
   return upper ? 1.0f - quarters : quarters;
 }
@@ -135,9 +135,9 @@ WFPG_HD inline std::uint32_t pack_direction(vec3 d) {
 
 /// The inverse of pack_direction.
 WFPG_HD inline vec3 unpack_direction(std::uint32_t packed) {
-  return glm::normalize(detail::octahedron_to_direction(
-      {(static_cast<float>(packed & 0xffffu) - 32767.0f) * (1.0f / 32767.0f),
-       (static_cast<float>(packed >> 16) - 32767.0f) * (1.0f / 32767.0f)}));
+  return glm::normalize(
+      detail::octahedron_to_direction({(static_cast<float>(packed & 0xffffu) - 32767.0f) * (1.0f / 32767.0f),
+                                       (static_cast<float>(packed >> 16) - 32767.0f) * (1.0f / 32767.0f)}));
 }
 
 }  // namespace wfpg

@@ -40,7 +40,7 @@ struct guider_options {
       128;  ///< voxels along the scene's longest side; a power of two in [1, 4096]
   guiding_mode mode = guiding_mode::oriented;
   field_lifetime fields = field_lifetime::kept;
-  kept_field_options kept;  ///< resolution, budget and refresh of kept fields
+  kept_field_options kept;          ///< resolution, budget and refresh of kept fields
   std::uint32_t min_bin_level = 3;  ///< l_min: no bin is larger than a node of this level (root 0)
   std::uint32_t rays_per_bin =
       64;  ///< c_ray: rays that make a node a bin, at least 1; in a wave, or with kept fields in a sample
@@ -48,9 +48,8 @@ struct guider_options {
       32;  ///< cells along a transient field's side at depth 0, in [2, 128]; halves at each depth
   std::uint32_t min_field_resolution = 16;  ///< down to this, in [2, 128]
   field_options field;                      ///< filter and floor
-  float guide_fraction =
-      0.0f;  ///< share of guided samples, (0, 1]; 0: 0.5 in plain mode, 0.7 in oriented mode; 0.5 in transient
-             ///< oriented bins of less than c_ray rays
+  float guide_fraction = 0.0f;  ///< share of guided samples, (0, 1]; 0: 0.5 in plain mode, 0.7 in oriented
+                                ///< mode; 0.5 in transient oriented bins of less than c_ray rays
   bool include_emission =
       true;  ///< guide toward emitters themselves; false where next-event estimation finds them
   std::uint32_t unguided_samples =
@@ -93,16 +92,16 @@ class path_guider {
                          array_view<sampled_direction> directions, const Queries& queries = {});
 
   /// The same in two steps: what the renderer's kernels sample from. `w.random` is not read. Holds until the
-  /// next call. Kept fields are only refreshed for it. Transient ones are made resident, in 4 (F² + F) bytes a
-  /// bin of the wave with most bins, and half more.
+  /// next call. Kept fields are only refreshed for it. Transient ones are made resident, in 4 (F² + F) bytes
+  /// a bin of the wave with most bins, and half more.
   template <class Surfaces, class Random, class Caster>
   guide_view prepare(const wave<Surfaces, Random>& w, const Caster& caster);
 
   /// Deposits what was recorded and updates the cache.
   void end_sample();
 
-  /// Geometry moved inside `bounds` (world space, old and new place): kept fields that may see it are cast anew
-  /// when they are next used. Until the octree is built anew the cache knows the old geometry only.
+  /// Geometry moved inside `bounds` (world space, old and new place): kept fields that may see it are cast
+  /// anew when they are next used. Until the octree is built anew the cache knows the old geometry only.
   void invalidate(const bounds3& bounds) {
     if (keeps_fields()) store_.invalidate(exec_, bounds);
   }

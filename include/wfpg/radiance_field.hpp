@@ -234,7 +234,8 @@ struct bin_fields {
     block.for_each(size * size, [&](int i) {
       const auto cell = static_cast<std::uint32_t>(i);
       const ray cone = cells.cone(cell);
-      words.set(i, cells.weigh(cells.find(cache, cone, hits(bin, cell, cone)).radiance(cache), cone.direction));
+      words.set(i,
+                cells.weigh(cells.find(cache, cone, hits(bin, cell, cone)).radiance(cache), cone.direction));
     });
     block.sync();
     const bool hemisphere = cells.origin.hemisphere;

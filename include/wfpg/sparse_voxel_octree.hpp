@@ -3,7 +3,8 @@
 // Construction of BVHs, Octrees, and k-d Trees"). Structure only; what light leaves a node is
 // exitance_cache.hpp's.
 //
-// Memory: 4 bytes a leaf, 9 an inner node, and up to 128 KiB where descents begin. Build: a sort of the fragments and O(nodes).
+// Memory: 4 bytes a leaf, 9 an inner node, and up to 128 KiB where descents begin. Build: a sort of the
+// fragments and O(nodes).
 #pragma once
 
 #include <wfpg/buffer.hpp>
@@ -283,7 +284,7 @@ class sparse_voxel_octree {
   std::uint32_t resolution() const { return view_.grid_.resolution; }
   std::uint32_t node_count() const { return view_.node_count(); }
   std::uint32_t leaf_count() const { return view_.leaf_count(); }
-  std::size_t bytes() const { 
+  std::size_t bytes() const {
     return parents_.bytes() + first_children_.bytes() + child_masks_.bytes() + top_.bytes();
   }
 

@@ -14,9 +14,10 @@ namespace wfpg {
 
 /// Sums over the guided samples so far, of one depth.
 struct depth_statistics {
-  std::uint64_t bins = 0;      ///< whose fields were made; of kept fields, made or refreshed
-  std::uint64_t rays = 0;      ///< in bins
-  std::uint64_t unbinned = 0;  ///< active rays outside every voxel or without room for a field: their BSDF alone
+  std::uint64_t bins = 0;  ///< whose fields were made; of kept fields, made or refreshed
+  std::uint64_t rays = 0;  ///< in bins
+  std::uint64_t unbinned =
+      0;  ///< active rays outside every voxel or without room for a field: their BSDF alone
   std::uint64_t cones = 0;
 };
 

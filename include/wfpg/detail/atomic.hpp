@@ -67,8 +67,8 @@ WFPG_HD inline void atomic_min(std::uint32_t* target, std::uint32_t value) {
   atomicMin(target, value);
 #else
   std::uint32_t before = atomic_load(target);
-  while (value < before && !__atomic_compare_exchange_n(target, &before, value, true, __ATOMIC_RELAXED,
-                                                        __ATOMIC_RELAXED)) {
+  while (value < before &&
+         !__atomic_compare_exchange_n(target, &before, value, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
   }
 #endif
 }
@@ -77,8 +77,8 @@ WFPG_HD inline void atomic_min(std::uint64_t* target, std::uint64_t value) {
   atomicMin(reinterpret_cast<unsigned long long*>(target), static_cast<unsigned long long>(value));
 #else
   std::uint64_t before = atomic_load(target);
-  while (value < before && !__atomic_compare_exchange_n(target, &before, value, true, __ATOMIC_RELAXED,
-                                                        __ATOMIC_RELAXED)) {
+  while (value < before &&
+         !__atomic_compare_exchange_n(target, &before, value, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
   }
 #endif
 }

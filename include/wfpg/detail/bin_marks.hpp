@@ -53,9 +53,9 @@ struct sum_counts {
   }
 };
 
-/// How many rays mark a node: so many that bins hold about c_ray a sample; or as many more as it takes for the
-/// marked nodes' fields to fit the room that there is. A surface has four times the rays one level up, so that
-/// nodes marked by half of c_ray and more hold, in ratio, about c_ray.
+/// How many rays mark a node: so many that bins hold about c_ray a sample; or as many more as it takes for
+/// the marked nodes' fields to fit the room that there is. A surface has four times the rays one level up, so
+/// that nodes marked by half of c_ray and more hold, in ratio, about c_ray.
 struct mark_threshold {
   std::uint32_t rays_per_bin;
   std::uint32_t samples;

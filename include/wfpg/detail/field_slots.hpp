@@ -55,10 +55,10 @@ struct field_slots_view {
 
 /// What the host never has to read in a sample.
 struct field_store_state {
-  std::uint32_t pressure = 2;  ///< see mark_threshold; doubled when births were refused
-  std::uint32_t free = 0;      ///< slots in the list of free ones, made at the beginning of a sample
-  std::uint32_t taken = 0;     ///< of that list
-  std::uint32_t refused_births = 0;         ///< in this sample, for want of a free slot
+  std::uint32_t pressure = 2;        ///< see mark_threshold; doubled when births were refused
+  std::uint32_t free = 0;            ///< slots in the list of free ones, made at the beginning of a sample
+  std::uint32_t taken = 0;           ///< of that list
+  std::uint32_t refused_births = 0;  ///< in this sample, for want of a free slot
   std::uint32_t refused_births_before = 0;  ///< in the sample before
   std::uint32_t refused_since_mark = 0;
   std::uint32_t evicted = 0;  ///< at the beginning of this sample

@@ -146,7 +146,8 @@ void field_store<Exec>::find(const Exec& exec, const kept_field_wave<Surfaces>& 
   using rays_type = detail::wave_rays<Surfaces>;
   const auto n = static_cast<std::uint32_t>(wave.ray_count);
   const detail::use_slot use{view(), field_of_ray_.data(), sample_, wave.seed};
-  exec.for_each(detail::max<std::size_t>(capacity_, 1), detail::begin_store_wave{slots_.view(), state_.data()});
+  exec.for_each(detail::max<std::size_t>(capacity_, 1),
+                detail::begin_store_wave{slots_.view(), state_.data()});
   exec.for_each(n, detail::find_fields<rays_type>{{wave.surfaces, wave.mode},
                                                   tree_,
                                                   marks_.view(),
@@ -159,8 +160,7 @@ void field_store<Exec>::find(const Exec& exec, const kept_field_wave<Surfaces>& 
   exec.for_each(exec::device_count{&state_.data()->missing, n},
                 detail::find_missing_fields{tree_, use, missing_keys_.data(), state_.data()});
   const std::size_t run = detail::count_served::run;
-  exec.for_each_block((n + run - 1) / run, 0,
-                      detail::count_served{{field_of_ray_.data(), n}, state_.data()});
+  exec.for_each_block((n + run - 1) / run, 0, detail::count_served{{field_of_ray_.data(), n}, state_.data()});
 }
 
 /// Gives free slots to wanted keys.
@@ -170,8 +170,12 @@ void field_store<Exec>::bear(const Exec& exec) {
   ::thrust::transform_inclusive_scan(exec.thrust(), wanted_.data(), wanted_.data() + wanted_.size(),
                                      wanted_through_.data(), detail::is_wanted{},
                                      ::thrust::plus<std::uint32_t>());
-  const detail::bear_fields births{view(),       wanted(), wanted_through_.data(), free_slots_.data(),
-                                   state_.data(), options_.max_wave_cones / cells};
+  const detail::bear_fields births{view(),
+                                   wanted(),
+                                   wanted_through_.data(),
+                                   free_slots_.data(),
+                                   state_.data(),
+                                   options_.max_wave_cones / cells};
   exec.for_each(wanted_.size(), births);
   exec.for_each(1, detail::count_births{births, state_.data()});
 }
@@ -215,8 +219,7 @@ void field_store<Exec>::build(const Exec& exec, const Builder& builder, const Ca
       const buffer<ray_hit, Exec> found(exec, cones.size());
       for (std::size_t at = 0; at < listed; at += at_once) {
         const std::size_t n = detail::min(at_once, listed - at);
-        exec.for_each_block(n, 0,
-                            detail::write_kept_cones<Builder>{builder, cones.view(), list + at, whole});
+        exec.for_each_block(n, 0, detail::write_kept_cones<Builder>{builder, cones.view(), list + at, whole});
         caster.cast(exec, array_view<const ray>(cones.data(), n * cones_a_field),
                     array_view<ray_hit>(found.data(), n * cones_a_field));
         const detail::stored_hits hits{found.view(), 0, cones_a_field};

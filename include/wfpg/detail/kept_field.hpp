@@ -12,8 +12,9 @@ WFPG_HD constexpr std::uint32_t refresh_cones(std::uint32_t resolution, std::uin
   return (resolution * resolution + recast - 1) / recast;
 }
 
-/// The cell of a refresh's cone: one in each run of `recast` cells, another each time, and shifted from run to
-/// run by the golden ratio so that rows are covered evenly. After `recast` refreshes every cell has been cast.
+/// The cell of a refresh's cone: one in each run of `recast` cells, another each time, and shifted from run
+/// to run by the golden ratio so that rows are covered evenly. After `recast` refreshes every cell has been
+/// cast.
 WFPG_HD constexpr std::uint32_t refreshed_cell(std::uint32_t cone, std::uint32_t refresh,
                                                std::uint32_t resolution, std::uint32_t recast) {
   const std::uint32_t begin = cone * recast;

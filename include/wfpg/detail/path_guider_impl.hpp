@@ -127,13 +127,7 @@ detail::bin_fields<Surfaces> path_guider<Exec>::bin_wave(const wave<Surfaces, Ra
       binner_.bin(exec_, w.ray_count, detail::wave_rays<Surfaces>{w.surfaces, options_.mode});
   const std::uint32_t size = field_resolution(w.depth);
   exec_.for_each(1, detail::add_counts{bins, binner_.unbinned(), size * size, depth_counts(w.depth)});
-  return {bins,
-          w.surfaces,
-          cache_.view(),
-          options_.field,
-          options_.mode,
-          size,
-          wave_seed(w.depth)};
+  return {bins, w.surfaces, cache_.view(), options_.field, options_.mode, size, wave_seed(w.depth)};
 }
 
 template <class Exec>
@@ -181,8 +175,8 @@ guide_view path_guider<Exec>::keep_wave(const wave<Surfaces, Random>& w, const C
     store_.count(exec_, w.ray_count, detail::wave_rays<Surfaces>{w.surfaces, options_.mode});
     return {};
   }
-  const kept_field_wave<Surfaces> wave{w.ray_count,   w.surfaces,    cache_.view(),
-                                       options_.field, options_.mode, fraction().with_enough_rays,
+  const kept_field_wave<Surfaces> wave{w.ray_count,       w.surfaces,    cache_.view(),
+                                       options_.field,    options_.mode, fraction().with_enough_rays,
                                        wave_seed(w.depth)};
   const guide_view view = store_.prepare(exec_, wave, caster, options_.caster_buffer_bytes);
   exec_.for_each(1, detail::add_kept_counts{store_.state(), store_.resolution() * store_.resolution(),
