@@ -10,17 +10,27 @@
 #include <vector>
 
 using namespace wfpg_test;
+using wfpg::field_lifetime;
 using wfpg::guider_options;
 using wfpg::guiding_mode;
 
 namespace {
 
+/// What a guider may keep across samples.
+template <class Exec>
+std::size_t most_persistent(const wfpg::path_guider<Exec>& guider) {
+  const std::size_t nodes = guider.octree().node_count(), leaves = guider.octree().leaf_count();
+  const bool kept = guider.options().fields == field_lifetime::kept;
+  return 28 * nodes + (std::size_t(128) << 10) +
+         (kept ? guider.options().kept.budget_bytes + 4 * (nodes + leaves) : 0);
+}
+
 WFPG_TEST_CASE("path guider: memory() is what it holds of its resource, by part", "[path_guider]") {
   counting_resource resource;
   const Exec exec(&resource);
-  {
+  for (field_lifetime lifetime : lifetimes) {
     const box_mesh<Exec> mesh(exec);
-    guider_options options = tracing_options(300);
+    guider_options options = tracing_options(300, guiding_mode::oriented, lifetime);
     options.octree_resolution = 64;
     const std::size_t mesh_bytes = resource.bytes_in_use;
     wfpg::path_guider<Exec> guider(exec, mesh.view(), options);
@@ -29,59 +39,72 @@ WFPG_TEST_CASE("path guider: memory() is what it holds of its resource, by part"
       CHECK(memory.persistent() + memory.transient() == resource.bytes_in_use - mesh_bytes);
       std::set<std::string> names;
       for (const wfpg::memory_part& part : memory.parts) names.insert(part.name);
-      CHECK(names ==
-            std::set<std::string>{"octree", "cache", "deposits", "paths", "binning", "fields", "scratch"});
-      CHECK(memory.persistent() <= 28 * std::size_t(guider.octree().node_count()));
-      for (const wfpg::memory_part& part : memory.parts)
+      CHECK(names == std::set<std::string>{"octree", "cache", "kept fields", "levels", "deposits", "paths",
+                                           "binning", "fields", "scratch"});
+      CHECK(memory.persistent() <= most_persistent(guider));
+      for (const wfpg::memory_part& part : memory.parts) {
         if (part.name == std::string("paths")) CHECK(part.bytes <= 300 * 3 * 40 + 300 * 4 + 64);
+        if (part.name == std::string("kept fields"))
+          CHECK((part.bytes > 0) == (lifetime == field_lifetime::kept));
+      }
       trace_paths(exec, guider, 1, 300, box_caster{});
     }
   }
   CHECK(resource.bytes_in_use == 0);
 }
 
-WFPG_TEST_CASE("path guider: nothing is allocated after the first guided sample", "[path_guider]") {
+/// Other bins every time, and a third more of them after the first.
+std::vector<test_surface> unlike_wave(std::uint32_t sample, std::uint32_t depth) {
+  auto surfaces = wall_surfaces(512, 10 * sample + depth);
+  for (std::size_t i = 0; sample == 0 && i < 140; ++i) surfaces[i] = surfaces[140];
+  return surfaces;
+}
+
+/// Allocations after the first of 8 samples. Forms: fused and prepared, with an inline and a batch caster.
+template <class Exec>
+std::size_t late_allocations(const guider_options& options, int form) {
   counting_resource resource;
   const Exec exec(&resource);
   const box_mesh<Exec> mesh(exec);
   batch_box_caster::log log;
-  // Other bins every time, and a third more of them after the first.
-  const auto wave = [](std::uint32_t sample, std::uint32_t depth) {
-    auto surfaces = wall_surfaces(512, 10 * sample + depth);
-    for (std::size_t i = 0; sample == 0 && i < 140; ++i) surfaces[i] = surfaces[140];
-    return surfaces;
-  };
-  for (int form = 0; form < 4; ++form) {
-    guider_options options = box_options();
-    options.max_rays = 512;
-    options.rays_per_bin = 3;
-    wfpg::path_guider<Exec> guider(exec, mesh.view(), options);
-    std::vector<wfpg::sampled_direction> host(512);
-    const wfpg::array_view<wfpg::sampled_direction> directions(host.data(), host.size());
-    std::size_t after_first = 0;
-    for (std::uint32_t sample = 0; sample < 8; ++sample) {
-      guider.begin_sample();
-      for (std::uint32_t depth = 0; depth < 2; ++depth) {
-        const auto surfaces = wave(sample, depth);
-        const wfpg::wave rays{depth, surfaces.size(), stored_surfaces{{surfaces.data(), surfaces.size()}},
-                              hashed_numbers{sample}};
-        const batch_box_caster batch{{}, &log};
-        if (form == 0) guider.sample_directions(rays, box_caster{}, directions);
-        if (form == 1) guider.sample_directions(rays, batch, directions);
-        if (form == 2) CHECK(guider.prepare(rays, box_caster{}).guides(0));
-        if (form == 3) CHECK(guider.prepare(rays, batch).guides(0));
-      }
-      deposit_on_walls(guider.cache(), 40, [](std::uint32_t, float, float) { return 1.0f; });
-      guider.end_sample();
-      if (sample == 0) after_first = resource.allocations;
+  wfpg::path_guider<Exec> guider(exec, mesh.view(), options);
+  std::vector<wfpg::sampled_direction> host(512);
+  const wfpg::array_view<wfpg::sampled_direction> directions(host.data(), host.size());
+  std::size_t after_first = 0;
+  for (std::uint32_t sample = 0; sample < 8; ++sample) {
+    guider.begin_sample();
+    for (std::uint32_t depth = 0; depth < 2; ++depth) {
+      const auto surfaces = unlike_wave(sample, depth);
+      const wfpg::wave rays{depth, surfaces.size(), stored_surfaces{{surfaces.data(), surfaces.size()}},
+                            hashed_numbers{sample}};
+      const batch_box_caster batch{{}, &log};
+      if (form == 0) guider.sample_directions(rays, box_caster{}, directions);
+      if (form == 1) guider.sample_directions(rays, batch, directions);
+      if (form == 2) guider.prepare(rays, box_caster{});
+      if (form == 3) guider.prepare(rays, batch);
     }
-    INFO("form " << form);
-    CHECK(resource.allocations == after_first);
+    deposit_on_walls(guider.cache(), 40, [](std::uint32_t, float, float) { return 1.0f; });
+    guider.end_sample();
+    if (sample == 0) after_first = resource.allocations;
   }
+  return resource.allocations - after_first;
+}
+
+WFPG_TEST_CASE("path guider: nothing is allocated after the first guided sample", "[path_guider]") {
+  for (field_lifetime lifetime : lifetimes)
+    for (int form = 0; form < 4; ++form)
+      for (std::size_t budget : {std::size_t(3) << 16, std::size_t(3) << 20}) {
+        guider_options options = box_options(guiding_mode::oriented, lifetime);
+        options.max_rays = 512;
+        options.rays_per_bin = 3;
+        options.kept.budget_bytes = budget;
+        INFO(name_of(lifetime) << ", form " << form << ", budget " << budget);
+        CHECK(late_allocations<Exec>(options, form) == 0);
+      }
 }
 
 WFPG_TEST_CASE("path guider: statistics count bins, rays and cones by depth", "[path_guider]") {
-  guided_box<Exec> box;
+  guided_box<Exec> box(field_lifetime::transient);
   CHECK(box.guider.statistics().samples == 0);
   CHECK(box.guider.statistics().build.skipped() == 0);
   box.learn();
@@ -113,6 +136,42 @@ WFPG_TEST_CASE("path guider: statistics count bins, rays and cones by depth", "[
   }
   CHECK(statistics.seconds.size() == 5);
   CHECK(seconds > 0.0);
+}
+
+WFPG_TEST_CASE("path guider: statistics count fields that are made or refreshed, and slots",
+               "[path_guider]") {
+  guided_box<Exec> box;
+  box.learn();
+  const auto surfaces = wall_surfaces(600, 7);
+  box.sample_again(surfaces);
+  const auto first = box.guider.statistics();
+  CHECK(first.kept.born > 20);
+  CHECK(first.kept.live == first.kept.born);
+  CHECK(first.kept.capacity == (std::size_t(4) << 20) / first.kept.bytes_a_slot);
+  CHECK(first.depths[0].bins == first.kept.born);
+  CHECK(first.depths[0].cones == first.kept.born * 256);
+  CHECK(first.depths[0].rays + first.depths[0].unbinned == 4 * 600);
+  CHECK(first.depths[0].rays > 3 * 600);
+  CHECK(first.kept.refreshed == 0);
+  CHECK(first.kept.refused == 0);
+  box.guider.begin_sample();
+  for (std::uint32_t depth : {1u, 0u, 30u}) box.sample(surfaces, box_caster{}, 1, depth);
+  const auto second = box.guider.statistics();
+  CHECK(second.guided_samples == 2);
+  CHECK(second.depths[1].bins == first.kept.born);
+  CHECK(second.depths[1].cones == first.kept.born * 256 / 8);
+  CHECK(second.depths[1].rays == 600);
+  CHECK(second.depths[0].cones == first.depths[0].cones);
+  CHECK(second.depths.back().rays == 600);
+  CHECK(second.kept.refreshed == first.kept.born);
+  CHECK(second.kept.born == first.kept.born);
+  CHECK(second.kept.freed == 0);
+
+  guided_box<Exec> transient(field_lifetime::transient);
+  transient.learn();
+  transient.sample(surfaces);
+  CHECK(transient.guider.statistics().kept.capacity == 0);
+  CHECK(transient.guider.statistics().kept.born == 0);
 }
 
 WFPG_TEST_CASE("path guider: a build report tells what of the mesh was left out", "[path_guider]") {

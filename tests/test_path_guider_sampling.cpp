@@ -13,6 +13,7 @@
 #include <vector>
 
 using namespace wfpg_test;
+using wfpg::field_lifetime;
 using wfpg::guider_options;
 using wfpg::guiding_mode;
 using wfpg::sampled_direction;
@@ -71,50 +72,73 @@ int count_guided(const std::vector<sampled_direction>& drawn) {
   return n;
 }
 
+/// All options that forms should agree under.
+std::vector<guider_options> kinds_of_guiding() {
+  std::vector<guider_options> kinds;
+  for (guiding_mode mode : modes)
+    for (field_lifetime lifetime : lifetimes) kinds.push_back(box_options(mode, lifetime));
+  return kinds;
+}
+
+std::string describe(const guider_options& options) {
+  return std::string(options.mode == guiding_mode::plain ? "plain, " : "oriented, ") +
+         name_of(options.fields);
+}
+
 WFPG_TEST_CASE("path guider: both forms draw the same directions from the same numbers, bit for bit",
                "[path_guider]") {
-  for (guiding_mode mode : modes) {
-    guider_options options = box_options(mode);
+  for (guider_options options : kinds_of_guiding()) {
     options.rays_per_bin = 8;  // bins with more and with fewer rays than these
-    guided_box<Exec> box(options);
-    box.learn();
+    guided_box<Exec> fused(options), prepared(options), batch(options), prepared_batch(options);
+    for (guided_box<Exec>* box : {&fused, &prepared, &batch, &prepared_batch}) box->learn();
     const auto surfaces = mixed_surfaces(700, 4);
-    const wfpg::buffer<test_surface, Exec> stored(box.exec, surfaces);
-    for (std::uint32_t depth : {0u, 1u, 7u}) {
-      const auto fused = box.sample(surfaces, box_caster{}, 1, depth);
-      CHECK(count_guided(fused) > 150);
-      CHECK(same_bits(sample_prepared(box, stored, box_caster{}, depth), fused));
-      batch_box_caster::log log;
-      CHECK(same_bits(sample_prepared(box, stored, batch_box_caster{{}, &log}, depth), fused));
-      CHECK(same_bits(box.sample(surfaces, batch_box_caster{{}, &log}, 1, depth), fused));
+    const wfpg::buffer<test_surface, Exec> stored(fused.exec, surfaces);
+    batch_box_caster::log log;
+    const batch_box_caster caster{{}, &log};
+    for (int sample = 0; sample < 3; ++sample) {
+      for (std::uint32_t depth : {0u, 1u, 7u}) {
+        INFO(describe(options) << ", sample " << sample << ", depth " << depth);
+        const auto expected = fused.sample(surfaces, box_caster{}, 1, depth);
+        CHECK(count_guided(expected) > 150);
+        CHECK(same_bits(sample_prepared(prepared, stored, box_caster{}, depth), expected));
+        CHECK(same_bits(sample_prepared(prepared_batch, stored, caster, depth), expected));
+        CHECK(same_bits(batch.sample(surfaces, caster, 1, depth), expected));
+      }
+      for (guided_box<Exec>* box : {&fused, &prepared, &batch, &prepared_batch}) {
+        box->guider.end_sample();
+        box->guider.begin_sample();
+      }
     }
   }
 }
 
 WFPG_TEST_CASE("path guider: both forms agree where nothing guides yet", "[path_guider]") {
-  guider_options options = box_options();
-  options.unguided_samples = 1;
-  guided_box<Exec> box(options);
-  box.guider.begin_sample();
-  CHECK(!box.guider.guided());
-  const auto surfaces = mixed_surfaces(200, 4);
-  const wfpg::buffer<test_surface, Exec> stored(box.exec, surfaces);
-  const auto fused = box.sample(surfaces);
-  CHECK(count_guided(fused) == 0);
-  CHECK(same_bits(sample_prepared(box, stored, box_caster{}, 0), fused));
-  box.guider.end_sample();
-  box.guider.begin_sample();
-  CHECK(box.guider.guided());
-  CHECK(count_guided(box.sample(surfaces)) > 20);
+  for (guider_options options : kinds_of_guiding()) {
+    INFO(describe(options));
+    options.unguided_samples = 1;
+    guided_box<Exec> box(options);
+    box.guider.begin_sample();
+    CHECK(!box.guider.guided());
+    const auto surfaces = mixed_surfaces(200, 4);
+    const wfpg::buffer<test_surface, Exec> stored(box.exec, surfaces);
+    const auto fused = box.sample(surfaces);
+    CHECK(count_guided(fused) == 0);
+    CHECK(same_bits(sample_prepared(box, stored, box_caster{}, 0), fused));
+    box.guider.end_sample();
+    box.guider.begin_sample();
+    CHECK(box.guider.guided());
+    CHECK(count_guided(box.sample(surfaces)) > 20);
+  }
 }
 
 WFPG_TEST_CASE("path guider: queries are answered with the density that sampling has", "[path_guider]") {
-  for (guiding_mode mode : modes) {
-    guided_box<Exec> box(box_options(mode));
+  for (const guider_options& options : kinds_of_guiding()) {
+    INFO(describe(options));
+    guided_box<Exec> box(options);
     box.learn();
     const auto surfaces = mixed_surfaces(700, 5);
     const wfpg::buffer<test_surface, Exec> stored(box.exec, surfaces);
-    const auto drawn = box.sample(surfaces);
+    const auto drawn = box.sample_again(surfaces);
     std::vector<vec3> asked;
     for (const sampled_direction& d : drawn) asked.push_back(asked.size() % 10 ? d.direction : vec3(0.0f));
     const wfpg::buffer<vec3, Exec> queries(box.exec, asked);
@@ -142,10 +166,16 @@ WFPG_TEST_CASE("path guider: queries are answered with the density that sampling
   }
 }
 
+/// The share of guided samples by default: less for few rays of a transient field.
+float default_share(const guider_options& options, bool many_rays) {
+  if (options.mode == guiding_mode::plain) return 0.5f;
+  return many_rays || options.fields == field_lifetime::kept ? 0.7f : 0.5f;
+}
+
 WFPG_TEST_CASE("path guider: densities are the mixture's of field and BSDF", "[path_guider]") {
-  for (guiding_mode mode : modes)
+  for (guider_options options : kinds_of_guiding())
     for (float fraction : {0.0f, 0.25f, 1.0f}) {
-      guider_options options = box_options(mode);
+      INFO(describe(options) << ", fraction " << fraction);
       options.guide_fraction = fraction;
       options.rays_per_bin = 400;
       options.min_bin_level = 1;
@@ -153,13 +183,11 @@ WFPG_TEST_CASE("path guider: densities are the mixture's of field and BSDF", "[p
       box.learn();
       std::vector<test_surface> surfaces(450, make_surface({0.4f, 0, 0.4f}, {0, 1, 0}, {0, 1, 0}));
       surfaces.resize(460, make_surface({1, 0.1f, 0.1f}, {-1, 0, 0}, {-1, 0, 0}));
-      const auto drawn = box.sample(surfaces);
+      const auto drawn = box.sample_again(surfaces);
       const wave_of_surfaces<Exec> wave(box.exec, surfaces);
       const wfpg::guide_view view = box.guider.prepare(wave.get(), box_caster{});
       for (std::uint32_t ray : {0u, 7u, 455u}) {
-        const bool many = ray < 450 || mode == guiding_mode::plain;
-        const float by_mode = mode == guiding_mode::plain || !many ? 0.5f : 0.7f;
-        const float share = fraction > 0.0f ? fraction : by_mode;
+        const float share = fraction > 0.0f ? fraction : default_share(options, ray < 450);
         const vec3 d = drawn[ray].direction;
         const float of_bsdf = surfaces[ray].bsdf.pdf(surfaces[ray].outgoing, d);
         CHECK(drawn[ray].pdf == Approx(share * view.pdf(ray, d) + (1.0f - share) * of_bsdf));
@@ -169,6 +197,56 @@ WFPG_TEST_CASE("path guider: densities are the mixture's of field and BSDF", "[p
       }
       if (fraction == 1.0f) CHECK(count_guided(drawn) == 460);
     }
+}
+
+/// How probable a direction of a ray's field is to meet the patch: a midpoint rule over the patch.
+double patch_probability(const wfpg::guide_view& view, std::uint32_t ray, vec3 from) {
+  constexpr int n = 60;
+  const double step = (double(patch_high) - double(patch_low)) / n;
+  double sum = 0.0;
+  for (int i = 0; i < n * n; ++i) {
+    const double x = double(patch_low) + (i % n + 0.5) * step, z = double(patch_low) + (i / n + 0.5) * step;
+    const vec3 to = vec3(float(x), 1.0f, float(z)) - from;
+    const double square = double(glm::dot(to, to));
+    sum += double(view.pdf(ray, glm::normalize(to))) * std::abs(double(to.y)) / std::pow(square, 1.5);
+  }
+  return sum * step * step;
+}
+
+/// Mean of a ray's probability over samples, after a few to settle.
+template <class Exec>
+std::vector<double> mean_patch_probability(const guider_options& options,
+                                           const std::vector<test_surface>& surfaces, std::uint32_t rays) {
+  guided_box<Exec> box(options);
+  box.learn();
+  const wave_of_surfaces<Exec> wave(box.exec, surfaces);
+  std::vector<double> mean(rays, 0.0);
+  for (int sample = 0; sample < 16; ++sample) {
+    const wfpg::guide_view view = box.guider.prepare(wave.get(), box_caster{});
+    for (std::uint32_t i = 0; sample >= 4 && i < rays; ++i)
+      mean[i] += patch_probability(view, i, surfaces[i].position) / 12.0;
+    box.guider.end_sample();
+    box.guider.begin_sample();
+  }
+  return mean;
+}
+
+WFPG_TEST_CASE("path guider: kept fields find the patch as transient ones do", "[path_guider]") {
+  const vec3 places[] = {{0.2f, 0, 0.3f}, {0.6f, 0, 0.7f}, {0.0f, 0.3f, 0.6f}, {0.4f, 0.2f, 0.0f}};
+  const vec3 normals[] = {{0, 1, 0}, {0, 1, 0}, {1, 0, 0}, {0, 0, 1}};
+  std::vector<test_surface> surfaces;
+  for (int i = 0; i < 400; ++i)
+    surfaces.push_back(make_surface(places[i % 4], normals[i % 4], normals[i % 4]));
+  for (guiding_mode mode : modes) {
+    const auto kept = mean_patch_probability<Exec>(box_options(mode), surfaces, 4);
+    const auto transient =
+        mean_patch_probability<Exec>(box_options(mode, field_lifetime::transient), surfaces, 4);
+    for (std::size_t i = 0; i < 4; ++i) {
+      INFO("place " << i << ", " << kept[i] << " kept, " << transient[i] << " transient");
+      CHECK(kept[i] > 0.03);  // of uniform directions 0.003 and less
+      CHECK(kept[i] == Approx(transient[i]).epsilon(0.25));
+    }
+  }
 }
 
 struct estimate {
@@ -210,107 +288,127 @@ WFPG_TEST_CASE("path guider: guided estimates have no bias and less variance", "
     guided_box<Exec> reference(unguided);
     const estimate bsdf = estimate_irradiance(reference, kind);
     CHECK(std::abs(bsdf.z) < 4.0);
-    for (guiding_mode mode : modes) {
-      guided_box<Exec> box(box_options(mode));
+    for (const guider_options& options : kinds_of_guiding()) {
+      guided_box<Exec> box(options);
       box.learn();
       const estimate guided = estimate_irradiance(box, kind);
-      INFO("z " << guided.z << ", variance " << guided.variance << " guided, " << bsdf.variance << " not");
+      INFO(describe(options) << ", z " << guided.z << ", variance " << guided.variance << " guided, "
+                             << bsdf.variance << " not");
       CHECK(std::abs(guided.z) < 4.0);
       CHECK(guided.variance < 0.5 * bsdf.variance);
     }
   }
 }
 
-WFPG_TEST_CASE("path guider: paths that learn as they go agree with unguided ones", "[path_guider]") {
+/// A mean over paths, and its standard error.
+struct mean_radiance {
+  double mean = 0.0, error = 0.0;
+};
+
+template <class Exec>
+mean_radiance trace_mean(guider_options options, bool guided) {
   constexpr std::size_t paths = 256;
   constexpr std::uint32_t samples = 24;
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
-  double mean[3], error[3];
-  for (int run = 0; run < 3; ++run) {
-    guider_options options = tracing_options(paths, modes[run % 2]);
-    if (run == 2) options.unguided_samples = samples;
-    wfpg::path_guider<Exec> guider(exec, mesh.view(), options);
-    double sum = 0.0, squares = 0.0;
-    for (float radiance : trace_paths(exec, guider, samples, paths, box_caster{})) {
-      sum += double(radiance);
-      squares += double(radiance) * double(radiance);
+  if (!guided) options.unguided_samples = samples;
+  wfpg::path_guider<Exec> guider(exec, mesh.view(), options);
+  double sum = 0.0, squares = 0.0;
+  for (float radiance : trace_paths(exec, guider, samples, paths, box_caster{})) {
+    sum += double(radiance);
+    squares += double(radiance) * double(radiance);
+  }
+  CHECK(guider.statistics().guided_samples == (guided ? samples - 1 : 0));
+  CHECK(guider.statistics().deposits.total() == 0);
+  const double n = double(paths) * samples, mean = sum / n;
+  return {mean, std::sqrt((squares / n - mean * mean) / n)};
+}
+
+WFPG_TEST_CASE("path guider: paths that learn as they go agree with unguided ones", "[path_guider]") {
+  const mean_radiance unguided = trace_mean<Exec>(tracing_options(256), false);
+  for (guiding_mode mode : modes)
+    for (field_lifetime lifetime : lifetimes) {
+      const mean_radiance guided = trace_mean<Exec>(tracing_options(256, mode, lifetime), true);
+      INFO(describe(tracing_options(1, mode, lifetime))
+           << ": " << guided.mean << " +- " << guided.error << " guided, " << unguided.mean << " +- "
+           << unguided.error << " not");
+      CHECK(std::abs(guided.mean - unguided.mean) < 4.0 * std::hypot(guided.error, unguided.error));
+      // Plain transient fields hardly gain where so few rays share a bin.
+      CHECK(guided.error < (mode == guiding_mode::plain ? 1.2 : 1.0) * unguided.error);
     }
-    const double n = double(paths) * samples;
-    mean[run] = sum / n;
-    error[run] = std::sqrt((squares / n - mean[run] * mean[run]) / n);
-    CHECK(guider.statistics().guided_samples == (run == 2 ? 0 : samples - 1));
-    CHECK(guider.statistics().deposits.total() == 0);
-  }
-  for (int run = 0; run < 2; ++run) {
-    INFO(mean[run] << " +- " << error[run] << " guided, " << mean[2] << " +- " << error[2] << " not");
-    CHECK(std::abs(mean[run] - mean[2]) < 4.0 * std::hypot(error[run], error[2]));
-    CHECK(error[run] < error[2]);
-  }
 }
 
 /// What a guider does over samples and depths, from a seed.
 template <class Exec>
-std::vector<float> picture(std::uint64_t seed, bool batch = false) {
+std::vector<float> picture(std::uint64_t seed, field_lifetime lifetime, bool batch = false) {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
-  guider_options options = tracing_options(800);
+  guider_options options = tracing_options(800, guiding_mode::oriented, lifetime);
   options.octree_resolution = 4;  // many deposits in one voxel, whose order threads change
   options.seed = seed;
   wfpg::path_guider<Exec> guider(exec, mesh.view(), options);
   batch_box_caster::log log;
-  return batch ? trace_paths(exec, guider, 3, 800, batch_box_caster{{}, &log})
-               : trace_paths(exec, guider, 3, 800, box_caster{});
+  return batch ? trace_paths(exec, guider, 4, 800, batch_box_caster{{}, &log})
+               : trace_paths(exec, guider, 4, 800, box_caster{});
 }
 
 WFPG_TEST_CASE("path guider: one seed gives the same bits on any number of threads", "[path_guider]") {
-  const std::vector<float> first = picture<Exec>(1);
-  CHECK(picture<Exec>(1) == first);
-  CHECK(picture<Exec>(1, true) == first);
-  CHECK(picture<Exec>(2) != first);
-  for (std::size_t threads : {1, 2, 5}) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    tbb::task_arena arena(static_cast<int>(threads));
-    INFO(threads << " TBB threads");
-    CHECK(arena.execute([] { return picture<Exec>(1); }) == first);
-  }
+  for (field_lifetime lifetime : lifetimes) {
+    INFO(name_of(lifetime));
+    const std::vector<float> first = picture<Exec>(1, lifetime);
+    CHECK(picture<Exec>(1, lifetime) == first);
+    CHECK(picture<Exec>(1, lifetime, true) == first);
+    CHECK(picture<Exec>(2, lifetime) != first);
+    for (std::size_t threads : {1, 2, 5}) {
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+      tbb::task_arena arena(static_cast<int>(threads));
+      INFO(threads << " TBB threads");
+      CHECK(arena.execute([&] { return picture<Exec>(1, lifetime); }) == first);
+    }
 #if !defined(WFPG_TEST_ONLY_TBB)
-  const int before = omp_get_max_threads();
-  for (int threads : {1, 2, 5}) {
-    omp_set_num_threads(threads);
-    INFO(threads << " OpenMP threads");
-    CHECK(picture<Exec>(1) == first);
-  }
-  omp_set_num_threads(before);
+    const int before = omp_get_max_threads();
+    for (int threads : {1, 2, 5}) {
+      omp_set_num_threads(threads);
+      INFO(threads << " OpenMP threads");
+      CHECK(picture<Exec>(1, lifetime) == first);
+    }
+    omp_set_num_threads(before);
 #endif
+  }
 }
 
 }  // namespace
 
 #if !defined(WFPG_TEST_ONLY_TBB)
 TEST_CASE("path guider: policies of one warp width give the same bits", "[path_guider]") {
-  const std::vector<float> serial = picture<wfpg::exec::seq>(1);
-  CHECK(picture<wfpg::exec::omp>(1) == serial);
-  CHECK(picture<wfpg::exec::tbb>(1) == serial);
-  CHECK(picture<wfpg::exec::basic_omp<8>>(1) == picture<wfpg::exec::basic_seq<8>>(1));
-  CHECK(picture<wfpg::exec::basic_tbb<8>>(1) == picture<wfpg::exec::basic_seq<8>>(1));
+  for (field_lifetime lifetime : lifetimes) {
+    INFO(name_of(lifetime));
+    const std::vector<float> serial = picture<wfpg::exec::seq>(1, lifetime);
+    CHECK(picture<wfpg::exec::omp>(1, lifetime) == serial);
+    CHECK(picture<wfpg::exec::tbb>(1, lifetime) == serial);
+    const std::vector<float> narrow = picture<wfpg::exec::basic_seq<8>>(1, lifetime);
+    CHECK(picture<wfpg::exec::basic_omp<8>>(1, lifetime) == narrow);
+    CHECK(picture<wfpg::exec::basic_tbb<8>>(1, lifetime) == narrow);
+  }
 }
 
 TEST_CASE("path guider: guiders of several policies live side by side", "[path_guider]") {
-  guided_box<wfpg::exec::seq> serial;
-  guided_box<wfpg::exec::omp> openmp;
-  guided_box<wfpg::exec::tbb> threads;
-  guided_box<wfpg::exec::tbb> another(box_options(guiding_mode::plain));
-  serial.learn();
-  another.learn();
-  openmp.learn();
-  threads.learn();
-  const auto surfaces = mixed_surfaces(400, 6);
-  const auto expected = serial.sample(surfaces);
-  const auto plain = another.sample(surfaces);
-  CHECK(same_bits(openmp.sample(surfaces), expected));
-  CHECK(same_bits(threads.sample(surfaces), expected));
-  CHECK(same_bits(serial.sample(surfaces), expected));
-  CHECK(!same_bits(plain, expected));
+  for (field_lifetime lifetime : lifetimes) {
+    guided_box<wfpg::exec::seq> serial(lifetime);
+    guided_box<wfpg::exec::omp> openmp(lifetime);
+    guided_box<wfpg::exec::tbb> threads(lifetime);
+    guided_box<wfpg::exec::tbb> another(box_options(guiding_mode::plain, lifetime));
+    serial.learn();
+    another.learn();
+    openmp.learn();
+    threads.learn();
+    const auto surfaces = mixed_surfaces(400, 6);
+    const auto expected = serial.sample_again(surfaces);
+    const auto plain = another.sample_again(surfaces);
+    CHECK(same_bits(openmp.sample_again(surfaces), expected));
+    CHECK(same_bits(threads.sample_again(surfaces), expected));
+    CHECK(same_bits(serial.sample(surfaces), expected));
+    CHECK(!same_bits(plain, expected));
+  }
 }
 #endif

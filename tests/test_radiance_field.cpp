@@ -1,6 +1,7 @@
 // Fields of bins in a box whose light is known: what cells see, and that the form of the
 // caster and the size of its buffer change nothing. Filter and floor are test_radiance_field_filter.cpp's.
 #include "support/fields.hpp"
+#include "support/lit_box.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
@@ -20,24 +21,6 @@ namespace {
 
 constexpr float wall_radiance[6] = {1.0f, 2.0f, 3.0f, 16.0f, 5.0f, 0.0f};
 
-/// The box, its octree and cache, with light on its walls.
-template <class Exec>
-struct lit_box {
-  Exec exec;
-  wfpg::sparse_voxel_octree<Exec> tree;
-  wfpg::exitance_cache<Exec> cache;
-
-  template <class Radiance>
-  explicit lit_box(const Radiance& radiance, std::uint32_t resolution = 32) {
-    const box_mesh<Exec> mesh(exec);
-    auto fragments = wfpg::voxelize(exec, mesh.view(), resolution);
-    tree = wfpg::sparse_voxel_octree<Exec>(exec, fragments);
-    cache = wfpg::exitance_cache<Exec>(exec, tree, fragments, 6 * 64 * 64);
-    deposit_on_walls(cache.view(), 64, radiance);
-    cache.update(exec);
-  }
-};
-
 float constant_walls(std::uint32_t face, float, float) {
   return wall_radiance[face];
 }
@@ -51,7 +34,8 @@ struct raw_cells {
   wfpg::array_view<wfpg::ray> cones;
   void operator()(std::size_t i) const {
     cones[i] = cells.cone(static_cast<std::uint32_t>(i));
-    values[i] = cells.value(cache, cones[i], caster(cones[i]));
+    values[i] =
+        cells.weigh(cells.find(cache, cones[i], caster(cones[i])).radiance(cache), cones[i].direction);
   }
 };
 
@@ -161,7 +145,9 @@ WFPG_TEST_CASE("radiance field: what is not finite or negative from a caster cou
   const lit_box<Exec> box(constant_walls);
   const wfpg::detail::field_cells cells({}, 4);
   const auto value = [&](float environment) {
-    return cells.value(box.cache.view(), cells.cone(0), {-1.0f, environment});
+    const wfpg::ray cone = cells.cone(0);
+    const wfpg::detail::cone_hit hit = cells.find(box.cache.view(), cone, {-1.0f, environment});
+    return cells.weigh(hit.radiance(box.cache.view()), cone.direction);
   };
   CHECK(value(2.0f) == 2.0f);
   CHECK(value(-2.0f) == 0.0f);

@@ -292,14 +292,18 @@ TEST_CASE("a guided rendering finds the furnace's radiance", "[renderer][guided]
   options.spp = 20;
   options.octree_resolution = 32;
   options.field_resolution = 16;
-  for (const bool nee : {false, true})
-    for (const guiding mode : {guiding::oriented, guiding::plain}) {
-      INFO("nee " << nee << ", mode " << static_cast<int>(mode));
-      options.nee = nee;
-      options.mode = mode;
-      const render_result result = render::render(furnace, options, {});
-      CHECK(mean_of(result.picture.pixels) == Approx(furnace_radiance(4)).epsilon(0.005));
-    }
+  options.slot_resolution = 16;
+  for (const fields lifetime : {fields::kept, fields::transient})
+    for (const bool nee : {false, true})
+      for (const guiding mode : {guiding::oriented, guiding::plain}) {
+        INFO("nee " << nee << ", mode " << static_cast<int>(mode) << ", fields "
+                    << static_cast<int>(lifetime));
+        options.lifetime = lifetime;
+        options.nee = nee;
+        options.mode = mode;
+        const render_result result = render::render(furnace, options, {});
+        CHECK(mean_of(result.picture.pixels) == Approx(furnace_radiance(4)).epsilon(0.005));
+      }
 }
 
 TEST_CASE("a guided rendering is one picture on any device and number of threads", "[renderer][guided]") {
@@ -308,19 +312,22 @@ TEST_CASE("a guided rendering is one picture on any device and number of threads
   options.width = options.height = 24;
   options.spp = 3;
   options.octree_resolution = 32;
-  options.where = device::seq;
-  const std::vector<vec3> serial = render::render(scene, options, {}).picture.pixels;
-  CHECK(same_bits(serial, render::render(scene, options, {}).picture.pixels));
-  for (const int threads : {1, 3}) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
-                                    static_cast<std::size_t>(threads));
-    options.where = device::cpu;
+  for (const fields lifetime : {fields::kept, fields::transient}) {
+    options.lifetime = lifetime;
+    options.where = device::seq;
+    const std::vector<vec3> serial = render::render(scene, options, {}).picture.pixels;
     CHECK(same_bits(serial, render::render(scene, options, {}).picture.pixels));
-    const int before = omp_get_max_threads();
-    omp_set_num_threads(threads);
-    options.where = device::omp;
-    CHECK(same_bits(serial, render::render(scene, options, {}).picture.pixels));
-    omp_set_num_threads(before);
+    for (const int threads : {1, 3}) {
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                      static_cast<std::size_t>(threads));
+      options.where = device::cpu;
+      CHECK(same_bits(serial, render::render(scene, options, {}).picture.pixels));
+      const int before = omp_get_max_threads();
+      omp_set_num_threads(threads);
+      options.where = device::omp;
+      CHECK(same_bits(serial, render::render(scene, options, {}).picture.pixels));
+      omp_set_num_threads(before);
+    }
   }
 }
 
@@ -335,13 +342,20 @@ TEST_CASE("the first sample of a guided rendering is path tracing's, later ones 
     options.spp = spp;
     return render::render(scene, options, {});
   };
-  CHECK(same_bits(render_with(sampling_method::pt, 1).picture.pixels,
-                  render_with(sampling_method::wfpg, 1).picture.pixels));
+  const std::vector<vec3> unguided = render_with(sampling_method::pt, 3).picture.pixels;
+  const std::vector<vec3> first = render_with(sampling_method::pt, 1).picture.pixels;
+  for (const fields lifetime : {fields::transient, fields::kept}) {
+    options.lifetime = lifetime;
+    CHECK(same_bits(render_with(sampling_method::wfpg, 1).picture.pixels, first));
+    CHECK_FALSE(same_bits(render_with(sampling_method::wfpg, 3).picture.pixels, unguided));
+  }
   const render_result guided = render_with(sampling_method::wfpg, 3);
-  CHECK_FALSE(same_bits(render_with(sampling_method::pt, 3).picture.pixels, guided.picture.pixels));
   CHECK(guided.report.octree.resolution == 32);
   CHECK(guided.report.octree.nodes > guided.report.octree.leaves);
   CHECK(guided.report.bins.at(0).count >= 1.0);
   CHECK(guided.report.cones_per_segment > 0.0);
   CHECK(guided.report.persistent_bytes > 0);
+  CHECK(guided.report.slots.capacity > guided.report.slots.live);
+  CHECK(guided.report.slots.live > 0);
+  CHECK(guided.report.slots.refreshed > 0.0);
 }

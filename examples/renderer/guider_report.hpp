@@ -22,9 +22,12 @@ void report_guider(const wfpg::path_guider<Exec>& guider, std::uint64_t segments
   report.octree.resolution = octree.resolution();
   report.octree.nodes = octree.node_count();
   report.octree.leaves = octree.leaf_count();
+  double node_bytes = 0.0;
+  for (const wfpg::memory_part& part : memory.parts)
+    if (part.name == std::string("octree") || part.name == std::string("cache"))
+      node_bytes += static_cast<double>(part.bytes);
   if (octree.node_count() > 0)
-    report.octree.bytes_per_node =
-        static_cast<double>(memory.persistent()) / static_cast<double>(octree.node_count());
+    report.octree.bytes_per_node = node_bytes / static_cast<double>(octree.node_count());
 
   const wfpg::guider_statistics statistics = guider.statistics();
   const double samples = std::max(1.0, static_cast<double>(statistics.guided_samples));

@@ -64,7 +64,7 @@ struct octree_report {
   std::uint32_t resolution = 0;
   std::size_t nodes = 0;
   std::size_t leaves = 0;
-  double bytes_per_node = 0.0;  ///< of everything that persists
+  double bytes_per_node = 0.0;  ///< of octree and cache
   double build_seconds = 0.0;
 };
 

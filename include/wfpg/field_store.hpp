@@ -18,7 +18,6 @@
 #include <wfpg/radiance_field.hpp>
 
 #include <thrust/fill.h>
-#include <thrust/iterator/counting_iterator.h>
 #include <thrust/transform_scan.h>
 
 namespace wfpg {
@@ -40,7 +39,7 @@ struct kept_field_statistics {
   std::uint64_t born = 0;        ///< slots taken
   std::uint64_t freed = 0;       ///< slots given back
   std::uint64_t refreshed = 0;   ///< builds that cast a part of a field's cones
-  std::uint32_t refused = 0;     ///< births refused in the last sample, for want of a free slot
+  std::uint32_t refused = 0;  ///< births refused in the last sample, for want of a slot or by max_wave_cones
 };
 
 /// What fields are made for in one wave.
@@ -132,6 +131,10 @@ class field_store {
   void list(const Exec& exec, std::uint64_t seed);
   template <class Builder, class Caster>
   void build(const Exec& exec, const Builder& builder, const Caster& caster, std::size_t buffer_bytes);
+  template <class Builder, class Caster>
+  void build_batches(const Exec& exec, const Builder& builder, const Caster& caster, bool whole,
+                     std::size_t count, array_view<ray> cones, array_view<ray_hit> hits);
+  const std::uint32_t* listed(bool whole) const { return list_.data() + (whole ? 0 : capacity_); }
 
   sparse_voxel_octree_view tree_;
   kept_field_options options_;

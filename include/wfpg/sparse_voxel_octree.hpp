@@ -3,7 +3,7 @@
 // Construction of BVHs, Octrees, and k-d Trees"). Structure only; what light leaves a node is
 // exitance_cache.hpp's.
 //
-// Memory: 4 bytes a leaf, 9 an inner node, and up to 128 KiB where descents begin. Build: a sort of the
+// Memory: 4 bytes a leaf, 9 an inner node, and at most one a node where descents begin. Build: a sort of the
 // fragments and O(nodes).
 #pragma once
 
@@ -67,8 +67,8 @@ class sparse_voxel_octree_view {
   /// The leaf at voxel coordinates below resolution, or invalid_node. O(depth).
   WFPG_HD node_id leaf_at(uvec3 voxel) const {
     if (empty()) return invalid_node;
-    std::uint32_t level = depth_ - top_level(depth_);
-    node_id node = top_[top_index(voxel >> level, top_level(depth_))];
+    std::uint32_t level = depth_ - top_level_;
+    node_id node = top_[top_index(voxel >> level, top_level_)];
     for (; level > 0 && node != invalid_node; --level) node = child(node, octant(voxel, level - 1));
     return node;
   }
@@ -122,14 +122,6 @@ class sparse_voxel_octree_view {
   template <class Exec>
   friend class sparse_voxel_octree;
 
-  /// The level that a table leads to from coordinates, so that a descent begins there: two above the leaves',
-  /// and no deeper than a table of 128 KiB allows.
-  WFPG_HD static constexpr std::uint32_t top_level(std::uint32_t depth) {
-    return depth < 2 ? 0u : detail::min(depth - 2u, 5u);
-  }
-  WFPG_HD static constexpr std::size_t top_size(std::uint32_t depth) {
-    return std::size_t(1) << 3 * top_level(depth);
-  }
   WFPG_HD static std::uint32_t top_index(uvec3 p, std::uint32_t level) {
     return p.x | p.y << level | p.z << 2 * level;
   }
@@ -173,7 +165,10 @@ class sparse_voxel_octree_view {
   const node_id* parents_ = nullptr;         // a node
   const node_id* first_children_ = nullptr;  // an inner node
   const std::uint8_t* child_masks_ = nullptr;
-  const node_id* top_ = nullptr;  // coordinates at the top level: the node there, or invalid_node
+  // Descents begin in a table of the nodes of one level by their coordinates, invalid_node where there is
+  // none.
+  std::uint32_t top_level_ = 0;
+  const node_id* top_ = nullptr;
 };
 
 namespace detail {
@@ -319,7 +314,7 @@ class sparse_voxel_octree {
                     detail::link_nodes{level_codes[level], up[level - 1].through.view(),
                                        view_.level_begin_[level], view_.level_begin_[level - 1],
                                        parents_.data(), first_children_.data(), child_masks_.data()});
-    const std::uint32_t top = view_.top_level(depth);
+    const std::uint32_t top = view_.top_level_;
     ::thrust::fill_n(exec.thrust(), top_.data(), top_.size(), invalid_node);
     exec.for_each(level_codes[top].size(),
                   detail::fill_top{level_codes[top], view_.level_begin_[top], top, top_.data()});
@@ -332,9 +327,12 @@ class sparse_voxel_octree {
     view_.parents_ = parents_.data();
     view_.first_children_ = first_children_.data();
     view_.child_masks_ = child_masks_.data();
-    top_ = buffer<node_id, Exec>(exec, view_.top_size(view_.depth_));
-    view_.top_ = top_.data();
     if (view_.node_count() == 0) return;
+    // Two levels above the leaves at the deepest, and no larger than a byte a node.
+    view_.top_level_ = view_.depth_ > 2 ? view_.depth_ - 2 : 0;
+    while (view_.top_level_ > 0 && (4ull << 3 * view_.top_level_) > view_.node_count()) --view_.top_level_;
+    top_ = buffer<node_id, Exec>(exec, std::size_t(1) << 3 * view_.top_level_);
+    view_.top_ = top_.data();
     const node_id none = invalid_node;
     exec.copy_from_host(parents_.data(), &none, sizeof none);
   }

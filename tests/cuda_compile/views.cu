@@ -101,4 +101,23 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(d::ascend_to_marked{});
   launch(d::serve_unbinned<d::serve_ray<surfaces, random_numbers, wfpg::no_queries>>{});
   launch(d::add_counts{});
+
+  // Kept fields.
+  const d::field_slots_view slots;
+  const d::use_slot use{slots, nullptr, 1, 0};
+  d::field_store_state* const state = nullptr;
+  launch(d::find_fields<d::wave_rays<surfaces>>{{}, tree, {}, use, {}, nullptr, state, 32});
+  launch(d::count_rays<d::wave_rays<surfaces>>{{}, tree, {}});
+  launch(d::bear_fields{slots, {}, nullptr, nullptr, state, 1});
+  launch(d::count_births{{slots, {}, nullptr, nullptr, state, 1}, state});
+  launch(d::find_missing_fields{tree, use, nullptr, state});
+  launch(d::list_builds{{}, nullptr, {}, nullptr, state, 0});
+  launch(d::evict_fields{{}, nullptr, state, 1, 16});
+  launch(d::index_slots{slots, nullptr, nullptr, state});
+  launch(d::invalidate_fields{{}, nullptr, tree, {}});
+  launch(d::mark_leaves{tree, {}, 3, {}});
+  launch(d::sum_counts{tree, 0, {}});
+  launch(d::match_sides{});
+  launch(d::fill_top{});
+  launch(d::adapt_pressure{state});
 }

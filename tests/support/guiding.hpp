@@ -36,9 +36,19 @@ inline double floor_irradiance(vec3 p) {
   return double(patch_radiance) * sum * step * step;
 }
 
-inline wfpg::guider_options box_options(wfpg::guiding_mode mode = wfpg::guiding_mode::oriented) {
+constexpr wfpg::field_lifetime lifetimes[] = {wfpg::field_lifetime::kept, wfpg::field_lifetime::transient};
+
+inline const char* name_of(wfpg::field_lifetime lifetime) {
+  return lifetime == wfpg::field_lifetime::kept ? "kept fields" : "transient fields";
+}
+
+inline wfpg::guider_options box_options(wfpg::guiding_mode mode = wfpg::guiding_mode::oriented,
+                                        wfpg::field_lifetime lifetime = wfpg::field_lifetime::kept) {
   wfpg::guider_options options;
   options.mode = mode;
+  options.fields = lifetime;
+  options.kept.resolution = 16;
+  options.kept.budget_bytes = std::size_t(4) << 20;
   options.octree_resolution = 32;
   options.min_bin_level = 2;
   options.rays_per_bin = 32;
@@ -78,6 +88,8 @@ struct guided_box {
   explicit guided_box(const wfpg::guider_options& options = box_options(),
                       wfpg::memory_resource* resource = nullptr)
       : exec(resource), guider(exec, box_mesh<Exec>(exec).view(), options) {}
+  explicit guided_box(wfpg::field_lifetime lifetime)
+      : guided_box(box_options(wfpg::guiding_mode::oriented, lifetime)) {}
 
   /// Deposits the patch on 40² points a wall, and begins the sample after it.
   void learn() {
@@ -95,6 +107,13 @@ struct guided_box {
     const wfpg::buffer<wfpg::sampled_direction, Exec> directions(exec, surfaces.size());
     guider.sample_directions(wave.get(), caster, directions.view());
     return directions.to_host(exec);
+  }
+  /// The same of a wave that has come before: where fields are kept, its rays have theirs by now.
+  template <class Caster = box_caster>
+  std::vector<wfpg::sampled_direction> sample_again(const std::vector<test_surface>& surfaces,
+                                                    const Caster& caster = {}) {
+    for (int wave = 0; wave < 3; ++wave) sample(surfaces, caster);
+    return sample(surfaces, caster);
   }
 };
 
@@ -198,8 +217,9 @@ std::vector<float> trace_paths(const Exec& exec, wfpg::path_guider<Exec>& guider
 
 /// Options for trace_paths.
 inline wfpg::guider_options tracing_options(std::size_t paths,
-                                            wfpg::guiding_mode mode = wfpg::guiding_mode::oriented) {
-  wfpg::guider_options options = box_options(mode);
+                                            wfpg::guiding_mode mode = wfpg::guiding_mode::oriented,
+                                            wfpg::field_lifetime lifetime = wfpg::field_lifetime::kept) {
+  wfpg::guider_options options = box_options(mode, lifetime);
   options.max_paths = paths;
   options.max_depth = 3;
   options.max_rays = 0;

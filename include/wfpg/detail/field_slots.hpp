@@ -60,13 +60,14 @@ struct field_store_state {
   std::uint32_t taken = 0;           ///< of that list
   std::uint32_t refused_births = 0;  ///< in this sample, for want of a free slot
   std::uint32_t refused_births_before = 0;  ///< in the sample before
+  std::uint32_t delayed_births = 0;         ///< in this sample, for the limit on cones
   std::uint32_t refused_since_mark = 0;
   std::uint32_t evicted = 0;  ///< at the beginning of this sample
   // Of the last wave:
   std::uint32_t missing = 0;   ///< the wave's size where some ray found no slot at first, else 0
   std::uint32_t unbinned = 0;  ///< rays outside every voxel
   std::uint32_t unserved = 0;  ///< rays that got no field
-  std::uint32_t served = 0;    ///< rays that did
+  std::uint32_t served = 0;    ///< rays whose field was there
   std::uint32_t all = 0;       ///< builds that cast all cells
   std::uint32_t part = 0;      ///< builds that cast a part of them
   // Since the beginning:
@@ -183,11 +184,14 @@ struct count_births {
   field_store_state* state;
   WFPG_HD void operator()(std::size_t) const {
     const std::uint32_t wanted = births.wanted_through[births.wanted.mask];
+    const std::uint32_t room = state->free - state->taken;
+    const std::uint32_t refused = wanted > room ? wanted - room : 0;
     const std::uint32_t born = min(wanted, births.allowed());
     state->taken += born;
     state->born += born;
-    state->refused_births += wanted - born;
-    state->refused_since_mark += wanted - born;
+    state->refused_births += refused;
+    state->delayed_births += wanted - refused - born;
+    state->refused_since_mark += refused;
   }
 };
 
@@ -227,52 +231,48 @@ struct build_limits {
   }
 };
 
-/// Slots in an order that begins elsewhere in each wave, so that limits pass over none for ever.
-struct slot_rotation {
-  array_view<field_slot> slots;
-  std::uint32_t first;
-  WFPG_HD std::uint32_t operator()(std::uint32_t i) const {
-    const auto n = static_cast<std::uint32_t>(slots.size());
-    return i < n - first ? i + first : i - (n - first);
-  }
-};
-
 /// 1 above for a slot to build from scratch, 1 below for one to refresh.
 struct is_to_build {
-  slot_rotation rotation;
-  WFPG_HD std::uint64_t operator()(std::uint32_t i) const {
-    const field_slot& s = rotation.slots[rotation(i)];
+  WFPG_HD std::uint64_t operator()(const field_slot& s) const {
     if (s.origin == field_slot::unpicked) return 0;
     return s.builds == 0 ? 1ull << 32 : 1ull;
   }
 };
 
-/// The slots to build in this wave: first those to cast whole, from `capacity` on those to refresh.
+/// The slots to build in this wave: first those to cast whole, from the number of slots on those to refresh.
+/// Where a limit passes over some, others are the first in the next wave.
 struct list_builds {
-  slot_rotation rotation;
-  const std::uint64_t* through;  // in the rotation's order: slots to build up to and with it
+  array_view<field_slot> slots;
+  const std::uint64_t* through;  // a slot: slots to build up to and with it
   build_limits limits;
   std::uint32_t* list;
   field_store_state* state;
+  std::uint64_t seed;
 
   WFPG_HD void operator()(std::size_t i) const {
-    const std::uint64_t total = through[rotation.slots.size() - 1];
-    const std::uint32_t all = limits.all(static_cast<std::uint32_t>(total >> 32));
-    const std::uint32_t parts = limits.parts(static_cast<std::uint32_t>(total), all);
+    const std::uint64_t total = through[slots.size() - 1];
+    const auto wholes = static_cast<std::uint32_t>(total >> 32), parts = static_cast<std::uint32_t>(total);
+    const std::uint32_t most_wholes = limits.all(wholes), most_parts = limits.parts(parts, most_wholes);
     if (i == 0) {
-      state->all = all;
-      state->part = parts;
-      state->refreshed += parts;
+      state->all = most_wholes;
+      state->part = most_parts;
+      state->refreshed += most_parts;
     }
-    const std::uint32_t slot = rotation(static_cast<std::uint32_t>(i));
-    field_slot& s = rotation.slots[slot];
+    field_slot& s = slots[i];
     if (s.origin == field_slot::unpicked) return;
     const bool whole = s.builds == 0;
-    const auto rank = static_cast<std::uint32_t>(whole ? through[i] >> 32 : through[i]) - 1;
-    if (rank < (whole ? all : parts))
-      list[whole ? rank : rotation.slots.size() + rank] = slot;
+    const std::uint32_t rank = whole ? rotated(static_cast<std::uint32_t>(through[i] >> 32) - 1, wholes)
+                                     : rotated(static_cast<std::uint32_t>(through[i]) - 1, parts);
+    if (rank < (whole ? most_wholes : most_parts))
+      list[whole ? rank : slots.size() + rank] = static_cast<std::uint32_t>(i);
     else
       s.origin = field_slot::unpicked;  // waits
+  }
+
+ private:
+  WFPG_HD std::uint32_t rotated(std::uint32_t rank, std::uint32_t total) const {
+    const auto first = static_cast<std::uint32_t>(seed % total);
+    return rank >= first ? rank - first : rank + (total - first);
   }
 };
 

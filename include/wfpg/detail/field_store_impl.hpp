@@ -11,7 +11,7 @@ struct begin_store_sample {
   field_store_state* state;
   WFPG_HD void operator()(std::size_t) const {
     state->refused_births_before = state->refused_births;
-    state->refused_births = 0;
+    state->refused_births = state->delayed_births = 0;
     state->taken = 0;
     state->evicted = 0;
   }
@@ -47,6 +47,7 @@ struct adapt_pressure {
 struct count_served {
   static constexpr std::size_t run = 4096;
   array_view<const std::uint32_t> field_of_ray;
+  const resident_field* fields;
   field_store_state* state;
 
   template <class Block>
@@ -54,7 +55,8 @@ struct count_served {
     const std::size_t first = i * run;
     const auto n = static_cast<int>(min(run, field_of_ray.size() - first));
     const std::uint32_t served = block.sum(n, [&](int j) -> std::uint32_t {
-      return field_of_ray[first + static_cast<std::size_t>(j)] != no_slot ? 1u : 0u;
+      const std::uint32_t field = field_of_ray[first + static_cast<std::size_t>(j)];
+      return field != no_slot && fields[field].fraction > 0.0f ? 1u : 0u;
     });
     block.for_each(1, [&](int) { atomic_add(&state->served, served); });
   }
@@ -80,7 +82,7 @@ field_store<Exec>::field_store(const Exec& exec, const sparse_voxel_octree_view&
                                std::size_t max_rays)
     : tree_(tree),
       options_(checked(options, tree.node_count())),
-      capacity_(options.budget_bytes / bytes_a_slot(options.resolution)),
+      capacity_(tree.empty() ? 0 : options.budget_bytes / bytes_a_slot(options.resolution)),
       marks_(exec, tree, binning),
       slots_(exec, std::vector<detail::field_slot>(capacity_)),
       fields_(exec, std::vector<resident_field>(capacity_)),
@@ -92,6 +94,7 @@ field_store<Exec>::field_store(const Exec& exec, const sparse_voxel_octree_view&
       field_of_ray_(exec, max_rays),
       missing_keys_(exec, max_rays),
       state_(exec, std::vector<detail::field_store_state>(1)) {
+  options_.recast = detail::min(options.recast, options.resolution * options.resolution);
   std::size_t entries = 2;
   while (entries < 2 * capacity_) entries *= 2;
   table_ = buffer<std::uint32_t, Exec>(exec, entries);
@@ -136,7 +139,11 @@ guide_view field_store<Exec>::prepare(const Exec& exec, const kept_field_wave<Su
   const detail::kept_fields_view kept{slots_.view(),       fields_.data(),  words_.data(), hits_.data(),
                                       options_.resolution, options_.recast, sample_};
   build(exec, detail::kept_field_builder<kept_field_wave<Surfaces>>{wave, kept}, caster, caster_buffer_bytes);
-  return {{field_of_ray_.data(), wave.ray_count}, fields_.data(), words_.data(), options_.resolution};
+  const array_view<const std::uint32_t> field_of_ray(field_of_ray_.data(), wave.ray_count);
+  const std::size_t run = detail::count_served::run;
+  exec.for_each_block((wave.ray_count + run - 1) / run, 0,
+                      detail::count_served{field_of_ray, fields_.data(), state_.data()});
+  return {field_of_ray, fields_.data(), words_.data(), options_.resolution};
 }
 
 /// Gives rays their slots, new ones where there is room.
@@ -159,8 +166,6 @@ void field_store<Exec>::find(const Exec& exec, const kept_field_wave<Surfaces>& 
   bear(exec);
   exec.for_each(exec::device_count{&state_.data()->missing, n},
                 detail::find_missing_fields{tree_, use, missing_keys_.data(), state_.data()});
-  const std::size_t run = detail::count_served::run;
-  exec.for_each_block((n + run - 1) / run, 0, detail::count_served{{field_of_ray_.data(), n}, state_.data()});
 }
 
 /// Gives free slots to wanted keys.
@@ -184,15 +189,12 @@ void field_store<Exec>::bear(const Exec& exec) {
 template <class Exec>
 void field_store<Exec>::list(const Exec& exec, std::uint64_t seed) {
   if (capacity_ == 0) return;
-  const detail::slot_rotation rotation{slots_.view(), static_cast<std::uint32_t>(seed % capacity_)};
-  const ::thrust::counting_iterator<std::uint32_t> first(0);
-  ::thrust::transform_inclusive_scan(exec.thrust(), first, first + static_cast<std::ptrdiff_t>(capacity_),
-                                     through_.data(), detail::is_to_build{rotation},
-                                     ::thrust::plus<std::uint64_t>());
+  ::thrust::transform_inclusive_scan(exec.thrust(), slots_.data(), slots_.data() + capacity_, through_.data(),
+                                     detail::is_to_build{}, ::thrust::plus<std::uint64_t>());
   const detail::build_limits limits{options_.max_wave_cones, options_.resolution * options_.resolution,
                                     refresh_cones()};
-  exec.for_each(capacity_,
-                detail::list_builds{rotation, through_.data(), limits, list_.data(), state_.data()});
+  exec.for_each(capacity_, detail::list_builds{slots_.view(), through_.data(), limits, list_.data(),
+                                               state_.data(), seed});
 }
 
 /// Builds the listed slots' fields.
@@ -200,34 +202,41 @@ template <class Exec>
 template <class Builder, class Caster>
 void field_store<Exec>::build(const Exec& exec, const Builder& builder, const Caster& caster,
                               std::size_t buffer_bytes) {
-  const std::size_t scratch = detail::field_scratch_bytes(options_.resolution);
-  for (const bool whole : {true, false}) {
-    const std::uint32_t* const list = list_.data() + (whole ? 0 : capacity_);
-    const std::uint32_t* const count = whole ? &state_.data()->all : &state_.data()->part;
-    if constexpr (is_inline_caster_v<Caster>) {
-      using hits = detail::inline_hits<Caster>;
-      exec.for_each_block(exec::device_count{count, capacity_}, scratch,
-                          detail::build_kept_fields<Builder, hits>{builder, {caster}, list, whole});
-    } else {
-      const std::uint32_t cones_a_field = builder.cone_count(whole);
-      const std::size_t at_once = detail::min(
-          capacity_,
-          detail::max<std::size_t>(1, buffer_bytes / (cones_a_field * (sizeof(ray) + sizeof(ray_hit)))));
-      const std::size_t listed = read_element(exec, count);
-      if (listed == 0) continue;
-      const buffer<ray, Exec> cones(exec, at_once * cones_a_field);
-      const buffer<ray_hit, Exec> found(exec, cones.size());
-      for (std::size_t at = 0; at < listed; at += at_once) {
-        const std::size_t n = detail::min(at_once, listed - at);
-        exec.for_each_block(n, 0, detail::write_kept_cones<Builder>{builder, cones.view(), list + at, whole});
-        caster.cast(exec, array_view<const ray>(cones.data(), n * cones_a_field),
-                    array_view<ray_hit>(found.data(), n * cones_a_field));
-        const detail::stored_hits hits{found.view(), 0, cones_a_field};
-        exec.for_each_block(
-            n, scratch,
-            detail::build_kept_fields<Builder, detail::stored_hits>{builder, hits, list + at, whole});
-      }
-    }
+  const std::uint32_t* const counts[2] = {&state_.data()->part, &state_.data()->all};
+  if constexpr (is_inline_caster_v<Caster>) {
+    using build_type = detail::build_kept_fields<Builder, detail::inline_hits<Caster>>;
+    for (const bool whole : {true, false})
+      exec.for_each_block(exec::device_count{counts[whole], capacity_},
+                          detail::field_scratch_bytes(options_.resolution),
+                          build_type{builder, {caster}, listed(whole), whole});
+  } else {
+    const std::uint32_t cells = builder.cone_count(true);
+    const std::size_t room = detail::max<std::size_t>(cells, buffer_bytes / (sizeof(ray) + sizeof(ray_hit)));
+    const buffer<ray, Exec> cones(exec, detail::min(room, capacity_ * cells));
+    const buffer<ray_hit, Exec> hits(exec, cones.size());
+    for (const bool whole : {true, false})
+      build_batches(exec, builder, caster, whole, read_element(exec, counts[whole]), cones.view(),
+                    hits.view());
+  }
+}
+
+/// The same through a batch caster, as many fields at once as the buffers hold.
+template <class Exec>
+template <class Builder, class Caster>
+void field_store<Exec>::build_batches(const Exec& exec, const Builder& builder, const Caster& caster,
+                                      bool whole, std::size_t count, array_view<ray> cones,
+                                      array_view<ray_hit> hits) {
+  const std::uint32_t cones_a_field = builder.cone_count(whole);
+  const std::size_t at_once = cones.size() / cones_a_field;
+  for (std::size_t first = 0; first < count; first += at_once) {
+    const std::size_t n = detail::min(at_once, count - first);
+    const std::uint32_t* const list = listed(whole) + first;
+    exec.for_each_block(n, 0, detail::write_kept_cones<Builder>{builder, cones, list, whole});
+    caster.cast(exec, array_view<const ray>(cones.data(), n * cones_a_field),
+                array_view<ray_hit>(hits.data(), n * cones_a_field));
+    const detail::stored_hits found{hits, 0, cones_a_field};
+    exec.for_each_block(n, detail::field_scratch_bytes(options_.resolution),
+                        detail::build_kept_fields<Builder, detail::stored_hits>{builder, found, list, whole});
   }
 }
 
@@ -241,7 +250,7 @@ kept_field_statistics field_store<Exec>::statistics(const Exec& exec) const {
   result.born = state.born;
   result.freed = state.freed;
   result.refreshed = state.refreshed;
-  result.refused = state.refused_births;
+  result.refused = state.refused_births + state.delayed_births;
   return result;
 }
 

@@ -9,7 +9,7 @@ namespace wfpg::detail {
 
 /// Cones of a refresh that casts one cell in `recast`.
 WFPG_HD constexpr std::uint32_t refresh_cones(std::uint32_t resolution, std::uint32_t recast) {
-  return (resolution * resolution + recast - 1) / recast;
+  return (resolution * resolution - 1) / recast + 1;
 }
 
 /// The cell of a refresh's cone: one in each run of `recast` cells, another each time, and shifted from run

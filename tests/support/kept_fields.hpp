@@ -1,0 +1,151 @@
+// A field store over the lit unit box, samples and waves for it, and a caster that notes its cones.
+#pragma once
+
+#include "support/guiding.hpp"
+#include "support/lit_box.hpp"
+#include "support/policies.hpp"
+#include "support/scenes.hpp"
+
+#include <wfpg/field_store.hpp>
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace wfpg_test {
+
+/// Cones that were cast, from any number of threads.
+class cone_log {
+ public:
+  explicit cone_log(std::size_t room = 0) : cones_(room) {}
+
+  void note(const wfpg::ray& cone) {
+    const std::size_t at = count_.fetch_add(1);
+    if (at < cones_.size()) cones_[at] = cone;
+  }
+  std::size_t count() const { return count_; }
+  std::size_t take() { return count_.exchange(0); }
+  const wfpg::ray& operator[](std::size_t i) const { return cones_[i]; }
+
+ private:
+  std::atomic<std::size_t> count_{0};
+  std::vector<wfpg::ray> cones_;
+};
+
+/// Inline: the box's hits, noted.
+struct noting_caster {
+  cone_log* log;
+  box_caster box;
+  wfpg::ray_hit operator()(const wfpg::ray& cone) const {
+    log->note(cone);
+    return box(cone);
+  }
+};
+
+inline float patch_light(std::uint32_t face, float u, float v) {
+  return emitted(face_point(face, u, v));
+}
+
+/// Options whose budget holds so many slots.
+inline wfpg::kept_field_options slots_of(std::uint32_t resolution, std::size_t slots,
+                                         std::uint32_t recast = 4) {
+  wfpg::kept_field_options options;
+  options.resolution = resolution;
+  options.recast = recast;
+  options.budget_bytes = slots * wfpg::field_store<wfpg::exec::tbb>::bytes_a_slot(resolution);
+  return options;
+}
+
+/// A store over the box with the patch. Fields are over nodes of level 2 until a marking.
+template <class Exec>
+struct kept_box {
+  lit_box<Exec> box{patch_light};
+  wfpg::field_store<Exec> store;
+  wfpg::guiding_mode mode;
+  wfpg::field_options field;
+  std::uint32_t sample = 0;
+  cone_log log;
+  wfpg::buffer<test_surface, Exec> surfaces;  // of the last wave
+
+  static constexpr std::size_t max_rays = 1024;
+
+  explicit kept_box(const wfpg::kept_field_options& options,
+                    wfpg::guiding_mode guiding = wfpg::guiding_mode::oriented, std::size_t noted = 0)
+      : store(box.exec, box.tree.view(), {2, 32}, options, max_rays), mode(guiding), log(noted) {}
+
+  const Exec& exec() const { return box.exec; }
+  void begin() { store.begin_sample(exec(), ++sample); }
+  void end() { store.end_sample(exec()); }
+
+  template <class Caster>
+  wfpg::guide_view prepare(const std::vector<test_surface>& wave, const Caster& caster,
+                           std::size_t buffer_bytes = std::size_t(1) << 20) {
+    surfaces = wfpg::buffer<test_surface, Exec>(exec(), wave);
+    const wfpg::kept_field_wave<stored_surfaces> kept{
+        wave.size(), {const_view<test_surface>(surfaces)}, box.cache.view(), field, mode,
+        0.7f,        wfpg::detail::hash(7, sample)};
+    return store.prepare(exec(), kept, caster, buffer_bytes);
+  }
+  wfpg::guide_view prepare(const std::vector<test_surface>& wave) {
+    return prepare(wave, noting_caster{&log, {}});
+  }
+  /// Cones that a wave casts.
+  std::size_t cones(const std::vector<test_surface>& wave) {
+    log.take();
+    prepare(wave);
+    return log.take();
+  }
+  /// Waves until every ray that can have a field of its own has it: of keys in one bucket a wave bears one.
+  wfpg::guide_view settle(const std::vector<test_surface>& wave) {
+    std::uint64_t born = 0;
+    do {
+      born = counts().born;
+      prepare(wave);
+    } while (counts().born != born);
+    return prepare(wave);
+  }
+  /// A sample of settled waves.
+  wfpg::guide_view whole_sample(const std::vector<test_surface>& wave) {
+    begin();
+    const wfpg::guide_view view = settle(wave);
+    end();
+    return view;
+  }
+
+  wfpg::kept_field_statistics counts() const { return store.statistics(exec()); }
+  wfpg::detail::field_store_state state() const { return wfpg::read_element(exec(), store.state()); }
+};
+
+/// Rays of one place, `n` times.
+inline std::vector<test_surface> rays_at(vec3 position, vec3 normal, std::size_t n = 1) {
+  return std::vector<test_surface>(n, make_surface(position, normal, normal));
+}
+
+inline std::size_t count_guided(const wfpg::guide_view& view, std::size_t rays) {
+  std::size_t n = 0;
+  for (std::size_t ray = 0; ray < rays; ++ray) n += view.guides(static_cast<std::uint32_t>(ray));
+  return n;
+}
+
+/// A ray's field in one number: frame, share and every weight.
+inline std::uint64_t field_bits(const wfpg::guide_mixture& mixture) {
+  if (mixture.field.empty()) return 0;
+  const wfpg::grid_distribution& grid = mixture.field.grid();
+  std::uint64_t bits = wfpg::detail::hash(mixture.field.hemisphere(), grid.resolution());
+  for (int axis = 0; axis < 3; ++axis)
+    bits = wfpg::detail::hash(bits, wfpg::detail::float_bits(mixture.field.normal()[axis]));
+  bits = wfpg::detail::hash(bits, wfpg::detail::float_bits(mixture.fraction));
+  for (std::uint32_t i = 0; i < grid.resolution() * grid.resolution(); ++i)
+    bits = wfpg::detail::hash(bits, grid.weight(i % grid.resolution(), i / grid.resolution()));
+  return bits;
+}
+
+inline std::vector<std::uint64_t> field_bits(const wfpg::guide_view& view, std::size_t rays) {
+  std::vector<std::uint64_t> bits;
+  for (std::size_t ray = 0; ray < rays; ++ray)
+    bits.push_back(field_bits(view.mixture(static_cast<std::uint32_t>(ray))));
+  return bits;
+}
+
+}  // namespace wfpg_test

@@ -1,0 +1,374 @@
+// Kept fields: what a cell remembers and which are cast again; distributions against their own densities and
+// against brute force; the same bits on any number of threads and from casters of both forms. Who gets a slot
+// and when it is built is test_field_store_slots.cpp's.
+#include "support/chi_square.hpp"
+#include "support/fields.hpp"
+#include "support/kept_fields.hpp"
+#include "support/lit_box.hpp"
+#include "support/policies.hpp"
+#include "support/scenes.hpp"
+
+#include <wfpg/field_store.hpp>
+
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+using namespace wfpg_test;
+using wfpg::directional_field;
+using wfpg::guide_view;
+using wfpg::guiding_mode;
+using wfpg::detail::cone_hit;
+
+namespace {
+
+constexpr guiding_mode modes[] = {guiding_mode::oriented, guiding_mode::plain};
+
+float graded_light(std::uint32_t face, float u, float v) {
+  return float(face) + u + 0.5f * v;
+}
+float turned_light(std::uint32_t face, float u, float v) {
+  return 3.0f + float(5 - face) * v + u;
+}
+
+/// The radiance of every node's sides as hits tell it, and as the cache does.
+template <class Exec>
+std::pair<std::vector<float>, std::vector<float>> read_both(const lit_box<Exec>& box,
+                                                            const std::vector<cone_hit>& hits) {
+  const wfpg::exitance_cache_view cache = box.cache.view();
+  std::vector<float> remembered, read;
+  for (std::uint32_t i = 0; i < hits.size(); ++i) {
+    remembered.push_back(hits[i].radiance(cache));
+    read.push_back(cache.read(i / 2, i % 2));
+  }
+  return {remembered, read};
+}
+
+WFPG_TEST_CASE("field store: a hit remembers a node's side, and follows the cache", "[field_store]") {
+  lit_box<Exec> box(graded_light, 16);
+  std::vector<cone_hit> hits;
+  for (wfpg::node_id node = 0; node < box.tree.view().node_count(); ++node)
+    for (std::uint32_t side : {0u, 1u}) hits.push_back(cone_hit::surface(node, side));
+  const auto before = read_both(box, hits);
+  CHECK(before.first == before.second);
+  box.shine(turned_light);
+  const auto after = read_both(box, hits);
+  CHECK(after.first == after.second);
+  CHECK(after.first != before.first);
+  box.cache.clear(box.exec);
+  for (const cone_hit& hit : hits) CHECK(hit.radiance(box.cache.view()) == 0.0f);
+}
+
+WFPG_TEST_CASE("field store: a hit remembers the environment, and nonsense as darkness", "[field_store]") {
+  const lit_box<Exec> box(graded_light, 4);
+  const auto remembered = [&](float radiance) {
+    return cone_hit::environment(radiance).radiance(box.cache.view());
+  };
+  for (float radiance : {0.0f, 1e-44f, 1e-30f, 0.3f, 7.0f, 1e30f}) CHECK(remembered(radiance) == radiance);
+  CHECK(remembered(3e38f) == 1e30f);
+  for (float radiance : {-0.0f, -1.0f, std::nanf(""), -std::nanf(""), INFINITY, -INFINITY})
+    CHECK(remembered(radiance) == 0.0f);
+  CHECK(cone_hit().radiance(box.cache.view()) == 0.0f);
+}
+
+/// How often each cell is cast by so many refreshes in turn.
+std::vector<int> times_cast(std::uint32_t resolution, std::uint32_t recast, std::uint32_t first) {
+  std::vector<int> times(resolution * resolution, 0);
+  const std::uint32_t cones = wfpg::detail::refresh_cones(resolution, recast);
+  for (std::uint32_t refresh = first; refresh < first + recast; ++refresh)
+    for (std::uint32_t cone = 0; cone < cones; ++cone)
+      ++times.at(wfpg::detail::refreshed_cell(cone, refresh, resolution, recast));
+  return times;
+}
+
+}  // namespace
+
+TEST_CASE("field store: as many refreshes as one in how many cast every cell once", "[field_store]") {
+  for (std::uint32_t recast : {1u, 3u, 8u, 16u, 32u})
+    for (std::uint32_t resolution = 2; resolution <= 33; ++resolution) {
+      const std::uint32_t cells = resolution * resolution;
+      INFO("resolution " << resolution << ", one in " << recast);
+      CHECK(wfpg::detail::refresh_cones(resolution, recast) == (cells + recast - 1) / recast);
+      for (std::uint32_t first : {1u, 2u, 1000u}) {
+        const std::vector<int> times = times_cast(resolution, recast, first);
+        const auto end_of_runs = times.begin() + (cells - cells % recast);
+        CHECK(std::all_of(times.begin(), end_of_runs, [](int n) { return n == 1; }));
+        CHECK(std::all_of(end_of_runs, times.end(), [](int n) { return n >= 1; }));  // of a shorter run
+      }
+    }
+}
+
+TEST_CASE("field store: a refresh casts a cell at least, however few", "[field_store]") {
+  for (std::uint32_t recast : {1000u, 0x7fffffffu, 0xfffffdc1u, 0xffffffffu})
+    CHECK(wfpg::detail::refresh_cones(24, recast) == 1);
+}
+
+namespace {
+
+/// Draws directions of a field.
+struct draw_field {
+  directional_field field;
+  wfpg::array_view<vec3> directions;
+  void operator()(std::size_t i) const {
+    directions[i] = field.sample(hashed_numbers{99}(static_cast<std::uint32_t>(i), 0));
+  }
+};
+
+double sum_of(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (double value : values) sum += value;
+  return sum;
+}
+
+WFPG_TEST_CASE("field store: directions have the density that fields report, which sums to one",
+               "[field_store]") {
+  const sphere_bins bins{12, 24};
+  constexpr std::size_t samples = 20000;
+  chi_square_family family;
+  int below = 0;
+  for (guiding_mode mode : modes) {
+    kept_box<Exec> box(slots_of(16, 500), mode);
+    auto wave = wall_surfaces(300, 3);
+    for (std::size_t i = 0; i < wave.size(); i += 5) wave[i].bsdf.kind = bsdf_kind::glass;
+    guide_view view;
+    for (int sample = 0; sample < 3; ++sample) view = box.whole_sample(wave);
+    for (std::uint32_t ray : {0u, 1u, 7u, 10u}) {
+      REQUIRE(view.guides(ray));
+      const directional_field field = view.mixture(ray).field;
+      CHECK(field.hemisphere() == (mode == guiding_mode::oriented && ray % 5 != 0));
+      const auto density = [&](vec3 d) { return field.pdf(d); };
+      CHECK(sum_of(bins.expected(density, 1.0, 12)) == Approx(1.0).epsilon(5e-3));
+      const wfpg::buffer<vec3, Exec> drawn(box.exec(), samples);
+      box.exec().for_each(samples, draw_field{field, drawn.view()});
+      std::vector<double> observed(bins.size(), 0.0);
+      for (vec3 d : drawn.to_host(box.exec())) {
+        observed[bins.of(d)] += 1.0;
+        below += field.hemisphere() && glm::dot(d, wave[ray].normal) < -1e-6f;
+      }
+      family.add(chi_square_test(observed, bins.expected(density, samples, 12)),
+                 "ray " + std::to_string(ray));
+    }
+  }
+  CHECK(below == 0);
+  INFO(family.message());
+  CHECK(family.accepted());
+}
+
+/// Where a direction's cell is in a field's grid.
+std::size_t cell_of(const directional_field& field, vec3 d) {
+  const std::uint32_t n = field.grid().resolution();
+  const vec2 uv = field.hemisphere()
+                      ? wfpg::hemisphere_to_square(wfpg::detail::frame(field.normal()).to_local(d))
+                      : wfpg::sphere_to_square(d);
+  const vec2 cell = glm::min(glm::floor(uv * float(n)), vec2(float(n - 1)));
+  return std::size_t(cell.y) * n + std::size_t(cell.x);
+}
+
+/// What each cell of a field sees in the cache, from noted cones; -1 where no cone looked.
+std::vector<double> seen_through(const cone_log& log, const directional_field& field,
+                                 wfpg::exitance_cache_view cache) {
+  const std::uint32_t n = field.grid().resolution();
+  std::vector<double> seen(std::size_t(n) * n, -1.0);
+  for (std::size_t i = 0; i < log.count(); ++i) {
+    const wfpg::ray& cone = log[i];
+    const float distance = box_caster()(cone).distance;
+    const wfpg::node_id leaf = cache.octree().nearest_leaf(cone.origin + distance * cone.direction);
+    const wfpg::node_id node = cache.octree().node_for_cone(leaf, distance, field.cell_solid_angle());
+    seen[cell_of(field, cone.direction)] = double(cache.read(node, -cone.direction));
+  }
+  return seen;
+}
+
+/// The cosine at the centres of cells over a hemisphere.
+double central_cosine(std::size_t cell, std::uint32_t n) {
+  const vec2 corner(float(cell % n), float(cell / n));
+  return double(wfpg::square_to_hemisphere((corner + 0.5f) / float(n)).z);
+}
+
+double largest_error(const directional_field& field, std::vector<double> seen) {
+  const std::uint32_t n = field.grid().resolution();
+  if (field.hemisphere())
+    for (std::size_t i = 0; i < seen.size(); ++i) seen[i] *= central_cosine(i, n);
+  const double sum = sum_of(seen);
+  double largest = 0.0;
+  for (std::uint32_t i = 0; i < n * n; ++i) {
+    const double p = double(field.grid().weight(i % n, i / n)) / double(field.grid().total());
+    largest = std::max(largest, std::abs(p - seen[i] / sum));
+  }
+  return largest;
+}
+
+WFPG_TEST_CASE("field store: fields are what brute force makes of the same cones, also under other light",
+               "[field_store]") {
+  for (guiding_mode mode : modes) {
+    kept_box<Exec> box(slots_of(12, 4), mode, 144 + 36);
+    box.field = {0.0f, 0.0f, false};
+    const auto wave = rays_at({0.3f, 0.0f, 0.6f}, {0, 1, 0}, 40);
+    box.begin();
+    directional_field field = box.prepare(wave).mixture(0).field;
+    CHECK(box.log.count() == 144);
+    std::vector<double> seen = seen_through(box.log, field, box.box.cache.view());
+    CHECK(std::count(seen.begin(), seen.end(), -1.0) == 0);
+    CHECK(largest_error(field, seen) < 1e-5);
+
+    box.box.cache.clear(box.exec());
+    box.box.shine(graded_light);
+    box.begin();
+    field = box.prepare(wave).mixture(0).field;
+    CHECK(box.log.count() == 144 + 36);
+    seen = seen_through(box.log, field, box.box.cache.view());  // later cones replace earlier ones
+    CHECK(largest_error(field, seen) < 1e-5);
+  }
+}
+
+WFPG_TEST_CASE("field store: a field keeps the frame of its first ray", "[field_store]") {
+  kept_box<Exec> box(slots_of(12, 4), guiding_mode::oriented, 144 + 36);
+  box.field = {0.0f, 0.0f, false};
+  const vec3 place(0.3f, 0.0f, 0.6f), first = glm::normalize(vec3(0.2f, 1.0f, 0.3f));
+  box.begin();
+  CHECK(box.prepare(rays_at(place, first)).mixture(0).field.normal() == first);
+  for (const vec3 next : {vec3(0, 1, 0), glm::normalize(vec3(-0.6f, 1.0f, 0.1f))}) {
+    box.begin();
+    const directional_field field = box.prepare(rays_at(place, next)).mixture(0).field;
+    CHECK(field.normal() == first);
+    int below = 0;
+    for (std::size_t i = 0; i < box.log.count() && i < 180; ++i)
+      below += glm::dot(box.log[i].direction, first) < -1e-6f;
+    CHECK(below == 0);
+    if (next.x == 0.0f)
+      CHECK(largest_error(field, seen_through(box.log, field, box.box.cache.view())) < 1e-5);
+  }
+  box.store.invalidate_all(box.exec());
+  CHECK(box.prepare(rays_at(place, {0, 1, 0})).mixture(0).field.normal() == vec3(0, 1, 0));
+}
+
+WFPG_TEST_CASE("field store: refreshes in turn cast each cell of a field once", "[field_store]") {
+  kept_box<Exec> box(slots_of(8, 4, 4), guiding_mode::oriented, 4 * 16);
+  const auto wave = rays_at({0.3f, 0.0f, 0.6f}, {0, 1, 0});
+  box.begin();
+  box.prepare(wave);
+  box.log.take();
+  directional_field field;
+  for (int refresh = 0; refresh < 4; ++refresh) {
+    box.begin();
+    field = box.prepare(wave).mixture(0).field;
+  }
+  REQUIRE(box.log.count() == 64);
+  const std::vector<double> seen = seen_through(box.log, field, box.box.cache.view());
+  CHECK(std::count(seen.begin(), seen.end(), -1.0) == 0);
+}
+
+WFPG_TEST_CASE("field store: refreshes follow light that moves without casting all cones", "[field_store]") {
+  const auto moved = [](std::uint32_t face, float u, float v) {
+    const vec3 p = face_point(face, u, v);
+    return emitted({1.0f - p.x, p.y, 1.0f - p.z});
+  };
+  const vec3 to_old = glm::normalize(vec3(0.3f, 1.0f, 0.3f)),
+             to_new = glm::normalize(vec3(-0.3f, 1.0f, -0.3f));
+  kept_box<Exec> box(slots_of(16, 4, 16));
+  const auto wave = rays_at({0.5f, 0.0f, 0.5f}, {0, 1, 0}, 10);
+  box.begin();
+  const directional_field before = box.prepare(wave).mixture(0).field;
+  CHECK(before.pdf(to_old) > 20.0f * before.pdf(to_new));
+  box.box.cache.clear(box.exec());
+  box.box.shine(moved);
+  box.begin();
+  CHECK(box.cones(wave) == 16);
+  const directional_field after = box.prepare(wave).mixture(0).field;
+  CHECK(after.pdf(to_new) > 20.0f * after.pdf(to_old));
+}
+
+/// What a store tells after samples of births, refreshes, refusals and evictions.
+struct store_history {
+  std::vector<std::uint64_t> fields;
+  std::uint64_t born = 0, freed = 0, refreshed = 0, refused = 0;
+
+  bool operator==(const store_history& other) const {
+    return fields == other.fields && born == other.born && freed == other.freed &&
+           refreshed == other.refreshed && refused == other.refused;
+  }
+};
+
+constexpr std::size_t inline_cones = ~std::size_t(0);
+
+/// From an inline caster, or a batch caster with a buffer of so many bytes.
+template <class Exec>
+store_history history(std::size_t buffer_bytes = inline_cones, batch_box_caster::log* log = nullptr) {
+  wfpg::kept_field_options options = slots_of(8, 90);
+  options.idle_samples = 2;
+  options.max_wave_cones = 40 * 64;
+  kept_box<Exec> box(options);
+  store_history result;
+  for (std::uint32_t sample = 0; sample < 6; ++sample) {
+    box.begin();
+    for (std::uint32_t depth = 0; depth < 3; ++depth) {
+      auto wave = wall_surfaces(600, sample / 3);
+      for (std::size_t i = depth; i < wave.size(); i += 7) wave[i].bsdf.kind = bsdf_kind::glass;
+      const guide_view view = buffer_bytes == inline_cones
+                                  ? box.prepare(wave)
+                                  : box.prepare(wave, batch_box_caster{{}, log}, buffer_bytes);
+      const auto bits = field_bits(view, wave.size());
+      result.fields.insert(result.fields.end(), bits.begin(), bits.end());
+    }
+    box.end();
+    result.refused += box.counts().refused;
+  }
+  result.born = box.counts().born;
+  result.freed = box.counts().freed;
+  result.refreshed = box.counts().refreshed;
+  return result;
+}
+
+WFPG_TEST_CASE("field store: the same bits on any number of threads", "[field_store]") {
+  const store_history first = history<Exec>();
+  CHECK(first.born > 90);
+  CHECK(first.freed > 0);
+  CHECK(first.refreshed > 50);
+  CHECK(first.refused > 0);
+  for (std::size_t threads : {1, 2, 5}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    tbb::task_arena arena(static_cast<int>(threads));
+    INFO(threads << " TBB threads");
+    CHECK(arena.execute([] { return history<Exec>(); }) == first);
+  }
+#if !defined(WFPG_TEST_ONLY_TBB)
+  const int before = omp_get_max_threads();
+  for (int threads : {1, 2, 5}) {
+    omp_set_num_threads(threads);
+    INFO(threads << " OpenMP threads");
+    CHECK(history<Exec>() == first);
+  }
+  omp_set_num_threads(before);
+#endif
+}
+
+WFPG_TEST_CASE("field store: casters of both forms, and buffers of any size, give the same bits",
+               "[field_store]") {
+  const store_history in_place = history<Exec>();
+  std::size_t rays = 0;
+  for (std::size_t bytes : {std::size_t(0), std::size_t(5 * 64 * 40), std::size_t(1) << 22}) {
+    batch_box_caster::log log;
+    CHECK(history<Exec>(bytes, &log) == in_place);
+    if (bytes == 0) CHECK(log.largest == 64);
+    if (bytes == 0) CHECK(log.calls > 90);
+    if (bytes > 1000000) CHECK(log.calls <= 2 * 6 * 3);
+    if (bytes > 0) CHECK(log.rays == rays);
+    rays = log.rays;
+  }
+}
+
+}  // namespace
+
+#if !defined(WFPG_TEST_ONLY_TBB)
+TEST_CASE("field store: policies of one warp width give the same bits", "[field_store]") {
+  const store_history serial = history<wfpg::exec::seq>();
+  CHECK(history<wfpg::exec::omp>() == serial);
+  CHECK(history<wfpg::exec::tbb>() == serial);
+  CHECK(history<wfpg::exec::basic_omp<8>>() == history<wfpg::exec::basic_seq<8>>());
+  CHECK(history<wfpg::exec::basic_tbb<8>>() == history<wfpg::exec::basic_seq<8>>());
+}
+#endif
