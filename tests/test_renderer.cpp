@@ -284,6 +284,32 @@ TEST_CASE("a rendering reports itself and takes samples or seconds", "[renderer]
   CHECK(timed.report.total_seconds >= 0.05);
 }
 
+TEST_CASE("checkpoints are the pictures on the way", "[renderer]") {
+  render_options options;
+  options.width = options.height = 16;
+  options.octree_resolution = 32;
+  options.spp = 4;
+  const scene box = make_builtin_scene("cornell-box");
+  CHECK(render::render(box, options, {}).checkpoints.empty());
+  options.checkpoints = true;
+  const render_result result = render::render(box, options, {});
+  REQUIRE(result.checkpoints.size() == 3);
+  CHECK(result.checkpoints[0].seconds <= result.checkpoints[2].seconds);
+  CHECK(result.checkpoints[2].samples == 4);
+  CHECK(result.checkpoints[2].picture.pixels == result.picture.pixels);
+  options.spp = 2;
+  CHECK(render::render(box, options, {}).picture.pixels == result.checkpoints[1].picture.pixels);
+}
+
+TEST_CASE("later samples count more only where they are better", "[renderer]") {
+  render_options options;
+  CHECK(combination_of(options) == wfpg::sample_combination::pt_linear);
+  options.method = sampling_method::pt;
+  CHECK(combination_of(options) == wfpg::sample_combination::constant);
+  options.combine = wfpg::sample_combination::quadratic;
+  CHECK(combination_of(options) == wfpg::sample_combination::quadratic);
+}
+
 TEST_CASE("a guided rendering finds the furnace's radiance", "[renderer][guided]") {
   const scene furnace = make_builtin_scene("furnace");
   render_options options;

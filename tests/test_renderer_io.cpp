@@ -2,6 +2,7 @@
 #include "builtin_scenes.hpp"
 #include "image_io.hpp"
 #include "metrics.hpp"
+#include "plot.hpp"
 #include "support/catch.hpp"
 #include "support/renderer_io.hpp"
 
@@ -233,4 +234,23 @@ TEST_CASE("The glass around the enclosed lamp is closed and faces outwards", "[r
 
 TEST_CASE("The conductor box of ajar is closed", "[renderer][builtin]") {
   CHECK(open_edges(render::make_builtin_scene("ajar"), material_kind::conductor) == 0);
+}
+
+TEST_CASE("plots: every positive point is drawn inside the frame, names are escaped", "[renderer][plot]") {
+  temporary_folder folder;
+  const render::curve falling{"a<b", {{0.02, 5.0}, {0.2, 0.5}, {7.0, 0.003}, {0.0, 1.0}, {1.0, -1.0}}};
+  render::write_svg(folder.file("a.svg"), {"title", "x", "y", {falling, {"empty", {}}}});
+  const std::string svg = content_of(folder.file("a.svg"));
+  CHECK(contains(svg, "a&lt;b"));
+  CHECK(contains(svg, ">title<"));
+  int circles = 0;
+  for (std::size_t at = svg.find("<circle cx='"); at != std::string::npos;
+       at = svg.find("<circle cx='", at + 1)) {
+    ++circles;
+    const double x = std::stod(svg.substr(at + 12));
+    const double y = std::stod(svg.substr(svg.find("cy='", at) + 4));
+    CHECK((x >= 80.0 && x <= 520.0 && y >= 40.0 && y <= 365.0));
+  }
+  CHECK(circles == 3);
+  CHECK_THROWS_AS(render::write_svg("/nonexistent/a.svg", {}), std::runtime_error);
 }

@@ -1,4 +1,4 @@
-// The six ways to combine samples, sample by sample.
+// The ways to combine samples, sample by sample.
 #include "support/catch.hpp"
 
 #include <wfpg/sample_combiner.hpp>
@@ -25,6 +25,7 @@ TEST_CASE("sample combiner: weights of the first eight samples", "[sample_combin
   CHECK(weights(sample_combination::one_two) == sequence{1, 2, 2, 2, 2, 2, 2, 2});
   CHECK(weights(sample_combination::discard_first) == sequence{0, 1, 1, 1, 1, 1, 1, 1});
   CHECK(weights(sample_combination::pt_first) == sequence{1, 1, 1, 1, 1, 1, 1, 1});
+  CHECK(weights(sample_combination::pt_linear) == sequence{1, 2, 3, 4, 5, 5, 5, 5});
 }
 
 TEST_CASE("sample combiner: weights stay bounded", "[sample_combiner]") {
@@ -33,11 +34,12 @@ TEST_CASE("sample combiner: weights stay bounded", "[sample_combiner]") {
   CHECK(wfpg::sample_weight(sample_combination::quadratic, 0xffffffffu) == 25.0f);
 }
 
-TEST_CASE("sample combiner: only pt_first wants an unguided sample", "[sample_combiner]") {
+TEST_CASE("sample combiner: only pt_first and pt_linear want an unguided sample", "[sample_combiner]") {
   using wfpg::sample_combination;
   for (sample_combination c :
        {sample_combination::constant, sample_combination::linear, sample_combination::quadratic,
         sample_combination::one_two, sample_combination::discard_first})
     CHECK(wfpg::unguided_samples(c) == 0);
-  CHECK(wfpg::unguided_samples(sample_combination::pt_first) == 1);
+  for (sample_combination c : {sample_combination::pt_first, sample_combination::pt_linear})
+    CHECK(wfpg::unguided_samples(c) == 1);
 }
