@@ -18,6 +18,7 @@
 #include <wfpg/radiance_field.hpp>
 
 #include <thrust/fill.h>
+#include <thrust/functional.h>
 #include <thrust/transform_scan.h>
 
 namespace wfpg {
