@@ -73,6 +73,7 @@ class field_store {
   /// Counts a wave's rays and guides none. `Rays`: (std::size_t) -> ray_to_bin.
   template <class Rays>
   void count(const Exec& exec, std::size_t n, const Rays& rays) {
+    if (!counts_rays()) return;
     exec.for_each(n, detail::count_rays<Rays>{rays, tree_, marks_.view()});
   }
 
@@ -124,6 +125,8 @@ class field_store {
   static const kept_field_options& checked(const kept_field_options& options, std::uint32_t nodes);
   detail::field_slots_view view() const { return {slots_.view(), table_.data(), mask()}; }
   detail::wanted_keys wanted() const { return {wanted_.data(), mask()}; }
+  // Counts settle soon, and each costs an atomic.
+  bool counts_rays() const { return sample_ <= 8 || sample_ % 4 == 0; }
   std::uint32_t mask() const { return static_cast<std::uint32_t>(table_.size() - 1); }
 
   template <class Surfaces>
@@ -141,6 +144,7 @@ class field_store {
   kept_field_options options_;
   std::size_t capacity_ = 0;  // slots
   std::uint32_t sample_ = 0;
+  std::uint32_t counted_samples_ = 0;
   detail::bin_marks<Exec> marks_;
   buffer<detail::field_slot, Exec> slots_;
   buffer<resident_field, Exec> fields_;  // a slot

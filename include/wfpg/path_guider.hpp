@@ -43,7 +43,8 @@ struct guider_options {
   kept_field_options kept;          ///< resolution, budget and refresh of kept fields
   std::uint32_t min_bin_level = 3;  ///< l_min: no bin is larger than a node of this level (root 0)
   std::uint32_t rays_per_bin =
-      64;  ///< c_ray: rays that make a node a bin, at least 1; in a wave, or with kept fields in a sample
+      64;  ///< c_ray, at least 1: rays of a wave that make a node a bin; of kept fields
+           ///< about what a bin gets in a sample, or more for their budget to suffice
   std::uint32_t field_resolution =
       32;  ///< cells along a transient field's side at depth 0, in [2, 128]; halves at each depth
   std::uint32_t min_field_resolution = 16;  ///< down to this, in [2, 128]
@@ -118,7 +119,7 @@ class path_guider {
   exitance_cache_view cache() const { return cache_.view(); }
   const sparse_voxel_octree<Exec>& octree() const { return octree_; }
   const guider_options& options() const { return options_; }
-  /// Whether the sample that has begun is guided, and how many cells its fields have at a depth.
+  /// Whether the sample that has begun is guided, and how many cells transient fields have at a depth.
   bool guided() const { return samples_ > options_.unguided_samples && !octree_.view().empty(); }
   std::uint32_t field_resolution(std::uint32_t depth) const;
 

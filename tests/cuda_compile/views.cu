@@ -106,7 +106,7 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   const d::field_slots_view slots;
   const d::use_slot use{slots, nullptr, 1, 0};
   d::field_store_state* const state = nullptr;
-  launch(d::find_fields<d::wave_rays<surfaces>>{{}, tree, {}, use, {}, nullptr, state, 32});
+  launch(d::find_fields<d::wave_rays<surfaces>>{{}, tree, {}, use, {}, nullptr, state, 32, true});
   launch(d::count_rays<d::wave_rays<surfaces>>{{}, tree, {}});
   launch(d::bear_fields{slots, {}, nullptr, nullptr, state, 1});
   launch(d::count_births{{slots, {}, nullptr, nullptr, state, 1}, state});

@@ -101,7 +101,7 @@ struct wanted_keys {
   }
 };
 
-/// Counts rays and finds their slots. `Rays`: (std::size_t) -> ray_to_bin.
+/// Finds rays' slots, and counts the rays where `counted`. `Rays`: (std::size_t) -> ray_to_bin.
 template <class Rays>
 struct find_fields {
   Rays rays;
@@ -112,6 +112,7 @@ struct find_fields {
   std::uint32_t* missing_keys;
   field_store_state* state;
   std::uint32_t wave_size;
+  bool counted;
 
   WFPG_HD void operator()(std::size_t i) const {
     use.field_of_ray[i] = no_slot;
@@ -123,7 +124,7 @@ struct find_fields {
       atomic_add(&state->unbinned, 1);
       return;
     }
-    marks.count(leaf);
+    if (counted) marks.count(leaf);
     const std::uint32_t key = marks.bin(leaf) * orientations + ray.orientation;
     const std::uint32_t slot = use.slots.find(key);
     if (slot != no_slot) {

@@ -45,20 +45,19 @@ struct adapt_pressure {
 
 /// Counts a run of rays with fields.
 struct count_served {
-  static constexpr std::size_t run = 4096;
+  static constexpr std::size_t run = 64;
   array_view<const std::uint32_t> field_of_ray;
   const resident_field* fields;
   field_store_state* state;
 
-  template <class Block>
-  WFPG_HD void operator()(Block& block, std::size_t i) const {
-    const std::size_t first = i * run;
-    const auto n = static_cast<int>(min(run, field_of_ray.size() - first));
-    const std::uint32_t served = block.sum(n, [&](int j) -> std::uint32_t {
-      const std::uint32_t field = field_of_ray[first + static_cast<std::size_t>(j)];
-      return field != no_slot && fields[field].fraction > 0.0f ? 1u : 0u;
-    });
-    block.for_each(1, [&](int) { atomic_add(&state->served, served); });
+  WFPG_HD void operator()(std::size_t i) const {
+    const std::size_t end = min((i + 1) * run, field_of_ray.size());
+    std::uint32_t served = 0;
+    for (std::size_t ray = i * run; ray < end; ++ray) {
+      const std::uint32_t field = field_of_ray[ray];
+      if (field != no_slot && fields[field].fraction > 0.0f) ++served;
+    }
+    if (served > 0) atomic_add(&state->served, served);
   }
 };
 
@@ -107,6 +106,7 @@ field_store<Exec>::field_store(const Exec& exec, const sparse_voxel_octree_view&
 template <class Exec>
 void field_store<Exec>::begin_sample(const Exec& exec, std::uint32_t sample) {
   sample_ = sample;
+  counted_samples_ += counts_rays() ? 1 : 0;
   exec.for_each(1, detail::begin_store_sample{state_.data()});
   exec.for_each(capacity_, detail::evict_fields{slots_.view(), fields_.data(), state_.data(), sample,
                                                 options_.idle_samples});
@@ -124,7 +124,7 @@ void field_store<Exec>::end_sample(const Exec& exec) {
   const bool is_power_of_two = (sample_ & (sample_ - 1)) == 0;
   if (sample_ == 0 || !is_power_of_two) return;
   exec.for_each(1, detail::adapt_pressure{state_.data()});
-  marks_.mark(exec, sample_, capacity_, &state_.data()->pressure);
+  marks_.mark(exec, counted_samples_, capacity_, &state_.data()->pressure);
 }
 
 template <class Exec>
@@ -141,8 +141,8 @@ guide_view field_store<Exec>::prepare(const Exec& exec, const kept_field_wave<Su
   build(exec, detail::kept_field_builder<kept_field_wave<Surfaces>>{wave, kept}, caster, caster_buffer_bytes);
   const array_view<const std::uint32_t> field_of_ray(field_of_ray_.data(), wave.ray_count);
   const std::size_t run = detail::count_served::run;
-  exec.for_each_block((wave.ray_count + run - 1) / run, 0,
-                      detail::count_served{field_of_ray, fields_.data(), state_.data()});
+  exec.for_each((wave.ray_count + run - 1) / run,
+                detail::count_served{field_of_ray, fields_.data(), state_.data()});
   return {field_of_ray, fields_.data(), words_.data(), options_.resolution};
 }
 
@@ -162,7 +162,8 @@ void field_store<Exec>::find(const Exec& exec, const kept_field_wave<Surfaces>& 
                                                   wanted(),
                                                   missing_keys_.data(),
                                                   state_.data(),
-                                                  n});
+                                                  n,
+                                                  counts_rays()});
   bear(exec);
   exec.for_each(exec::device_count{&state_.data()->missing, n},
                 detail::find_missing_fields{tree_, use, missing_keys_.data(), state_.data()});
