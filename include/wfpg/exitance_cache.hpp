@@ -193,6 +193,9 @@ struct fold_deposits {
   WFPG_HD void operator()(std::size_t i) const {
     if (!(queue[i] & oldest_deposit)) return;
     const std::uint32_t key = static_cast<std::uint32_t>(queue[i]) & ~oldest_deposit;
+    leaf_exitance& leaf = leaves[key / 2];
+    double mean = leaf.means[key % 2];  // arrive while the deposits are summed
+    std::uint32_t count = leaf.counts[key % 2];
     std::uint32_t n = 0, largest = 0;
     for_each_deposit(key, [&](std::uint32_t bits) {
       ++n;
@@ -201,8 +204,9 @@ struct fold_deposits {
     exact_sum sum(largest, n);
     for_each_deposit(key, [&](std::uint32_t bits) { sum.add(bits); });
     newest[key] = no_deposit;
-    leaf_exitance& leaf = leaves[key / 2];
-    add_to_mean(leaf.means[key % 2], leaf.counts[key % 2], sum.value(), n);
+    add_to_mean(mean, count, sum.value(), n);
+    leaf.means[key % 2] = mean;
+    leaf.counts[key % 2] = count;
   }
 
  private:

@@ -27,7 +27,8 @@ struct field_slot {
 
   /// Fields settle as samples accumulate: an eighth of them may pass between two builds.
   WFPG_HD bool is_due(std::uint32_t sample) const {
-    return builds == 0 || sample - last_built >= max(1u, sample / 8);
+    const std::uint64_t passed = sample - last_built;
+    return builds == 0 || (passed >= 1 && 8 * passed >= sample);
   }
 };
 
