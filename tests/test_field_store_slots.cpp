@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -425,15 +424,6 @@ WFPG_TEST_CASE("field store: unusual rays are counted and have no field", "[fiel
   CHECK(box.state().served == 7);
   CHECK(count_guided(view, wave.size()) == 7);
   CHECK(count_guided(box.prepare({}), 12) == 0);
-}
-
-std::string refusal(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "";
 }
 
 WFPG_TEST_CASE("field store: options out of range are named, and too many rays refused", "[field_store]") {

@@ -66,22 +66,13 @@ const std::vector<bad_option>& bad_options() {
   return list;
 }
 
-std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "";
-}
-
 WFPG_TEST_CASE("path guider: options out of range are named", "[path_guider]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   for (const bad_option& bad : bad_options()) {
     guider_options options;
     bad.spoil(options);
-    const std::string message = message_of([&] { path_guider<Exec>(exec, mesh.view(), options); });
+    const std::string message = refusal([&] { path_guider<Exec>(exec, mesh.view(), options); });
     INFO("expected: " << bad.name << ", message: " << message);
     CHECK(message.find(bad.name) != std::string::npos);
   }
@@ -90,7 +81,7 @@ WFPG_TEST_CASE("path guider: options out of range are named", "[path_guider]") {
   good.field_resolution = 128;
   good.min_field_resolution = 2;
   good.octree_resolution = 1;
-  CHECK(message_of([&] { path_guider<Exec>(exec, mesh.view(), good); }).empty());
+  CHECK(refusal([&] { path_guider<Exec>(exec, mesh.view(), good); }).empty());
 }
 
 WFPG_TEST_CASE("path guider: waves beyond the capacity, and outputs that are too small", "[path_guider]") {

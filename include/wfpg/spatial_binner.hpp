@@ -57,6 +57,11 @@ struct bins_view : partition_view {
 
 namespace detail {
 
+/// The leaf that an active ray's surface lies in, or invalid_node.
+WFPG_HD inline node_id leaf_of(const sparse_voxel_octree_view& tree, const ray_to_bin& ray) {
+  return is_finite(ray.position) ? tree.nearest_leaf(ray.position) : invalid_node;
+}
+
 /// `Rays`: (std::size_t) -> ray_to_bin.
 template <class Rays>
 struct count_at_leaves {
@@ -69,7 +74,7 @@ struct count_at_leaves {
     const ray_to_bin ray = rays(i);
     keys[i] = 0xffffffffu;
     if (!ray.active) return;
-    const node_id leaf = is_finite(ray.position) ? tree.nearest_leaf(ray.position) : invalid_node;
+    const node_id leaf = leaf_of(tree, ray);
     if (leaf == invalid_node) {
       atomic_add(unbinned, 1);
       return;

@@ -10,9 +10,22 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <functional>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 namespace wfpg_test {
+
+/// What std::invalid_argument says that a call throws; empty where it throws none.
+inline std::string refusal(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "";
+}
 
 /// The ceiling's patch, 0.7 <= x, z <= 0.9 at y = 1, and its radiance.
 constexpr float patch_low = 0.7f, patch_high = 0.9f, patch_radiance = 10.0f;

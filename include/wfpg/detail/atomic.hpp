@@ -4,6 +4,7 @@
 #include <wfpg/detail/config.hpp>
 
 #include <cstdint>
+#include <type_traits>
 
 namespace wfpg::detail {
 
@@ -17,16 +18,10 @@ WFPG_HD inline std::uint32_t atomic_add(std::uint32_t* target, std::uint32_t val
 }
 
 /// *target as it is at some moment.
-WFPG_HD inline std::uint32_t atomic_load(const std::uint32_t* target) {
+template <class T>
+WFPG_HD T atomic_load(const T* target) {
 #if defined(__CUDA_ARCH__)
-  return *static_cast<const volatile std::uint32_t*>(target);
-#else
-  return __atomic_load_n(target, __ATOMIC_RELAXED);
-#endif
-}
-WFPG_HD inline std::uint64_t atomic_load(const std::uint64_t* target) {
-#if defined(__CUDA_ARCH__)
-  return *static_cast<const volatile std::uint64_t*>(target);
+  return *static_cast<const volatile T*>(target);
 #else
   return __atomic_load_n(target, __ATOMIC_RELAXED);
 #endif
@@ -61,22 +56,14 @@ WFPG_HD inline std::uint32_t atomic_compare_exchange(std::uint32_t* target, std:
 #endif
 }
 
-/// *target = the lesser of itself and value.
-WFPG_HD inline void atomic_min(std::uint32_t* target, std::uint32_t value) {
+/// *target = the lesser of itself and value, 32 or 64 bits.
+template <class T>
+WFPG_HD void atomic_min(T* target, T value) {
 #if defined(__CUDA_ARCH__)
-  atomicMin(target, value);
+  using word = std::conditional_t<sizeof(T) == 8, unsigned long long, unsigned int>;
+  atomicMin(reinterpret_cast<word*>(target), static_cast<word>(value));
 #else
-  std::uint32_t before = atomic_load(target);
-  while (value < before &&
-         !__atomic_compare_exchange_n(target, &before, value, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
-  }
-#endif
-}
-WFPG_HD inline void atomic_min(std::uint64_t* target, std::uint64_t value) {
-#if defined(__CUDA_ARCH__)
-  atomicMin(reinterpret_cast<unsigned long long*>(target), static_cast<unsigned long long>(value));
-#else
-  std::uint64_t before = atomic_load(target);
+  T before = atomic_load(target);
   while (value < before &&
          !__atomic_compare_exchange_n(target, &before, value, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
   }

@@ -12,7 +12,7 @@
 
 namespace wfpg::detail {
 
-inline constexpr std::uint32_t no_slot = 0xffffffffu;
+inline constexpr std::uint32_t no_slot = guide_view::no_field;
 inline constexpr std::uint32_t no_key = 0xffffffffu;
 
 /// What is known of a slot, beside its field.
@@ -63,7 +63,6 @@ struct field_store_state {
   std::uint32_t refused_births_before = 0;  ///< in the sample before
   std::uint32_t delayed_births = 0;         ///< in this sample, for the limit on cones
   std::uint32_t refused_since_mark = 0;
-  std::uint32_t evicted = 0;  ///< at the beginning of this sample
   // Of the last wave:
   std::uint32_t missing = 0;   ///< the wave's size where some ray found no slot at first, else 0
   std::uint32_t unbinned = 0;  ///< rays outside every voxel
@@ -72,7 +71,7 @@ struct field_store_state {
   std::uint32_t all = 0;       ///< builds that cast all cells
   std::uint32_t part = 0;      ///< builds that cast a part of them
   // Since the beginning:
-  std::uint64_t born = 0, freed = 0, refreshed = 0;
+  std::uint64_t born = 0, refreshed = 0;
 };
 
 /// A ray of the wave gets a slot.
@@ -86,7 +85,8 @@ struct use_slot {
     field_slot& s = slots.slots[slot];
     if (atomic_load(&s.last_used) != sample) atomic_store(&s.last_used, sample);
     // The least random number picks the origin, whichever ray comes first.
-    if (s.is_due(sample)) atomic_min(&s.origin, (hash(seed, ray) & ~0xffffffffull) | ray);
+    const std::uint64_t candidate = (hash(seed, ray) & ~0xffffffffull) | ray;
+    if (s.is_due(sample)) atomic_min(&s.origin, candidate);
     field_of_ray[ray] = slot;
   }
 };
@@ -120,7 +120,7 @@ struct find_fields {
     missing_keys[i] = no_key;
     const ray_to_bin ray = rays(i);
     if (!ray.active) return;
-    const node_id leaf = is_finite(ray.position) ? tree.nearest_leaf(ray.position) : invalid_node;
+    const node_id leaf = leaf_of(tree, ray);
     if (leaf == invalid_node) {
       atomic_add(&state->unbinned, 1);
       return;
@@ -146,8 +146,8 @@ struct count_rays {
   bin_marks_view marks;
   WFPG_HD void operator()(std::size_t i) const {
     const ray_to_bin ray = rays(i);
-    if (!ray.active || !is_finite(ray.position)) return;
-    const node_id leaf = tree.nearest_leaf(ray.position);
+    if (!ray.active) return;
+    const node_id leaf = leaf_of(tree, ray);
     if (leaf != invalid_node) marks.count(leaf);
   }
 };
@@ -252,6 +252,8 @@ struct list_builds {
   std::uint64_t seed;
 
   WFPG_HD void operator()(std::size_t i) const {
+    field_slot& s = slots[i];
+    if (i > 0 && s.origin == field_slot::unpicked) return;
     const std::uint64_t total = through[slots.size() - 1];
     const auto wholes = static_cast<std::uint32_t>(total >> 32), parts = static_cast<std::uint32_t>(total);
     const std::uint32_t most_wholes = limits.all(wholes), most_parts = limits.parts(parts, most_wholes);
@@ -260,7 +262,6 @@ struct list_builds {
       state->part = most_parts;
       state->refreshed += most_parts;
     }
-    field_slot& s = slots[i];
     if (s.origin == field_slot::unpicked) return;
     const bool whole = s.builds == 0;
     const std::uint32_t rank = whole ? rotated(static_cast<std::uint32_t>(through[i] >> 32) - 1, wholes)
@@ -282,7 +283,7 @@ struct list_builds {
 struct evict_fields {
   array_view<field_slot> slots;
   resident_field* fields;
-  field_store_state* state;
+  const field_store_state* state;
   std::uint32_t sample;
   std::uint32_t idle_samples;
 
@@ -292,7 +293,6 @@ struct evict_fields {
     if (s.key == no_key || sample - s.last_used <= most) return;
     s = {};
     fields[i] = {};
-    atomic_add(&state->evicted, 1);
   }
 };
 

@@ -13,14 +13,7 @@ struct begin_store_sample {
     state->refused_births_before = state->refused_births;
     state->refused_births = state->delayed_births = 0;
     state->taken = 0;
-    state->evicted = 0;
   }
-};
-
-/// After evictions.
-struct count_evicted {
-  field_store_state* state;
-  WFPG_HD void operator()(std::size_t) const { state->freed += state->evicted; }
 };
 
 /// The state as a wave begins; origins that a wave before left behind, where its caster threw, are void.
@@ -110,7 +103,6 @@ void field_store<Exec>::begin_sample(const Exec& exec, std::uint32_t sample) {
   exec.for_each(1, detail::begin_store_sample{state_.data()});
   exec.for_each(capacity_, detail::evict_fields{slots_.view(), fields_.data(), state_.data(), sample,
                                                 options_.idle_samples});
-  exec.for_each(1, detail::count_evicted{state_.data()});
   ::thrust::fill_n(exec.thrust(), table_.data(), table_.size(), detail::no_slot);
   const array_view<std::uint32_t> free_through(list_.data(), capacity_);
   ::thrust::transform_inclusive_scan(exec.thrust(), slots_.data(), slots_.data() + capacity_,
@@ -246,10 +238,10 @@ kept_field_statistics field_store<Exec>::statistics(const Exec& exec) const {
   const detail::field_store_state state = read_element(exec, state_.data());
   kept_field_statistics result;
   result.capacity = static_cast<std::uint32_t>(capacity_);
-  result.live = static_cast<std::uint32_t>(state.born - state.freed);
+  result.live = sample_ > 0 ? result.capacity - (state.free - state.taken) : 0;
   result.bytes_a_slot = bytes_a_slot(options_.resolution);
   result.born = state.born;
-  result.freed = state.freed;
+  result.freed = state.born - result.live;
   result.refreshed = state.refreshed;
   result.refused = state.refused_births + state.delayed_births;
   return result;
