@@ -172,8 +172,8 @@ made_fields make_fields(const lit_box<Exec>& box, const std::vector<test_surface
   const stored_surfaces stored{const_view<test_surface>(surfaces)};
   wfpg::spatial_binner<Exec> binner(exec, box.tree.view(), {1, 16}, wave.size());
   const auto bins = binner.bin(exec, wave.size(), wfpg::detail::wave_rays<stored_surfaces>{stored, mode});
-  const wfpg::detail::bin_fields<stored_surfaces> fields{bins,       stored, box.cache.view(), {}, mode,
-                                                         resolution, 42};
+  const wfpg::detail::bin_fields<stored_surfaces> fields{bins, stored, box.cache.view(), {}, mode, resolution,
+                                                         0,    42};
   const std::size_t n = wfpg::read_element(exec, bins.count);
   const wfpg::buffer<std::uint32_t, Exec> words(exec, n * wfpg::detail::distribution_words(resolution));
   const wfpg::buffer<wfpg::resident_field, Exec> resident(exec, n);
@@ -182,7 +182,7 @@ made_fields make_fields(const lit_box<Exec>& box, const std::vector<test_surface
   wfpg::detail::for_each_field(
       exec, fields, caster,
       wfpg::detail::resident_sink{
-          bins, words.data(), resident.data(), field_of_ray.data(), {0.5f, 0.5f, 0}, resolution},
+          bins, words.data(), resident.data(), field_of_ray.data(), {0.5f, 0.5f, 0}, resolution, 0},
       0, buffer_bytes);
   made_fields result{words.to_host(exec), field_of_ray.to_host(exec), resident.to_host(exec), {}};
   for (std::size_t bin = 0; bin < n; ++bin) result.orientations.push_back(bins.orientation(bin));

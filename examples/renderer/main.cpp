@@ -45,8 +45,10 @@ void add_method_options(CLI::App& app, render::render_options& options) {
   using render::sampling_method;
   using combine = wfpg::sample_combination;
   add_choice<sampling_method>(app, "--method", options.method,
-                              {{"pt", sampling_method::pt}, {"wfpg", sampling_method::wfpg}},
-                              "path tracing, or guided by wfpg (default)");
+                              {{"pt", sampling_method::pt},
+                               {"wfpg", sampling_method::wfpg},
+                               {"wfpg-product", sampling_method::wfpg_product}},
+                              "path tracing; guided by fields (default), or by their products with BSDFs");
   add_choice<guiding>(app, "--guiding", options.mode,
                       {{"oriented", guiding::oriented}, {"plain", guiding::plain}},
                       "bins by position and normal (default), or by position alone");
@@ -92,6 +94,8 @@ void add_guider_options(CLI::App& app, render::render_options& options) {
       ->check(CLI::Range(1, 1 << 20));
   app.add_option("--field-budget", options.field_budget, "memory of kept fields, such as 16MiB (the default)")
       ->transform(CLI::AsSizeValue(false));
+  app.add_option("--product-resolution", options.product_resolution,
+                 "blocks a side of wfpg-product's products: 4, 8 or 16 (default: 8)");
   app.add_option("--rays-per-bin", options.rays_per_bin, "rays that a bin should have (default: 64)");
   app.add_option("--min-bin-level", options.min_bin_level, "octree level of the largest bins (default: 3)");
   app.add_option("--guide-fraction", options.guide_fraction,

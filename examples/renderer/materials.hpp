@@ -39,21 +39,30 @@ struct bsdf {
     return vec3(fresnel_dielectric(glm::dot(wo, h), ior) * facets) + colour * (below * wi.z / pi);
   }
   WFPG_HD float eval(vec3 outgoing, vec3 incident) const {
-    return wfpg::luminance(eval_rgb(outgoing, incident));
+    if (kind != material_kind::lambert) return wfpg::luminance(eval_rgb(outgoing, incident));
+    return reflects(outgoing, incident) ? wfpg::luminance(colour) * glm::dot(incident, normal) / pi : 0.0f;
+  }
+
+  /// The coat of the plastic and the conductor, and how often sample() draws from it.
+  WFPG_HD wfpg::glossy_part glossy(vec3 outgoing) const {
+    if (kind == material_kind::conductor) return {1.0f, alpha};
+    if (kind == material_kind::plastic) return {coat_probability(glm::dot(outgoing, normal)), alpha};
+    return {};
   }
 
   /// Density of sample(), per steradian; 0 for delta lobes.
   WFPG_HD float pdf(vec3 outgoing, vec3 incident) const {
+    const float coat = glossy(outgoing).share;
+    return (coat > 0.0f ? coat * pdf_part(true, outgoing, incident) : 0.0f) +
+           (coat < 1.0f ? (1.0f - coat) * pdf_part(false, outgoing, incident) : 0.0f);
+  }
+  /// The same of one part.
+  WFPG_HD float pdf_part(bool coat, vec3 outgoing, vec3 incident) const {
     if (is_delta() || is_black() || !reflects(outgoing, incident)) return 0.0f;
+    if (!coat) return glm::dot(incident, normal) / pi;
     const frame local(normal);
     const vec3 wo = local.to_local(outgoing);
-    const vec3 wi = local.to_local(incident);
-    const float diffuse = wi.z / pi;
-    if (kind == material_kind::lambert) return diffuse;
-    const float facets = ggx{alpha}.pdf(wo, glm::normalize(wo + wi));
-    if (kind == material_kind::conductor) return facets;
-    const float coat = coat_probability(wo.z);
-    return coat * facets + (1.0f - coat) * diffuse;
+    return ggx{alpha}.pdf(wo, glm::normalize(wo + local.to_local(incident)));
   }
 
   WFPG_HD wfpg::bsdf_sample sample(vec3 outgoing, vec2 u) const {
@@ -63,12 +72,21 @@ struct bsdf {
       const vec3 incident = mirrored(outgoing, normal);
       return {incident, reflects(outgoing, incident) ? 1.0f : 0.0f};
     }
+    const float coat = glossy(outgoing).share;
+    const bool from_coat = u.x < coat;
+    u.x = from_coat ? u.x / coat : (u.x - coat) / (1.0f - coat);
+    wfpg::bsdf_sample drawn = sample_part(from_coat, outgoing, {glm::min(0x1.fffffep-1f, u.x), u.y});
+    if (drawn.pdf > 0.0f && coat > 0.0f) drawn.pdf = pdf(outgoing, drawn.direction);
+    return drawn;
+  }
+  /// The same from one part, with its density.
+  WFPG_HD wfpg::bsdf_sample sample_part(bool coat, vec3 outgoing, vec2 u) const {
     const frame local(normal);
     const vec3 wo = local.to_local(outgoing);
-    if (wo.z <= 0.0f) return {};
-    const vec3 wi = kind == material_kind::lambert ? cosine_hemisphere(u) : sample_coat(wo, u);
+    if (is_delta() || is_black() || wo.z <= 0.0f) return {};
+    const vec3 wi = coat ? mirrored(wo, ggx{alpha}.sample(wo, u)) : cosine_hemisphere(u);
     const vec3 incident = glm::normalize(local.to_world(wi));
-    return {incident, pdf(outgoing, incident)};
+    return {incident, pdf_part(coat, outgoing, incident)};
   }
 
   /// Value over probability of the delta lobe that joins two directions, per channel.
@@ -114,17 +132,6 @@ struct bsdf {
     return glm::min(0.9f, glm::max(0.1f, coat / (coat + (1.0f - coat) * base)));
   }
 
-  // Of the conductor, and of the plastic with its base.
-  WFPG_HD vec3 sample_coat(vec3 wo, vec2 u) const {
-    if (kind == material_kind::plastic) {
-      const float coat = coat_probability(wo.z);
-      if (u.x >= coat)
-        return cosine_hemisphere({glm::min(0x1.fffffep-1f, (u.x - coat) / (1.0f - coat)), u.y});
-      u.x = glm::min(0x1.fffffep-1f, u.x / coat);
-    }
-    return mirrored(wo, ggx{alpha}.sample(wo, u));
-  }
-
   WFPG_HD wfpg::bsdf_sample sample_dielectric(vec3 outgoing, float u) const {
     const float above = glm::dot(outgoing, normal);
     const vec3 facing = above < 0.0f ? -normal : normal;
@@ -141,6 +148,7 @@ struct bsdf {
   }
 };
 
-static_assert(wfpg::is_bsdf_v<bsdf> && std::is_trivially_copyable_v<bsdf>);
+static_assert(wfpg::is_bsdf_v<bsdf> && wfpg::has_separate_parts_v<bsdf> &&
+              std::is_trivially_copyable_v<bsdf>);
 
 }  // namespace render

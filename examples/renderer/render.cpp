@@ -55,7 +55,9 @@ render_result render_completed(const scene& scene, const render_options& options
 render_result render(const scene& scene, const render_options& options, const progress_callback& progress) {
   render_result result = render_completed(scene, completed(scene, options), progress);
   result.report.scene = scene.name;
-  result.report.method = options.method == sampling_method::pt ? "pt" : "wfpg";
+  result.report.method = options.method == sampling_method::pt     ? "pt"
+                         : options.method == sampling_method::wfpg ? "wfpg"
+                                                                   : "wfpg-product";
   result.report.device = options.where == device::cpu ? "cpu" : options.where == device::omp ? "omp" : "seq";
   return result;
 }

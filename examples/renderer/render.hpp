@@ -15,7 +15,7 @@
 
 namespace render {
 
-enum class sampling_method { pt, wfpg };
+enum class sampling_method { pt, wfpg, wfpg_product };
 enum class guiding { oriented, plain };
 enum class fields { kept, transient };
 enum class device { cpu, omp, seq };  ///< TBB, OpenMP, one thread
@@ -37,6 +37,7 @@ struct render_options {
   std::uint32_t slot_resolution = 24;                ///< cells a side of kept fields
   std::uint32_t recast = 8;                          ///< a refresh casts one cone in so many again
   std::size_t field_budget = std::size_t(16) << 20;  ///< bytes of kept fields
+  std::uint32_t product_resolution = 8;              ///< blocks a side of products, 4, 8 or 16
   std::uint32_t rays_per_bin = 64;                   ///< c_ray
   std::uint32_t min_bin_level = 3;                   ///< l_min, from the root
   float guide_fraction = 0.0f;                       ///< in [0, 1]; 0: the mode's own

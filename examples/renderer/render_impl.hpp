@@ -80,6 +80,7 @@ inline wfpg::guider_options guider_options_of(const render_options& options) {
   guided.kept.resolution = options.slot_resolution;
   guided.kept.recast = options.recast;
   guided.kept.budget_bytes = options.field_budget;
+  if (options.method == sampling_method::wfpg_product) guided.product_resolution = options.product_resolution;
   guided.rays_per_bin = options.rays_per_bin;
   guided.min_bin_level = options.min_bin_level;
   guided.mode = options.mode == guiding::plain ? wfpg::guiding_mode::plain : wfpg::guiding_mode::oriented;

@@ -16,6 +16,12 @@ struct bsdf_sample {
   float pdf = 0.0f;  ///< per unit solid angle, or the probability of a delta lobe; 0 where sampling failed
 };
 
+/// The narrow part of a BSDF: a lobe that reflects about a mirrored direction.
+struct glossy_part {
+  float share = 0.0f;  ///< of sample()'s directions that it draws, in [0, 1]
+  float alpha = 1.0f;  ///< its GGX roughness, or what is as wide, in (0, 1]
+};
+
 /// A point where a path goes on, as the host describes it.
 template <class Bsdf>
 struct surface {
@@ -39,6 +45,20 @@ struct is_bsdf<B, std::void_t<decltype(float(std::declval<const B&>().eval(vec3(
                               decltype(bool(std::declval<const B&>().is_delta())),
                               decltype(bool(std::declval<const B&>().transmits()))>> : std::true_type {};
 
+template <class B, class = void>
+struct has_glossy_part : std::false_type {};
+template <class B>
+struct has_glossy_part<B, std::void_t<decltype(glossy_part(std::declval<const B&>().glossy(vec3())))>>
+    : std::true_type {};
+
+template <class B, class = void>
+struct has_separate_parts : std::false_type {};
+template <class B>
+struct has_separate_parts<
+    B, std::void_t<decltype(bsdf_sample(std::declval<const B&>().sample_part(true, vec3(), vec2()))),
+                   decltype(float(std::declval<const B&>().pdf_part(true, vec3(), vec3())))>>
+    : has_glossy_part<B> {};
+
 template <class S>
 struct surface_bsdf {};
 template <class B>
@@ -56,9 +76,21 @@ struct surface_bsdf<surface<B>> {
 ///   bool is_delta() const;                                all of it is delta lobes: sampled alone, not guided
 ///   bool transmits() const;                               light can come from below the normal
 /// eval and pdf are zero, and sample fails, where the BSDF is black. Wherever eval is positive, pdf is too.
-// clang-format on
 template <class B>
 inline constexpr bool is_bsdf_v = detail::is_bsdf<B>::value;
+
+/// True where B tells of a narrow part, which is guided less:
+///   glossy_part glossy(vec3 outgoing) const;
+template <class B>
+inline constexpr bool has_glossy_part_v = detail::has_glossy_part<B>::value;
+
+/// True where B can draw that part and the rest alone, too:
+///   bsdf_sample sample_part(bool glossy, vec3 outgoing, vec2 u) const;
+///   float pdf_part(bool glossy, vec3 outgoing, vec3 incident) const;      of sample_part(), per steradian
+/// share · pdf_part(true, ...) + (1 - share) · pdf_part(false, ...) is pdf(...).
+// clang-format on
+template <class B>
+inline constexpr bool has_separate_parts_v = detail::has_separate_parts<B>::value;
 
 /// The BSDF type of what a surfaces functor (std::uint32_t ray) -> surface<Bsdf> gives.
 template <class Surfaces>

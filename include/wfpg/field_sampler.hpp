@@ -13,6 +13,37 @@
 
 namespace wfpg {
 
+namespace detail {
+
+/// Where a number fell among inclusive sums: the entry, and how far into its width, in [0,1).
+struct sums_position {
+  std::uint32_t index = 0;
+  float fraction = 0.0f;
+};
+
+/// The first of n inclusive sums, of integers, that exceeds `before` plus u times their whole, u in [0,1); it
+/// has a width then. sums(i) for i in [0, n); `before` is what sums(0) begins from, less than sums(n - 1).
+template <class Sums>
+WFPG_HD sums_position find_in_sums(const Sums& sums, std::uint32_t n, std::uint32_t before, float u) {
+  const std::uint32_t total = sums(n - 1) - before;
+  const auto scaled = static_cast<std::uint64_t>(u * 0x1p24f) * total;  // exact: u has 24 bits
+  const std::uint32_t target = before + min(static_cast<std::uint32_t>(scaled >> 24), total - 1u);
+  std::uint32_t low = 0;
+  for (std::uint32_t size = n; size > 1; size -= size / 2)
+    low += sums(low + size / 2 - 1) > target ? 0 : size / 2;
+  if (low > 0) before = sums(low - 1);
+  const float rest = static_cast<float>(scaled & 0xffffffu) * 0x1p-24f;
+  return {low, (static_cast<float>(target - before) + rest) / static_cast<float>(sums(low) - before)};
+}
+
+/// A place inside a cell off its faces by more than rounding moves a point to a direction and back, so that a
+/// density finds the cell that was drawn.
+WFPG_HD inline float inside_cell(float fraction) {
+  return clamp(fraction, 0x1p-14f, 1.0f - 0x1p-14f);
+}
+
+}  // namespace detail
+
 /// A density over [0,1)², constant in each of F x F cells.
 class grid_distribution {
  public:
@@ -37,23 +68,25 @@ class grid_distribution {
   }
   /// The same, and pdf() of the point: of the cell that the search ended in.
   WFPG_HD vec2 sample(vec2 u, float& density) const {
-    vec2 fraction;
-    const std::uint32_t y = find(marginal_, u.y, fraction.y);
-    const std::uint32_t x = find(rows_ + y * resolution_, u.x, fraction.x);
-    density = cell_pdf(x, y);
-    return vec2{static_cast<float>(x) + fraction.x, static_cast<float>(y) + fraction.y} /
+    const detail::sums_position row = find(marginal_, u.y);
+    const detail::sums_position column = find(rows_ + row.index * resolution_, u.x);
+    density = cell_pdf(column.index, row.index);
+    return vec2{static_cast<float>(column.index) + detail::inside_cell(column.fraction),
+                static_cast<float>(row.index) + detail::inside_cell(row.fraction)} /
            static_cast<float>(resolution_);
   }
 
-  /// The density at a point, per unit of the square's area.
-  WFPG_HD float pdf(vec2 uv) const {
+  /// The cell along one side of the square that a coordinate in [0,1] lies in.
+  WFPG_HD std::uint32_t cell_along(float coordinate) const {
     const auto last = static_cast<float>(resolution_ - 1);
-    const auto x =
-        static_cast<std::uint32_t>(detail::clamp(uv.x * static_cast<float>(resolution_), 0.0f, last));
-    const auto y =
-        static_cast<std::uint32_t>(detail::clamp(uv.y * static_cast<float>(resolution_), 0.0f, last));
-    return cell_pdf(x, y);
+    return static_cast<std::uint32_t>(
+        detail::clamp(coordinate * static_cast<float>(resolution_), 0.0f, last));
   }
+  /// The sum of the cells of row y up to x.
+  WFPG_HD std::uint32_t row_sum(std::uint32_t x, std::uint32_t y) const { return rows_[y * resolution_ + x]; }
+
+  /// The density at a point, per unit of the square's area.
+  WFPG_HD float pdf(vec2 uv) const { return cell_pdf(cell_along(uv.x), cell_along(uv.y)); }
 
  private:
   WFPG_HD float cell_pdf(std::uint32_t x, std::uint32_t y) const {
@@ -63,22 +96,8 @@ class grid_distribution {
   WFPG_HD static std::uint32_t width(const std::uint32_t* sums, std::uint32_t i) {
     return sums[i] - (i ? sums[i - 1] : 0u);
   }
-
-  /// The first entry whose sum exceeds u times the last sum, which has a width then; and how far into it that
-  /// is.
-  WFPG_HD std::uint32_t find(const std::uint32_t* sums, float u, float& fraction) const {
-    const std::uint32_t total = sums[resolution_ - 1];
-    const auto scaled = static_cast<std::uint64_t>(u * 0x1p24f) * total;  // exact: u has 24 bits
-    const auto target = detail::min(static_cast<std::uint32_t>(scaled >> 24), total - 1u);
-    std::uint32_t low = 0;
-    for (std::uint32_t n = resolution_; n > 1; n -= n / 2) low += sums[low + n / 2 - 1] > target ? 0 : n / 2;
-    const std::uint32_t before = low ? sums[low - 1] : 0u;
-    const float rest = static_cast<float>(scaled & 0xffffffu) * 0x1p-24f;
-    fraction = (static_cast<float>(target - before) + rest) / static_cast<float>(sums[low] - before);
-    // Off the faces by more than rounding moves a point to a direction and back, so that pdf() finds the cell
-    // that was drawn.
-    fraction = detail::clamp(fraction, 0x1p-14f, 1.0f - 0x1p-14f);
-    return low;
+  WFPG_HD detail::sums_position find(const std::uint32_t* sums, float u) const {
+    return detail::find_in_sums([sums](std::uint32_t i) { return sums[i]; }, resolution_, 0, u);
   }
 
   const std::uint32_t* rows_ = nullptr;
@@ -123,16 +142,29 @@ class directional_field {
 
   /// The density of a unit direction, per steradian; 0 outside the hemisphere. Precondition: not empty.
   WFPG_HD float pdf(vec3 d) const {
-    if (!hemisphere_) return grid_.pdf(sphere_to_square(d)) / domain();
-    vec3 local = frame_.to_local(d);
-    if (local.z < -1.0e-5f) return 0.0f;  // what sample() draws at the horizon may round to below it
-    local.z = detail::max(local.z, 0.0f);
-    return grid_.pdf(hemisphere_to_square(local)) / domain();
+    vec2 uv;
+    return locate(d, uv) ? grid_.pdf(uv) / domain() : 0.0f;
   }
 
- private:
-  WFPG_HD float domain() const { return hemisphere_ ? 2.0f * detail::pi : 4.0f * detail::pi; }
+  /// The point of the square that a unit direction comes from; false outside the hemisphere.
+  WFPG_HD bool locate(vec3 d, vec2& uv) const {
+    if (!hemisphere_) {
+      uv = sphere_to_square(d);
+      return true;
+    }
+    vec3 local = frame_.to_local(d);
+    if (local.z < -1.0e-5f) return false;  // what sample() draws at the horizon may round to below it
+    local.z = detail::max(local.z, 0.0f);
+    uv = hemisphere_to_square(local);
+    return true;
+  }
 
+  /// Solid angle of all cells, steradians.
+  WFPG_HD float domain() const { return hemisphere_ ? 2.0f * detail::pi : 4.0f * detail::pi; }
+  /// A direction of square_to_hemisphere or square_to_sphere, in the world.
+  WFPG_HD vec3 to_world(vec3 local) const { return hemisphere_ ? frame_.to_world(local) : local; }
+
+ private:
   grid_distribution grid_;
   detail::frame frame_;
   bool hemisphere_ = false;
@@ -154,6 +186,23 @@ WFPG_HD constexpr std::size_t distribution_words(std::uint32_t resolution) {
   return std::size_t(resolution) * resolution + resolution;
 }
 
+/// sums[i] becomes the sum of value(0) to value(i), for i in [0, n), by one warp; gives the last to all.
+/// value(i) may read sums[i].
+template <class Warp, class Value>
+WFPG_HD std::uint32_t scan_by_warp(const Warp& warp, int n, std::uint32_t* sums, const Value& value) {
+  std::uint32_t before = 0;
+  for (int first = 0; first < n; first += Warp::width) {
+    const auto values =
+        warp.map([&](int lane) -> std::uint32_t { return first + lane < n ? value(first + lane) : 0u; });
+    const auto through = warp.inclusive_sum(values);
+    warp.for_each_lane([&](int lane) {
+      if (first + lane < n) sums[first + lane] = before + through[lane];
+    });
+    before += warp.shuffle(through, Warp::width - 1);
+  }
+  return before;
+}
+
 /// Turns F² non-negative finite cell values, each plus `floor`, into a distribution in place, and the F words
 /// behind them into its marginal. All values zero (their sum below 1e-25): uniform. The values' sum is below
 /// 3e38.
@@ -173,19 +222,9 @@ WFPG_HD grid_distribution build_distribution(const Block& block, const cell_word
   std::uint32_t* const marginal = cells.words + n;
   block.for_each_warp(resolution, [&](const auto& warp, int y) {
     std::uint32_t* const row = cells.words + y * resolution;
-    constexpr int width = std::decay_t<decltype(warp)>::width;
-    std::uint32_t before = 0;
-    for (int first = 0; first < resolution; first += width) {
-      const auto weights =
-          warp.map([&](int lane) { return first + lane < resolution ? row[first + lane] : 0u; });
-      const auto sums = warp.inclusive_sum(weights);
-      warp.for_each_lane([&](int lane) {
-        if (first + lane < resolution) row[first + lane] = before + sums[lane];
-      });
-      before += warp.shuffle(sums, width - 1);
-    }
+    const std::uint32_t sum = scan_by_warp(warp, resolution, row, [&](int x) { return row[x]; });
     warp.for_each_lane([&](int lane) {
-      if (lane == 0) marginal[y] = before;
+      if (lane == 0) marginal[y] = sum;
     });
   });
   block.sync();

@@ -3,7 +3,9 @@
 // that were made resident; the fused form draws the same directions from the same random numbers.
 #pragma once
 
+#include <wfpg/detail/lanes.hpp>
 #include <wfpg/mis.hpp>
+#include <wfpg/product_sampler.hpp>
 #include <wfpg/types.hpp>
 
 namespace wfpg {
@@ -15,30 +17,67 @@ struct resident_field {
   bool hemisphere = false;
 };
 
-/// Trivially copyable; holds until the guider's next call. Rays are the wave's.
+/// Fields in memory: what each is, and words of its distribution and its block sums.
+struct resident_fields {
+  const resident_field* fields = nullptr;
+  const std::uint32_t* words = nullptr;  ///< detail::field_words(resolution, points.resolution) each
+  std::uint32_t resolution = 0;          ///< F
+  product_points points;                 ///< of this wave
+
+  WFPG_HD directional_field field(std::uint32_t i) const {
+    const std::uint32_t* const rows = words_of(i);
+    const grid_distribution grid(rows, rows + std::size_t(resolution) * resolution, resolution);
+    return fields[i].hemisphere ? directional_field(grid, fields[i].normal) : directional_field(grid);
+  }
+  WFPG_HD block_sums blocks(std::uint32_t i) const {
+    return {words_of(i) + detail::distribution_words(resolution), points.resolution};
+  }
+
+ private:
+  WFPG_HD const std::uint32_t* words_of(std::uint32_t i) const {
+    return words + i * detail::field_words(resolution, points.resolution);
+  }
+};
+
+/// Trivially copyable; holds until the guider's next call. Rays are the wave's. With products each ray draws
+/// from its field times its BSDF.
 class guide_view {
  public:
   static constexpr std::uint32_t no_field = 0xffffffffu;
 
   guide_view() = default;
-  WFPG_HD guide_view(array_view<const std::uint32_t> field_of_ray, const resident_field* fields,
-                     const std::uint32_t* words, std::uint32_t resolution)
-      : field_of_ray_(field_of_ray), fields_(fields), words_(words), resolution_(resolution) {}
+  WFPG_HD guide_view(array_view<const std::uint32_t> field_of_ray, const resident_fields& fields)
+      : field_of_ray_(field_of_ray), fields_(fields) {}
 
   /// Whether the ray has a field; without one it is its BSDF's.
   WFPG_HD bool guides(std::uint32_t ray) const {
     return ray < field_of_ray_.size() && field_of_ray_[ray] != no_field &&
-           fields_[field_of_ray_[ray]].fraction > 0.0f;
+           fields_.fields[field_of_ray_[ray]].fraction > 0.0f;
   }
 
-  /// The ray's mixture of field and BSDF; of a ray without field, the BSDF alone.
+  /// P, or 0 without products.
+  WFPG_HD std::uint32_t product_resolution() const { return fields_.points.resolution; }
+
+  /// The ray's mixture of field and BSDF, without products; of a ray without field, the BSDF alone.
   WFPG_HD guide_mixture mixture(std::uint32_t ray) const {
     if (!guides(ray)) return {};
-    const resident_field& f = fields_[field_of_ray_[ray]];
-    const std::size_t cells = std::size_t(resolution_) * resolution_;
-    const std::uint32_t* rows = words_ + field_of_ray_[ray] * detail::distribution_words(resolution_);
-    const grid_distribution grid(rows, rows + cells, resolution_);
-    return {f.hemisphere ? directional_field(grid, f.normal) : directional_field(grid), f.fraction};
+    const std::uint32_t field = field_of_ray_[ray];
+    return {fields_.field(field), fields_.fields[field].fraction};
+  }
+  /// The ray's mixture of product and BSDF, made by a warp: P² evaluations of the BSDF into `words`, P² of
+  /// them, which it reads as long as it lives. Precondition: product_resolution() > 0.
+  template <class Warp, class Bsdf>
+  WFPG_HD product_mixture product(const Warp& warp, std::uint32_t ray, const surface<Bsdf>& s,
+                                  std::uint32_t* words) const {
+    if (!guides(ray) || s.bsdf.is_delta()) return {};
+    const std::uint32_t field = field_of_ray_[ray];
+    return {detail::multiply(warp, fields_.field(field), fields_.blocks(field), fields_.points, s, words),
+            fields_.fields[field].fraction};
+  }
+  /// The same by one thread.
+  template <class Bsdf>
+  WFPG_HD product_mixture product(std::uint32_t ray, const surface<Bsdf>& s, std::uint32_t* words) const {
+    return product(detail::emulated_warp<8>(), ray, s, words);
   }
 
   /// A direction and its density from the field alone. Precondition: guides(ray).
@@ -51,23 +90,26 @@ class guide_view {
   /// The field's density of a unit direction, per steradian. Precondition: guides(ray).
   WFPG_HD float pdf(std::uint32_t ray, vec3 direction) const { return mixture(ray).field.pdf(direction); }
 
-  /// A direction of the mixture with the surface's BSDF, and the mixture's density.
+  /// A direction of the mixture with the surface's BSDF, and the mixture's density. With products each call
+  /// makes the ray's anew, in 1 KiB of the thread's own; who calls twice keeps product().
   template <class Bsdf>
   WFPG_HD sampled_direction sample(std::uint32_t ray, const surface<Bsdf>& s, float u_technique,
                                    vec2 u) const {
-    return mixture(ray).sample(s, u_technique, u);
+    if (product_resolution() == 0) return mixture(ray).sample(s, u_technique, u);
+    std::uint32_t words[max_product_resolution * max_product_resolution];
+    return product(ray, s, words).sample(s, u_technique, u);
   }
   /// The mixture's density of a unit direction, per steradian.
   template <class Bsdf>
   WFPG_HD float pdf(std::uint32_t ray, const surface<Bsdf>& s, vec3 direction) const {
-    return mixture(ray).pdf(s, direction);
+    if (product_resolution() == 0) return mixture(ray).pdf(s, direction);
+    std::uint32_t words[max_product_resolution * max_product_resolution];
+    return product(ray, s, words).pdf(s, direction);
   }
 
  private:
   array_view<const std::uint32_t> field_of_ray_;
-  const resident_field* fields_ = nullptr;
-  const std::uint32_t* words_ = nullptr;
-  std::uint32_t resolution_ = 0;
+  resident_fields fields_;
 };
 
 }  // namespace wfpg

@@ -4,6 +4,7 @@
 
 #include <wfpg/bsdf.hpp>
 #include <wfpg/field_sampler.hpp>
+#include <wfpg/product_sampler.hpp>
 #include <wfpg/types.hpp>
 
 namespace wfpg {
@@ -36,46 +37,102 @@ struct sampled_direction {
   sampling_technique technique = sampling_technique::none;
 };
 
-/// The mixture of a field and a surface's BSDF: the field with probability `fraction`, in [0, 1]. With an
-/// empty field, and on delta BSDFs, the BSDF alone.
-struct guide_mixture {
-  directional_field field;
+/// The shares of what a mixture draws from; their sum is 1. A BSDF whose parts cannot be drawn alone is all
+/// `smooth`.
+struct mixture_shares {
+  float guide = 0.0f;
+  float glossy = 0.0f;
+  float smooth = 1.0f;
+};
+
+/// How much of its share a glossy part of GGX roughness `alpha` leaves to the guide: all from 0.5 on, where
+/// the lobe is nearly as wide as a diffuse one; a quarter where it is a mirror's, since fields know nothing
+/// of it.
+WFPG_HD inline float guided_part(float alpha) {
+  const float width = detail::min(alpha / 0.5f, 1.0f);
+  return 0.25f + 0.75f * width * width;
+}
+
+/// The mixture of a field, or of its product with the BSDF, and a surface's BSDF: the field with probability
+/// `fraction`, in [0, 1], and less on glossy parts. With an empty field, and on delta BSDFs, the BSDF alone.
+template <class Field>
+struct basic_guide_mixture {
+  Field field;
   float fraction = 0.0f;
 
   /// A direction from a number in [0,1) that chooses the technique and u in [0,1)². O(log F) and the BSDF.
   template <class Bsdf>
   WFPG_HD sampled_direction sample(const surface<Bsdf>& s, float u_technique, vec2 u) const {
-    if (s.bsdf.is_delta()) return from_bsdf(s, u, sampling_technique::delta);
-    if (!guides() || u_technique >= fraction) {
-      sampled_direction result = from_bsdf(s, u, sampling_technique::bsdf);
-      if (guides() && result.pdf > 0.0f) result.pdf = pdf(s, result.direction);
-      return result;
+    if (s.bsdf.is_delta()) return from_bsdf(s.bsdf.sample(s.outgoing, u), sampling_technique::delta);
+    if (!guides()) return from_bsdf(s.bsdf.sample(s.outgoing, u), sampling_technique::bsdf);
+    const mixture_shares shares = shares_of(s);
+    if (u_technique < shares.guide) {
+      float from_field;
+      const vec3 direction = field.sample(u, from_field);
+      return {direction, shares.guide * from_field + bsdf_pdf(s, shares, direction),
+              sampling_technique::guide};
     }
-    float from_field;
-    const vec3 direction = field.sample(u, from_field);
-    return {direction, mixed(from_field, s.bsdf.pdf(s.outgoing, direction)), sampling_technique::guide};
+    sampled_direction result =
+        from_bsdf(draw(s, u_technique < shares.guide + shares.glossy, u), sampling_technique::bsdf);
+    if (result.pdf > 0.0f)
+      result.pdf = shares.guide * field.pdf(result.direction) + bsdf_pdf(s, shares, result.direction);
+    return result;
   }
 
   /// The density with which sample() draws a unit direction, per steradian; 0 on delta BSDFs.
   template <class Bsdf>
   WFPG_HD float pdf(const surface<Bsdf>& s, vec3 direction) const {
     if (s.bsdf.is_delta()) return 0.0f;
-    const float from_bsdf = s.bsdf.pdf(s.outgoing, direction);
-    return guides() ? mixed(field.pdf(direction), from_bsdf) : from_bsdf;
+    if (!guides()) return s.bsdf.pdf(s.outgoing, direction);
+    const mixture_shares shares = shares_of(s);
+    return shares.guide * field.pdf(direction) + bsdf_pdf(s, shares, direction);
+  }
+
+  /// What the mixture draws from at a surface. Precondition: the field is not empty.
+  template <class Bsdf>
+  WFPG_HD mixture_shares shares_of(const surface<Bsdf>& s) const {
+    if constexpr (!has_glossy_part_v<Bsdf>)
+      return {fraction, 0.0f, 1.0f - fraction};
+    else {
+      const glossy_part part = s.bsdf.glossy(s.outgoing);
+      const float less = fraction * guided_part(part.alpha);
+      const float guide = fraction + part.share * (less - fraction);
+      if constexpr (!has_separate_parts_v<Bsdf>)
+        return {guide, 0.0f, 1.0f - guide};
+      else
+        return {guide, part.share * (1.0f - less), (1.0f - part.share) * (1.0f - fraction)};
+    }
   }
 
  private:
-  WFPG_HD float mixed(float from_field, float from_bsdf) const {
-    return fraction * from_field + (1.0f - fraction) * from_bsdf;
-  }
   WFPG_HD bool guides() const { return fraction > 0.0f && !field.empty(); }
 
-  template <class Bsdf>
-  WFPG_HD static sampled_direction from_bsdf(const surface<Bsdf>& s, vec2 u, sampling_technique technique) {
-    const bsdf_sample drawn = s.bsdf.sample(s.outgoing, u);
+  WFPG_HD static sampled_direction from_bsdf(const bsdf_sample& drawn, sampling_technique technique) {
     if (!(drawn.pdf > 0.0f)) return {};
     return {drawn.direction, drawn.pdf, technique};
   }
+
+  template <class Bsdf>
+  WFPG_HD static bsdf_sample draw(const surface<Bsdf>& s, bool glossy, vec2 u) {
+    if constexpr (has_separate_parts_v<Bsdf>)
+      return s.bsdf.sample_part(glossy, s.outgoing, u);
+    else
+      return s.bsdf.sample(s.outgoing, u);
+  }
+
+  /// The BSDF's share of the density.
+  template <class Bsdf>
+  WFPG_HD static float bsdf_pdf(const surface<Bsdf>& s, const mixture_shares& shares, vec3 direction) {
+    if constexpr (has_separate_parts_v<Bsdf>)
+      return shares.glossy * s.bsdf.pdf_part(true, s.outgoing, direction) +
+             shares.smooth * s.bsdf.pdf_part(false, s.outgoing, direction);
+    else
+      return shares.smooth * s.bsdf.pdf(s.outgoing, direction);
+  }
 };
+
+using guide_mixture = basic_guide_mixture<directional_field>;
+/// `fraction` below 1: where a product is 0 and the BSDF is not, the BSDF has to draw.
+using product_mixture = basic_guide_mixture<product_field>;
 
 }  // namespace wfpg

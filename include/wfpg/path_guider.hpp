@@ -17,6 +17,7 @@
 #include <wfpg/field_store.hpp>
 #include <wfpg/guide_view.hpp>
 #include <wfpg/path_recorder.hpp>
+#include <wfpg/product_sampler.hpp>
 #include <wfpg/radiance_field.hpp>
 #include <wfpg/sparse_voxel_octree.hpp>
 #include <wfpg/spatial_binner.hpp>
@@ -49,6 +50,8 @@ struct guider_options {
       32;  ///< cells along a transient field's side at depth 0, in [2, 128]; halves at each depth
   std::uint32_t min_field_resolution = 16;  ///< down to this, in [2, 128]
   field_options field;                      ///< filter and floor
+  std::uint32_t product_resolution = 0;     ///< P: draw from products of field and BSDF in P x P blocks, 4, 8
+                                            ///< or 16, a divisor of the fields' resolutions; 0: from fields
   float guide_fraction = 0.0f;  ///< share of guided samples, (0, 1]; 0: 0.5 in plain mode, 0.7 in oriented
                                 ///< mode; 0.5 in transient oriented bins of less than c_ray rays
   bool include_emission =
@@ -121,7 +124,7 @@ class path_guider {
   const guider_options& options() const { return options_; }
   /// Whether the sample that has begun is guided, and how many cells transient fields have at a depth.
   bool guided() const { return samples_ > options_.unguided_samples && !octree_.view().empty(); }
-  std::uint32_t field_resolution(std::uint32_t depth) const;
+  std::uint32_t field_resolution(std::uint32_t depth) const { return resolution_at(options_, depth); }
 
   /// Wait for the work before them.
   guider_statistics statistics() const;
@@ -130,6 +133,7 @@ class path_guider {
  private:
   static const guider_options& checked(const guider_options& options);
   static guider_options with_capacities(guider_options options);
+  static std::uint32_t resolution_at(const guider_options& options, std::uint32_t depth);
 
   bool keeps_fields() const { return options_.fields == field_lifetime::kept; }
   template <class Surfaces, class Random, class Caster>
@@ -140,6 +144,8 @@ class path_guider {
   void serve_transient(const wave<Surfaces, Random>& w, const Caster& caster, const Serve& serve);
   template <class Surfaces, class Random>
   detail::bin_fields<Surfaces> bin_wave(const wave<Surfaces, Random>& w);
+  template <class Surfaces, class Random>
+  product_points points_of(const wave<Surfaces, Random>& w);
   detail::mixture_fraction fraction() const;
   depth_statistics* depth_counts(std::uint32_t depth) {
     return counts_.data() + detail::min(depth, options_.max_depth - 1);
@@ -167,6 +173,7 @@ class path_guider {
   buffer<std::uint32_t, Exec> resident_words_;
   buffer<resident_field, Exec> resident_fields_;
   buffer<std::uint32_t, Exec> field_of_ray_;
+  buffer<product_point, Exec> product_points_;
   buffer<depth_statistics, Exec> counts_;
   std::uint32_t samples_ = 0;
 };

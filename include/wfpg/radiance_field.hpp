@@ -11,6 +11,7 @@
 #include <wfpg/buffer.hpp>
 #include <wfpg/exitance_cache.hpp>
 #include <wfpg/field_sampler.hpp>
+#include <wfpg/product_sampler.hpp>
 #include <wfpg/ray_caster.hpp>
 #include <wfpg/spatial_binner.hpp>
 #include <wfpg/types.hpp>
@@ -199,8 +200,8 @@ WFPG_HD vec3 off_surface(const surface<Bsdf>& s, const sparse_voxel_octree_view&
 /// The fields of a wave's bins: a functor of blocks that fills each bin's field and hands it to `sink`.
 ///   Surfaces  (std::uint32_t ray) -> surface<Bsdf>
 ///   Hits      (std::size_t bin, std::uint32_t cell, const ray&) -> ray_hit
-///   Sink      words(block&, bin) -> std::uint32_t*, room for distribution_words(resolution);
-///             finish(block&, bin, directional_field), by the whole block
+///   Sink      words(block&, bin) -> std::uint32_t*, room for field_words(resolution, product_resolution);
+///             finish(block&, bin, directional_field, block_sums), by the whole block
 template <class Surfaces>
 struct bin_fields {
   bins_view bins;
@@ -209,7 +210,8 @@ struct bin_fields {
   field_options options;
   guiding_mode mode;
   std::uint32_t resolution;
-  std::uint64_t seed;  // of the sample and depth
+  std::uint32_t product_resolution;  // 0: no block sums
+  std::uint64_t seed;                // of the sample and depth
 
   /// The bin's origin: one of its rays, drawn anew in each sample.
   WFPG_HD field_origin origin(std::size_t bin) const {
@@ -240,8 +242,11 @@ struct bin_fields {
     block.sync();
     const bool hemisphere = cells.origin.hemisphere;
     const grid_distribution grid = finish_field(block, words, scratch, size, hemisphere, options);
+    std::uint32_t* const sums = words.words + distribution_words(resolution);
+    if (product_resolution > 0) sum_blocks(block, grid, product_resolution, sums);
     sink.finish(block, bin,
-                hemisphere ? directional_field(grid, cells.origin.normal) : directional_field(grid));
+                hemisphere ? directional_field(grid, cells.origin.normal) : directional_field(grid),
+                block_sums{sums, product_resolution});
   }
 };
 

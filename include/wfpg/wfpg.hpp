@@ -17,6 +17,7 @@
 #include <wfpg/partitioner.hpp>
 #include <wfpg/path_guider.hpp>
 #include <wfpg/path_recorder.hpp>
+#include <wfpg/product_sampler.hpp>
 #include <wfpg/radiance_field.hpp>
 #include <wfpg/ray_caster.hpp>
 #include <wfpg/sample_combiner.hpp>

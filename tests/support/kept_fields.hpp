@@ -82,9 +82,14 @@ struct kept_box {
   wfpg::guide_view prepare(const std::vector<test_surface>& wave, const Caster& caster,
                            std::size_t buffer_bytes = std::size_t(1) << 20) {
     surfaces = wfpg::buffer<test_surface, Exec>(exec(), wave);
-    const wfpg::kept_field_wave<stored_surfaces> kept{
-        wave.size(), {const_view<test_surface>(surfaces)}, box.cache.view(), field, mode,
-        0.7f,        wfpg::detail::hash(7, sample)};
+    const wfpg::kept_field_wave<stored_surfaces> kept{wave.size(),
+                                                      {const_view<test_surface>(surfaces)},
+                                                      box.cache.view(),
+                                                      field,
+                                                      mode,
+                                                      0.7f,
+                                                      wfpg::detail::hash(7, sample),
+                                                      {}};
     return store.prepare(exec(), kept, caster, buffer_bytes);
   }
   wfpg::guide_view prepare(const std::vector<test_surface>& wave) {

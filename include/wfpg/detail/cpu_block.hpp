@@ -23,7 +23,7 @@ class cpu_block {
     for (int i = 0; i < n; ++i) f(i);
   }
 
-  /// f(warp, i) for i in [0, n): each i is one warp's.
+  /// f(warp, i) for i in [0, n): each i is one warp's. warp.index() is below the policy's warps_per_block.
   template <class F>
   void for_each_warp(int n, F f) const {
     const warp all;

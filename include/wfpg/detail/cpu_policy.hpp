@@ -17,6 +17,7 @@ template <class Derived, int W>
 class cpu_policy {
  public:
   static constexpr int warp_width = W;
+  static constexpr int warps_per_block = 1;
   using block = cpu_block<W>;
 
   explicit cpu_policy(memory_resource* resource)

@@ -15,11 +15,12 @@ template <class T, int W>
 struct lanes {
   T values[W];
 
-  T& operator[](int lane) { return values[lane]; }
-  const T& operator[](int lane) const { return values[lane]; }
+  WFPG_HD T& operator[](int lane) { return values[lane]; }
+  WFPG_HD const T& operator[](int lane) const { return values[lane]; }
 };
 
-/// W cooperating lanes, W = 8, 16 or 32. Every call is made by all lanes together.
+/// W cooperating lanes, W = 8, 16 or 32. Every call is made by all lanes together. One thread plays them all,
+/// on a device too where a kernel has no warp to spare for a ray.
 template <int W>
 class emulated_warp {
  public:
@@ -30,7 +31,7 @@ class emulated_warp {
 
   /// f(lane) for each lane, gathered.
   template <class F>
-  auto map(F f) const {
+  WFPG_HD auto map(F f) const {
     using value = std::decay_t<decltype(f(0))>;
     lanes<value, W> result;
     WFPG_VECTORIZE
@@ -38,15 +39,30 @@ class emulated_warp {
     return result;
   }
 
+  /// The same of an f that calls the host's code, which nobody asked to vectorise.
+  template <class F>
+  WFPG_HD auto evaluate(F f) const {
+    using value = std::decay_t<decltype(f(0))>;
+    lanes<value, W> result;
+    for (int lane = 0; lane < W; ++lane) result[lane] = f(lane);
+    return result;
+  }
+
   /// f(lane) for each lane, for what it does.
   template <class F>
-  void for_each_lane(F f) const {
+  WFPG_HD void for_each_lane(F f) const {
     WFPG_VECTORIZE
     for (int lane = 0; lane < W; ++lane) f(lane);
   }
 
+  /// Which warp of its block this is.
+  WFPG_HD int index() const { return 0; }
+
+  /// Waits until all lanes are here; what they wrote is seen by all.
+  WFPG_HD void sync() const {}
+
   /// Bit l is set where lane l's value is true.
-  std::uint32_t ballot(const lanes<bool, W>& value) const {
+  WFPG_HD std::uint32_t ballot(const lanes<bool, W>& value) const {
     std::uint32_t bits = 0;
     for (int lane = 0; lane < W; ++lane) bits |= static_cast<std::uint32_t>(value[lane]) << lane;
     return bits;
@@ -54,13 +70,13 @@ class emulated_warp {
 
   /// The value of lane `source`, 0 <= source < W, given to all.
   template <class T>
-  T shuffle(const lanes<T, W>& value, int source) const {
+  WFPG_HD T shuffle(const lanes<T, W>& value, int source) const {
     return value[source];
   }
 
   /// To each lane the value of the lane it names.
   template <class T>
-  lanes<T, W> shuffle(const lanes<T, W>& value, const lanes<int, W>& source) const {
+  WFPG_HD lanes<T, W> shuffle(const lanes<T, W>& value, const lanes<int, W>& source) const {
     lanes<T, W> result;
     for (int lane = 0; lane < W; ++lane) result[lane] = value[source[lane]];
     return result;
@@ -68,7 +84,7 @@ class emulated_warp {
 
   /// Lane l receives the sum of lanes 0 to l.
   template <class T>
-  lanes<T, W> inclusive_sum(const lanes<T, W>& value) const {
+  WFPG_HD lanes<T, W> inclusive_sum(const lanes<T, W>& value) const {
     lanes<T, W> result = value;
     for (int distance = 1; distance < W; distance *= 2) {
       const lanes<T, W> before = result;
@@ -80,7 +96,7 @@ class emulated_warp {
 
   /// op over all lanes (associative and commutative), by halves; the same value to all.
   template <class T, class Op>
-  T reduce(const lanes<T, W>& value, Op op) const {
+  WFPG_HD T reduce(const lanes<T, W>& value, Op op) const {
     lanes<T, W> partial = value;
     for (int half = W / 2; half > 0; half /= 2) {
       WFPG_VECTORIZE
@@ -90,7 +106,7 @@ class emulated_warp {
   }
 
   /// The lowest lane whose value is true, or W where none is.
-  int find_first(const lanes<bool, W>& value) const {
+  WFPG_HD int find_first(const lanes<bool, W>& value) const {
     for (int lane = 0; lane < W; ++lane)
       if (value[lane]) return lane;
     return W;

@@ -55,6 +55,12 @@ const guider_options& path_guider<Exec>::checked(const guider_options& o) {
   require(o.max_depth >= 1 && o.max_depth <= 1024, "max_depth", o.max_depth, "in [1, 1024]");
   require(o.max_paths < 0xffffffffull, "max_paths", o.max_paths, "less than 2^32 - 1");
   require(o.max_rays < 0xffffffffull, "max_rays", o.max_rays, "less than 2^32 - 1");
+  if (o.fields == field_lifetime::transient)
+    for (std::uint32_t depth = 0; depth < 8; ++depth)
+      detail::require_product_resolution(o.product_resolution, "field_resolution at a depth",
+                                         resolution_at(o, depth));
+  require(o.product_resolution == 0 || o.guide_fraction < 1.0f, "guide_fraction", o.guide_fraction,
+          "less than 1 with products, which do not reach all that a BSDF does");
   const guider_options full = with_capacities(o);
   require(full.deposit_capacity < 0xffffffffull, "max_paths times max_depth, the deposits of a sample,",
           full.deposit_capacity, "less than 2^32 - 1");
@@ -78,10 +84,12 @@ path_guider<Exec>::path_guider(const Exec& exec, voxel_fragments<Exec> fragments
       working_memory_(std::make_unique<retaining_resource>(exec.resource())),
       exec_(exec.with_resource(working_memory_.get())),
       recorder_(exec_, options_.max_paths, options_.max_depth, options_.include_emission),
+      product_points_(exec_, std::size_t(2) * options_.product_resolution * options_.product_resolution),
       counts_(exec_, options_.max_depth) {
   const binning_options binning{options_.min_bin_level, options_.rays_per_bin};
   if (keeps_fields())
-    store_ = field_store<Exec>(exec_, octree_.view(), binning, options_.kept, options_.max_rays);
+    store_ = field_store<Exec>(exec_, octree_.view(), binning, options_.kept, options_.max_rays,
+                               options_.product_resolution);
   else
     binner_ = spatial_binner<Exec>(exec_, octree_.view(), binning, options_.max_rays);
   octree_.release_build_data();
@@ -107,9 +115,21 @@ void path_guider<Exec>::end_sample() {
 }
 
 template <class Exec>
-std::uint32_t path_guider<Exec>::field_resolution(std::uint32_t depth) const {
-  const std::uint32_t least = detail::min(options_.min_field_resolution, options_.field_resolution);
-  return depth < 32 ? detail::max(options_.field_resolution >> depth, least) : least;
+std::uint32_t path_guider<Exec>::resolution_at(const guider_options& options, std::uint32_t depth) {
+  const std::uint32_t least = detail::min(options.min_field_resolution, options.field_resolution);
+  return depth < 32 ? detail::max(options.field_resolution >> depth, least) : least;
+}
+
+/// Where this wave's products evaluate BSDFs.
+template <class Exec>
+template <class Surfaces, class Random>
+product_points path_guider<Exec>::points_of(const wave<Surfaces, Random>& w) {
+  const std::uint32_t p = options_.product_resolution;
+  if (p == 0) return {};
+  product_point* const sphere = product_points_.data() + std::size_t(p) * p;
+  exec_.for_each(std::size_t(p) * p,
+                 detail::draw_product_points{product_points_.data(), sphere, p, wave_seed(w.depth)});
+  return {product_points_.data(), sphere, p};
 }
 
 template <class Exec>
@@ -127,7 +147,14 @@ detail::bin_fields<Surfaces> path_guider<Exec>::bin_wave(const wave<Surfaces, Ra
       binner_.bin(exec_, w.ray_count, detail::wave_rays<Surfaces>{w.surfaces, options_.mode});
   const std::uint32_t size = field_resolution(w.depth);
   exec_.for_each(1, detail::add_counts{bins, binner_.unbinned(), size * size, depth_counts(w.depth)});
-  return {bins, w.surfaces, cache_.view(), options_.field, options_.mode, size, wave_seed(w.depth)};
+  return {bins,
+          w.surfaces,
+          cache_.view(),
+          options_.field,
+          options_.mode,
+          size,
+          options_.product_resolution,
+          wave_seed(w.depth)};
 }
 
 template <class Exec>
@@ -152,7 +179,12 @@ void path_guider<Exec>::sample_directions(const wave<Surfaces, Random>& w, const
   if (!keeps_fields()) return serve_transient(w, caster, serve);
   const guide_view view = keep_wave(w, caster);
   const auto timed = clock_.time(detail::stage::serve);
-  exec_.for_each(w.ray_count, detail::serve_view<decltype(serve)>{serve, view});
+  if (view.product_resolution() == 0) {
+    exec_.for_each(w.ray_count, detail::serve_view<decltype(serve)>{serve, view});
+  } else {
+    const detail::serve_products<decltype(serve)> products{serve, view, w.ray_count, Exec::warps_per_block};
+    exec_.for_each_block(products.blocks(), products.scratch_bytes(), products);
+  }
 }
 
 template <class Exec>
@@ -175,9 +207,9 @@ guide_view path_guider<Exec>::keep_wave(const wave<Surfaces, Random>& w, const C
     store_.count(exec_, w.ray_count, detail::wave_rays<Surfaces>{w.surfaces, options_.mode});
     return {};
   }
-  const kept_field_wave<Surfaces> wave{w.ray_count,       w.surfaces,    cache_.view(),
-                                       options_.field,    options_.mode, fraction().with_enough_rays,
-                                       wave_seed(w.depth)};
+  const kept_field_wave<Surfaces> wave{w.ray_count,        w.surfaces,    cache_.view(),
+                                       options_.field,     options_.mode, fraction().with_enough_rays,
+                                       wave_seed(w.depth), points_of(w)};
   const guide_view view = store_.prepare(exec_, wave, caster, options_.caster_buffer_bytes);
   exec_.for_each(1, detail::add_kept_counts{store_.state(), store_.resolution() * store_.resolution(),
                                             store_.refresh_cones(), depth_counts(w.depth)});
@@ -194,10 +226,9 @@ void path_guider<Exec>::serve_transient(const wave<Surfaces, Random>& w, const C
     const auto fields = bin_wave(w);
     rest.ray_keys = fields.bins.ray_keys;
     const auto timed = clock_.time(detail::stage::fields);
-    const detail::transient_sink<Serve> sink{fields.bins, serve, fraction(), fields.resolution};
-    detail::for_each_field(exec_, fields, caster, sink,
-                           4 * detail::distribution_words(fields.resolution) + 16,
-                           options_.caster_buffer_bytes);
+    const detail::transient_sink<Serve> sink{fields.bins,       serve,        fraction(),
+                                             fields.resolution, points_of(w), Exec::warps_per_block};
+    detail::for_each_field(exec_, fields, caster, sink, sink.scratch_bytes(), options_.caster_buffer_bytes);
   }
   const auto timed = clock_.time(detail::stage::serve);
   exec_.for_each(w.ray_count, rest);
@@ -211,20 +242,19 @@ guide_view path_guider<Exec>::make_resident(const wave<Surfaces, Random>& w, con
   const auto fields = bin_wave(w);
   const auto timed = clock_.time(detail::stage::fields);
   const std::size_t bins = read_element(exec_, fields.bins.count);
-  const std::size_t words = bins * detail::distribution_words(fields.resolution);
+  const std::size_t words = bins * detail::field_words(fields.resolution, fields.product_resolution);
   // Half more than is needed: the next waves have a few bins more or less, and are not to allocate.
   if (resident_fields_.size() < bins) reallocate(resident_fields_, bins + bins / 2);
   if (resident_words_.size() < words) reallocate(resident_words_, words + words / 2);
   if (field_of_ray_.size() < options_.max_rays) reallocate(field_of_ray_, options_.max_rays);
   ::thrust::fill_n(exec_.thrust(), field_of_ray_.data(), w.ray_count, guide_view::no_field);
-  detail::for_each_field(exec_, fields, caster,
-                         detail::resident_sink{fields.bins, resident_words_.data(), resident_fields_.data(),
-                                               field_of_ray_.data(), fraction(), fields.resolution},
-                         0, options_.caster_buffer_bytes);
+  detail::for_each_field(
+      exec_, fields, caster,
+      detail::resident_sink{fields.bins, resident_words_.data(), resident_fields_.data(),
+                            field_of_ray_.data(), fraction(), fields.resolution, fields.product_resolution},
+      0, options_.caster_buffer_bytes);
   return {{field_of_ray_.data(), w.ray_count},
-          resident_fields_.data(),
-          resident_words_.data(),
-          fields.resolution};
+          {resident_fields_.data(), resident_words_.data(), fields.resolution, points_of(w)}};
 }
 
 template <class Exec>

@@ -19,7 +19,8 @@ struct mixture_fraction {
   }
 };
 
-/// Writes one ray's direction, and the density that was asked for.
+/// Writes one ray's direction, and the density that was asked for. Its mixture is made for its surface:
+/// mixture_of(surface<Bsdf>).
 template <class Surfaces, class Random, class Queries>
 struct serve_ray {
   Surfaces surfaces;
@@ -27,13 +28,15 @@ struct serve_ray {
   Queries queries;
   array_view<sampled_direction> directions;
 
-  WFPG_HD void operator()(std::uint32_t ray, const guide_mixture& mixture) const {
+  template <class Mixtures>
+  WFPG_HD void operator()(std::uint32_t ray, const Mixtures& mixture_of) const {
     const auto s = surfaces(ray);
     if (!s.active) {
       directions[ray] = {};
       answer(ray, 0.0f);
       return;
     }
+    const auto mixture = mixture_of(s);
     directions[ray] = mixture.sample(s, random(ray, 0).x, random(ray, 1));
     if constexpr (!std::is_same_v<Queries, no_queries>) {
       const vec3 d = queries.query(ray);
@@ -54,7 +57,36 @@ struct serve_view {
   guide_view view;
   WFPG_HD void operator()(std::size_t i) const {
     const auto ray = static_cast<std::uint32_t>(i);
-    serve(ray, view.mixture(ray));
+    serve(ray, [&](const auto&) { return view.mixture(ray); });
+  }
+};
+
+/// Runs of rays whose fields are in memory, each ray's product made by a warp.
+template <class Serve>
+struct serve_products {
+  static constexpr std::size_t run = 256;
+  Serve serve;
+  guide_view view;
+  std::size_t ray_count;
+  int warps;
+
+  std::size_t blocks() const { return (ray_count + run - 1) / run; }
+  WFPG_HD std::size_t words_a_warp() const {
+    return std::size_t(view.product_resolution()) * view.product_resolution();
+  }
+  std::size_t scratch_bytes() const {
+    return sizeof(std::uint32_t) * words_a_warp() * std::size_t(warps) + 16;
+  }
+
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t i) const {
+    auto* const words = block.template scratch<std::uint32_t>(words_a_warp() * std::size_t(warps));
+    const std::size_t first = i * run;
+    block.for_each_warp(static_cast<int>(min(run, ray_count - first)), [&](const auto& warp, int k) {
+      const auto ray = static_cast<std::uint32_t>(first + static_cast<std::size_t>(k));
+      std::uint32_t* const own = words + words_a_warp() * static_cast<std::size_t>(warp.index());
+      serve(ray, [&](const auto& s) { return view.product(warp, ray, s, own); });
+    });
   }
 };
 
@@ -65,7 +97,7 @@ struct serve_unbinned {
   array_view<const std::uint32_t> ray_keys;  // empty: no ray has a bin
   WFPG_HD void operator()(std::size_t ray) const {
     if (!ray_keys.empty() && ray_keys[ray] != 0xffffffffu) return;
-    serve(static_cast<std::uint32_t>(ray), guide_mixture{});
+    serve(static_cast<std::uint32_t>(ray), [](const auto&) { return guide_mixture{}; });
   }
 };
 
@@ -76,17 +108,41 @@ struct transient_sink {
   Serve serve;
   mixture_fraction fraction;
   std::uint32_t resolution;
+  product_points points;
+  int warps;
+
+  std::size_t product_words() const {
+    return std::size_t(points.resolution) * points.resolution * std::size_t(warps);
+  }
+  std::size_t scratch_bytes() const {
+    return sizeof(std::uint32_t) * (field_words(resolution, points.resolution) + product_words()) + 32;
+  }
 
   template <class Block>
   WFPG_HD std::uint32_t* words(Block& block, std::size_t) const {
-    return block.template scratch<std::uint32_t>(distribution_words(resolution));
+    return block.template scratch<std::uint32_t>(field_words(resolution, points.resolution));
   }
   template <class Block>
-  WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field) const {
-    const guide_mixture mixture{field, fraction(bins.size(bin))};
-    const std::uint32_t begin = bins.begin(bin);
-    block.for_each(static_cast<int>(bins.size(bin)),
-                   [&](int i) { serve(bins.permutation[begin + static_cast<std::uint32_t>(i)], mixture); });
+  WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field,
+                      const block_sums& blocks) const {
+    const float share = fraction(bins.size(bin));
+    const std::uint32_t* const rays = bins.permutation.data() + bins.begin(bin);
+    const auto count = static_cast<int>(bins.size(bin));
+    if (points.resolution == 0) {
+      block.for_each(count, [&](int i) {
+        serve(rays[i], [&](const auto&) { return guide_mixture{field, share}; });
+      });
+      return;
+    }
+    const std::size_t words_a_warp = std::size_t(points.resolution) * points.resolution;
+    auto* const words = block.template scratch<std::uint32_t>(words_a_warp * std::size_t(warps));
+    block.for_each_warp(count, [&](const auto& warp, int i) {
+      std::uint32_t* const own = words + words_a_warp * static_cast<std::size_t>(warp.index());
+      serve(rays[i], [&](const auto& s) -> product_mixture {
+        if (s.bsdf.is_delta()) return {};
+        return {multiply(warp, field, blocks, points, s, own), share};
+      });
+    });
   }
 };
 
@@ -98,13 +154,15 @@ struct resident_sink {
   std::uint32_t* field_of_ray;
   mixture_fraction fraction;
   std::uint32_t resolution;
+  std::uint32_t product_resolution;
 
   template <class Block>
   WFPG_HD std::uint32_t* words(Block&, std::size_t bin) const {
-    return storage + bin * distribution_words(resolution);
+    return storage + bin * field_words(resolution, product_resolution);
   }
   template <class Block>
-  WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field) const {
+  WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field,
+                      const block_sums&) const {
     const std::uint32_t begin = bins.begin(bin);
     block.for_each(static_cast<int>(bins.size(bin)), [&](int i) {
       if (i == 0) fields[bin] = {field.normal(), fraction(bins.size(bin)), field.hemisphere()};

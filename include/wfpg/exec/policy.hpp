@@ -15,7 +15,8 @@
 //                                what a block and its warps offer)
 //
 // n is a std::size_t, or a device_count where only the device knows it. Calls are ordered: one sees what the
-// one before it wrote. `Exec::warp_width` is the number of lanes of a warp, 8, 16 or 32.
+// one before it wrote. `Exec::warp_width` is the number of lanes of a warp, 8, 16 or 32, and
+// `Exec::warps_per_block` that of the warps of a block.
 #pragma once
 
 #include <wfpg/detail/config.hpp>
@@ -49,10 +50,10 @@ template <class Exec, class = void>
 struct is_execution_policy : std::false_type {};
 
 template <class Exec>
-struct is_execution_policy<
-    Exec, std::void_t<decltype(std::declval<const Exec&>().resource()),
-                      decltype(std::declval<const Exec&>().with_resource(nullptr)),
-                      decltype(std::declval<const Exec&>().thrust()), decltype(Exec::warp_width)>>
+struct is_execution_policy<Exec, std::void_t<decltype(std::declval<const Exec&>().resource()),
+                                             decltype(std::declval<const Exec&>().with_resource(nullptr)),
+                                             decltype(std::declval<const Exec&>().thrust()),
+                                             decltype(Exec::warp_width), decltype(Exec::warps_per_block)>>
     : std::true_type {};
 
 }  // namespace detail

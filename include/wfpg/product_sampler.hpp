@@ -1,0 +1,224 @@
+// Product sampling: a ray draws from a field times its own BSDF, in two levels (paper, section 3.6; thesis,
+// section 4.5, Algorithms 6 and 7; after Conty Estevez & Lecocq 2018, "Fast Product Importance Sampling of
+// Environment Maps"). The F x F cells of a field form P x P blocks. One warp multiplies the blocks by the
+// BSDF, which it evaluates at a point in each, and scans them; a direction is drawn from a block and then
+// from the cells inside it. The density is that of what was evaluated, exactly: probability of the block
+// times that of the cell inside it, over the cell's solid angle.
+//
+// Memory: 4 F P bytes a field, 4 P² a ray in flight. Cost: P² evaluations of the BSDF a ray; a direction
+// takes O(log P + log F), a density O(1).
+#pragma once
+
+#include <wfpg/bsdf.hpp>
+#include <wfpg/detail/math.hpp>
+#include <wfpg/error.hpp>
+#include <wfpg/field_sampler.hpp>
+#include <wfpg/types.hpp>
+
+#include <string>
+
+namespace wfpg {
+
+/// The largest P of products.
+inline constexpr std::uint32_t max_product_resolution = 16;
+
+/// The sums of a field's blocks: entry (bx, y) is the sum of block column bx over the rows of its block up to
+/// row y. Made once a field, so that a direction inside a block takes a search.
+struct block_sums {
+  const std::uint32_t* words = nullptr;  ///< F · P, row by row
+  std::uint32_t resolution = 0;          ///< P
+
+  WFPG_HD std::uint32_t through(std::uint32_t bx, std::uint32_t y) const {
+    return words[y * resolution + bx];
+  }
+};
+
+/// A block as products see it: where they evaluate BSDFs, jittered anew for each sample and depth, so that a
+/// lobe between points is not missed forever; and the mean of all its directions.
+struct product_point {
+  vec3 direction;  ///< unit length
+  vec3 mean;       ///< shorter than 1, by more where the block is wider
+};
+
+/// A wave's P² points over the hemisphere about +z and over the sphere, row by row.
+struct product_points {
+  const product_point* hemisphere = nullptr;
+  const product_point* sphere = nullptr;
+  std::uint32_t resolution = 0;  ///< P; 0: no products
+};
+
+/// A density over directions: a field times a BSDF, of one ray. A default one is empty.
+class product_field {
+ public:
+  product_field() = default;
+  /// `weights`: inclusive sums of the P² products, at most 2³¹; they and the rest outlive this.
+  WFPG_HD product_field(const directional_field& field, const block_sums& blocks,
+                        const std::uint32_t* weights)
+      : field_(field), blocks_(blocks), weights_(weights) {
+    side_ = field.grid().resolution() / blocks.resolution;
+  }
+
+  /// Nothing to draw from: the BSDF is black wherever the field shines.
+  WFPG_HD bool empty() const { return weights_ == nullptr || total() == 0; }
+
+  /// A unit direction from u in [0,1)², and pdf() of it. Precondition: not empty.
+  WFPG_HD vec3 sample(vec2 u, float& density) const {
+    const std::uint32_t p = blocks_.resolution;
+    const auto drawn = detail::find_in_sums([this](std::uint32_t i) { return weights_[i]; }, p * p, 0, u.x);
+    const cell_in_block first{drawn.index % p * side_, drawn.index / p * side_, drawn.index};
+    const auto row = detail::find_in_sums(
+        [&](std::uint32_t i) { return blocks_.through(drawn.index % p, first.y + i); }, side_, 0, u.y);
+    const cell_in_block begin{first.x, first.y + row.index, drawn.index};
+    const auto column =
+        detail::find_in_sums([&](std::uint32_t i) { return field_.grid().row_sum(begin.x + i, begin.y); },
+                             side_, begin.x > 0 ? field_.grid().row_sum(begin.x - 1, begin.y) : 0u,
+                             detail::min(drawn.fraction, 1.0f - 0x1p-24f));
+    const cell_in_block cell{begin.x + column.index, begin.y, drawn.index};
+    density = cell_pdf(cell);
+    return field_.direction(vec2{static_cast<float>(cell.x) + detail::inside_cell(column.fraction),
+                                 static_cast<float>(cell.y) + detail::inside_cell(row.fraction)} /
+                            static_cast<float>(field_.grid().resolution()));
+  }
+
+  /// The density of a unit direction, per steradian; 0 outside a hemisphere. Precondition: not empty.
+  WFPG_HD float pdf(vec3 d) const {
+    vec2 uv;
+    if (!field_.locate(d, uv)) return 0.0f;
+    const std::uint32_t x = field_.grid().cell_along(uv.x), y = field_.grid().cell_along(uv.y);
+    return cell_pdf({x, y, y / side_ * blocks_.resolution + x / side_});
+  }
+
+ private:
+  struct cell_in_block {
+    std::uint32_t x, y, block;
+  };
+
+  WFPG_HD std::uint32_t total() const { return weights_[blocks_.resolution * blocks_.resolution - 1]; }
+
+  WFPG_HD float cell_pdf(const cell_in_block& cell) const {
+    const std::uint32_t product = weights_[cell.block] - (cell.block > 0 ? weights_[cell.block - 1] : 0u);
+    if (product == 0) return 0.0f;
+    const std::uint32_t bx = cell.block % blocks_.resolution, by = cell.block / blocks_.resolution;
+    const std::uint32_t inside = field_.grid().weight(cell.x, cell.y);
+    const std::uint32_t whole = blocks_.through(bx, (by + 1) * side_ - 1);
+    return static_cast<float>(product) * static_cast<float>(inside) /
+           (static_cast<float>(total()) * static_cast<float>(whole) * field_.cell_solid_angle());
+  }
+
+  directional_field field_;
+  block_sums blocks_;
+  const std::uint32_t* weights_ = nullptr;
+  std::uint32_t side_ = 0;  // of a block, in cells
+};
+
+namespace detail {
+
+/// Throws std::invalid_argument where P is not 0, 4, 8 or 16, or does not divide the resolution of that name.
+inline void require_product_resolution(std::uint32_t p, const char* name, std::uint32_t resolution) {
+  require(p == 0 || p == 4 || p == 8 || p == max_product_resolution, "product_resolution", p,
+          "0, 4, 8 or 16");
+  require(p == 0 || resolution % p == 0, name, resolution,
+          ("a multiple of product_resolution, " + std::to_string(p)).c_str());
+}
+
+/// 4-byte words of a field of F² cells with its block sums; P = 0: without.
+WFPG_HD constexpr std::size_t field_words(std::uint32_t resolution, std::uint32_t product_resolution) {
+  return distribution_words(resolution) + std::size_t(resolution) * product_resolution;
+}
+
+/// Sums the blocks of a distribution, by a whole block of threads.
+template <class Block>
+WFPG_HD void sum_blocks(const Block& block, const grid_distribution& grid, std::uint32_t product_resolution,
+                        std::uint32_t* words) {
+  const auto p = static_cast<int>(product_resolution);
+  const std::uint32_t side = grid.resolution() / product_resolution;
+  block.for_each(p * p, [&](int i) {
+    const auto bx = static_cast<std::uint32_t>(i % p), by = static_cast<std::uint32_t>(i / p);
+    std::uint32_t sum = 0;
+    for (std::uint32_t y = by * side; y < (by + 1) * side; ++y) {
+      sum += grid.row_sum((bx + 1) * side - 1, y) - (bx > 0 ? grid.row_sum(bx * side - 1, y) : 0u);
+      words[y * product_resolution + bx] = sum;
+    }
+  });
+  block.sync();
+}
+
+/// Draws a wave's points: f(i) for i in [0, P²).
+struct draw_product_points {
+  product_point* hemisphere;
+  product_point* sphere;
+  std::uint32_t resolution;
+  std::uint64_t seed;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    constexpr int n = 8;  // of the midpoint rule, along a side
+    const vec2 corner(static_cast<float>(i % resolution), static_cast<float>(i / resolution));
+    const vec2 uv = (corner + unit_vec2(hash(seed, i))) / static_cast<float>(resolution);
+    hemisphere[i] = {square_to_hemisphere(uv), vec3(0.0f)};
+    sphere[i] = {square_to_sphere(uv), vec3(0.0f)};
+    for (int k = 0; k < n * n; ++k) {
+      const vec2 inside(static_cast<float>(k % n) + 0.5f, static_cast<float>(k / n) + 0.5f);
+      const vec2 at = (corner + inside / static_cast<float>(n)) / static_cast<float>(resolution);
+      hemisphere[i].mean += square_to_hemisphere(at) / static_cast<float>(n * n);
+      sphere[i].mean += square_to_sphere(at) / static_cast<float>(n * n);
+    }
+  }
+};
+
+/// The mean over a block of the cosine at a normal, where that is positive: exact for blocks above the
+/// horizon but for 6%, and right at the horizon, where half a block counts.
+WFPG_HD inline float mean_cosine(vec3 mean, vec3 normal) {
+  const float cosine = glm::dot(mean, normal);
+  const float spread = max(1.0f - glm::dot(mean, mean), 0.0f);  // variance of the block's directions
+  return 0.5f * (cosine + sqrtf(cosine * cosine + 0.375f * spread));
+}
+
+/// What a BSDF does to a block of a field. Its value at the block's point is that of the block but for the
+/// cosine, which varies most there and is replaced by its mean; and taken out where the field carries it.
+template <class Bsdf>
+WFPG_HD float block_factor(const surface<Bsdf>& s, const directional_field& field,
+                           const product_point& local) {
+  const vec3 direction = field.to_world(local.direction);
+  const float value = s.bsdf.eval(s.outgoing, direction);
+  if (!(value > 0.0f) || !is_finite(value)) return 0.0f;
+  const float cosine = glm::dot(direction, s.normal);
+  const float mean = mean_cosine(field.to_world(local.mean), cosine >= 0.0f ? s.normal : -s.normal);
+  const float carried = field.hemisphere() ? local.mean.z : 1.0f;
+  return min(value, 1.0e25f) * mean / (max(fabsf(cosine), 1.0e-3f) * carried);
+}
+
+/// Multiplies a field by a surface's BSDF, by one warp; `words` holds P². Weights are integers, scaled by the
+/// largest of them: alike on every width, and exact in every sum.
+template <class Warp, class Bsdf>
+WFPG_HD product_field multiply(const Warp& warp, const directional_field& field, const block_sums& blocks,
+                               const product_points& points, const surface<Bsdf>& s, std::uint32_t* words) {
+  const auto p = static_cast<int>(blocks.resolution);
+  const int shift = p == 16 ? 4 : p == 8 ? 3 : 2;  // of a power of two, which divides
+  const auto side = static_cast<int>(field.grid().resolution()) >> shift;
+  const product_point* const local = field.hemisphere() ? points.hemisphere : points.sphere;
+  auto largest = warp.map([](int) { return 0.0f; });
+  for (int first = 0; first < p * p; first += Warp::width) {
+    const auto products = warp.evaluate([&](int lane) {
+      const int i = first + lane;
+      if (i >= p * p) return 0.0f;
+      const std::uint32_t sum = blocks.words[((i >> shift) * side + side - 1) * p + (i & (p - 1))];
+      return sum > 0 ? static_cast<float>(sum) * block_factor(s, field, local[i]) : 0.0f;
+    });
+    warp.for_each_lane([&](int lane) {
+      if (first + lane < p * p) words[first + lane] = float_bits(products[lane]);
+    });
+    largest = warp.map([&](int lane) { return max(largest[lane], products[lane]); });
+  }
+  const float brightest = warp.reduce(largest, [](float a, float b) { return max(a, b); });
+  if (!(brightest > 1.0e-25f)) return {};
+  const float scale = 0x1p31f / static_cast<float>(p * p) / brightest;
+  scan_by_warp(warp, p * p, words, [&](int i) {
+    const float product = bits_float(words[i]);
+    return product > 0.0f ? max(static_cast<std::uint32_t>(product * scale), 1u) : 0u;
+  });
+  warp.sync();
+  return {field, blocks, words};
+}
+
+}  // namespace detail
+}  // namespace wfpg
