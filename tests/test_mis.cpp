@@ -19,9 +19,6 @@ using wfpg::sampling_technique;
 
 namespace {
 
-const vec3 up = glm::normalize(vec3(-0.2f, 0.9f, 0.4f));
-const vec3 toward_eye = glm::normalize(vec3(0.5f, 0.6f, 0.3f));
-
 struct draw_mixture {
   guide_mixture mixture;
   test_surface surface;

@@ -18,9 +18,6 @@ using wfpg::product_point;
 
 namespace {
 
-const vec3 up = glm::normalize(vec3(-0.2f, 0.9f, 0.4f));
-const vec3 toward_eye = glm::normalize(vec3(0.5f, 0.6f, 0.3f));
-
 struct resolutions {
   std::uint32_t field, product;
 };
@@ -70,7 +67,8 @@ template <class Exec>
 struct product_of {
   std::vector<drawn_direction> drawn;
   bool was_empty = false;
-  std::vector<double> cells;  ///< probability of each, from the density
+  std::vector<double> cells;     ///< probability of each, from the density
+  std::vector<double> observed;  ///< directions in each
   double integral = 0.0;
 
   product_of(resolutions r, bool hemisphere, bsdf_kind kind, std::uint64_t seed, std::size_t samples) {
@@ -110,8 +108,6 @@ struct product_of {
         observed[field.grid().cell_along(uv.y) * r.field + field.grid().cell_along(uv.x)] += 1.0;
     }
   }
-
-  std::vector<double> observed;
 };
 
 WFPG_TEST_CASE("product sampler: densities are frequencies, integrate to one, and answer queries",

@@ -69,7 +69,7 @@ class guide_view {
   template <class Warp, class Bsdf>
   WFPG_HD product_mixture product(const Warp& warp, std::uint32_t ray, const surface<Bsdf>& s,
                                   std::uint32_t* words) const {
-    if (!guides(ray) || s.bsdf.is_delta()) return {};
+    if (!guides(ray)) return {};
     const std::uint32_t field = field_of_ray_[ray];
     return {detail::multiply(warp, fields_.field(field), fields_.blocks(field), fields_.points, s, words),
             fields_.fields[field].fraction};
@@ -95,19 +95,22 @@ class guide_view {
   template <class Bsdf>
   WFPG_HD sampled_direction sample(std::uint32_t ray, const surface<Bsdf>& s, float u_technique,
                                    vec2 u) const {
-    if (product_resolution() == 0) return mixture(ray).sample(s, u_technique, u);
-    std::uint32_t words[max_product_resolution * max_product_resolution];
-    return product(ray, s, words).sample(s, u_technique, u);
+    return with_mixture(ray, s, [&](const auto& mixture) { return mixture.sample(s, u_technique, u); });
   }
   /// The mixture's density of a unit direction, per steradian.
   template <class Bsdf>
   WFPG_HD float pdf(std::uint32_t ray, const surface<Bsdf>& s, vec3 direction) const {
-    if (product_resolution() == 0) return mixture(ray).pdf(s, direction);
-    std::uint32_t words[max_product_resolution * max_product_resolution];
-    return product(ray, s, words).pdf(s, direction);
+    return with_mixture(ray, s, [&](const auto& mixture) { return mixture.pdf(s, direction); });
   }
 
  private:
+  template <class Bsdf, class F>
+  WFPG_HD auto with_mixture(std::uint32_t ray, const surface<Bsdf>& s, const F& f) const {
+    if (product_resolution() == 0) return f(mixture(ray));
+    std::uint32_t words[max_product_resolution * max_product_resolution];
+    return f(product(ray, s, words));
+  }
+
   array_view<const std::uint32_t> field_of_ray_;
   resident_fields fields_;
 };

@@ -61,6 +61,9 @@ class product_field {
   /// Nothing to draw from: the BSDF is black wherever the field shines.
   WFPG_HD bool empty() const { return weights_ == nullptr || total() == 0; }
 
+  /// The GGX roughness of a lobe as wide as two blocks, which so many points do not miss.
+  WFPG_HD float resolved_alpha() const { return 2.0f / static_cast<float>(blocks_.resolution); }
+
   /// A unit direction from u in [0,1)², and pdf() of it. Precondition: not empty.
   WFPG_HD vec3 sample(vec2 u, float& density) const {
     const std::uint32_t p = blocks_.resolution;
@@ -188,10 +191,11 @@ WFPG_HD float block_factor(const surface<Bsdf>& s, const directional_field& fiel
 }
 
 /// Multiplies a field by a surface's BSDF, by one warp; `words` holds P². Weights are integers, scaled by the
-/// largest of them: alike on every width, and exact in every sum.
+/// largest of them: alike on every width, and exact in every sum. Of a delta BSDF nothing is left.
 template <class Warp, class Bsdf>
 WFPG_HD product_field multiply(const Warp& warp, const directional_field& field, const block_sums& blocks,
                                const product_points& points, const surface<Bsdf>& s, std::uint32_t* words) {
+  if (s.bsdf.is_delta()) return {};
   const auto p = static_cast<int>(blocks.resolution);
   const int shift = p == 16 ? 4 : p == 8 ? 3 : 2;  // of a power of two, which divides
   const auto side = static_cast<int>(field.grid().resolution()) >> shift;

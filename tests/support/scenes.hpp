@@ -71,6 +71,10 @@ struct test_bsdf {
   vec3 mirrored(vec3 outgoing) const { return 2.0f * glm::dot(normal, outgoing) * normal - outgoing; }
 };
 
+/// A normal and a viewer above it, along no axis.
+inline const vec3 up = glm::normalize(vec3(-0.2f, 0.9f, 0.4f));
+inline const vec3 toward_eye = glm::normalize(vec3(0.5f, 0.6f, 0.3f));
+
 using test_surface = wfpg::surface<test_bsdf>;
 
 inline test_surface make_surface(vec3 position, vec3 normal, vec3 outgoing,

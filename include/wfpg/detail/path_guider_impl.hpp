@@ -56,7 +56,7 @@ const guider_options& path_guider<Exec>::checked(const guider_options& o) {
   require(o.max_paths < 0xffffffffull, "max_paths", o.max_paths, "less than 2^32 - 1");
   require(o.max_rays < 0xffffffffull, "max_rays", o.max_rays, "less than 2^32 - 1");
   if (o.fields == field_lifetime::transient)
-    for (std::uint32_t depth = 0; depth < 8; ++depth)
+    for (std::uint32_t depth = 0; depth < 8; ++depth)  // 128 cells are halved no more than 7 times
       detail::require_product_resolution(o.product_resolution, "field_resolution at a depth",
                                          resolution_at(o, depth));
   require(o.product_resolution == 0 || o.guide_fraction < 1.0f, "guide_fraction", o.guide_fraction,
@@ -182,8 +182,9 @@ void path_guider<Exec>::sample_directions(const wave<Surfaces, Random>& w, const
   if (view.product_resolution() == 0) {
     exec_.for_each(w.ray_count, detail::serve_view<decltype(serve)>{serve, view});
   } else {
-    const detail::serve_products<decltype(serve)> products{serve, view, w.ray_count, Exec::warps_per_block};
-    exec_.for_each_block(products.blocks(), products.scratch_bytes(), products);
+    const detail::serve_products<decltype(serve)> products{
+        serve, view, w.ray_count, {view.product_resolution(), Exec::warps_per_block}};
+    exec_.for_each_block(products.blocks(), products.scratch.bytes(), products);
   }
 }
 
@@ -226,8 +227,10 @@ void path_guider<Exec>::serve_transient(const wave<Surfaces, Random>& w, const C
     const auto fields = bin_wave(w);
     rest.ray_keys = fields.bins.ray_keys;
     const auto timed = clock_.time(detail::stage::fields);
-    const detail::transient_sink<Serve> sink{fields.bins,       serve,        fraction(),
-                                             fields.resolution, points_of(w), Exec::warps_per_block};
+    const product_points points = points_of(w);
+    const detail::transient_sink<Serve> sink{fields.bins, serve,
+                                             fraction(),  fields.resolution,
+                                             points,      {points.resolution, Exec::warps_per_block}};
     detail::for_each_field(exec_, fields, caster, sink, sink.scratch_bytes(), options_.caster_buffer_bytes);
   }
   const auto timed = clock_.time(detail::stage::serve);

@@ -61,6 +61,25 @@ struct serve_view {
   }
 };
 
+/// Scratch memory in which the warps of a block make products: P² words a warp.
+struct product_scratch {
+  std::uint32_t resolution;  // P
+  int warps;                 // of a block
+
+  WFPG_HD std::size_t words_a_warp() const { return std::size_t(resolution) * resolution; }
+  WFPG_HD std::size_t words() const { return words_a_warp() * static_cast<std::size_t>(warps); }
+  std::size_t bytes() const { return sizeof(std::uint32_t) * words() + 16; }
+
+  /// f(warp, words of the warp, i) for i in [0, n): each i is one warp's.
+  template <class Block, class F>
+  WFPG_HD void for_each_warp(Block& block, int n, const F& f) const {
+    auto* const all = block.template scratch<std::uint32_t>(words());
+    block.for_each_warp(n, [&](const auto& warp, int i) {
+      f(warp, all + words_a_warp() * static_cast<std::size_t>(warp.index()), i);
+    });
+  }
+};
+
 /// Runs of rays whose fields are in memory, each ray's product made by a warp.
 template <class Serve>
 struct serve_products {
@@ -68,24 +87,17 @@ struct serve_products {
   Serve serve;
   guide_view view;
   std::size_t ray_count;
-  int warps;
+  product_scratch scratch;
 
   std::size_t blocks() const { return (ray_count + run - 1) / run; }
-  WFPG_HD std::size_t words_a_warp() const {
-    return std::size_t(view.product_resolution()) * view.product_resolution();
-  }
-  std::size_t scratch_bytes() const {
-    return sizeof(std::uint32_t) * words_a_warp() * std::size_t(warps) + 16;
-  }
 
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t i) const {
-    auto* const words = block.template scratch<std::uint32_t>(words_a_warp() * std::size_t(warps));
     const std::size_t first = i * run;
-    block.for_each_warp(static_cast<int>(min(run, ray_count - first)), [&](const auto& warp, int k) {
+    const auto count = static_cast<int>(min(run, ray_count - first));
+    scratch.for_each_warp(block, count, [&](const auto& warp, std::uint32_t* words, int k) {
       const auto ray = static_cast<std::uint32_t>(first + static_cast<std::size_t>(k));
-      std::uint32_t* const own = words + words_a_warp() * static_cast<std::size_t>(warp.index());
-      serve(ray, [&](const auto& s) { return view.product(warp, ray, s, own); });
+      serve(ray, [&](const auto& s) { return view.product(warp, ray, s, words); });
     });
   }
 };
@@ -109,13 +121,10 @@ struct transient_sink {
   mixture_fraction fraction;
   std::uint32_t resolution;
   product_points points;
-  int warps;
+  product_scratch products;
 
-  std::size_t product_words() const {
-    return std::size_t(points.resolution) * points.resolution * std::size_t(warps);
-  }
   std::size_t scratch_bytes() const {
-    return sizeof(std::uint32_t) * (field_words(resolution, points.resolution) + product_words()) + 32;
+    return sizeof(std::uint32_t) * field_words(resolution, points.resolution) + 16 + products.bytes();
   }
 
   template <class Block>
@@ -134,12 +143,8 @@ struct transient_sink {
       });
       return;
     }
-    const std::size_t words_a_warp = std::size_t(points.resolution) * points.resolution;
-    auto* const words = block.template scratch<std::uint32_t>(words_a_warp * std::size_t(warps));
-    block.for_each_warp(count, [&](const auto& warp, int i) {
-      std::uint32_t* const own = words + words_a_warp * static_cast<std::size_t>(warp.index());
+    products.for_each_warp(block, count, [&](const auto& warp, std::uint32_t* own, int i) {
       serve(rays[i], [&](const auto& s) -> product_mixture {
-        if (s.bsdf.is_delta()) return {};
         return {multiply(warp, field, blocks, points, s, own), share};
       });
     });
