@@ -95,7 +95,8 @@ void add_guider_options(CLI::App& app, render::render_options& options) {
   app.add_option("--field-budget", options.field_budget, "memory of kept fields, such as 16MiB (the default)")
       ->transform(CLI::AsSizeValue(false));
   app.add_option("--product-resolution", options.product_resolution,
-                 "blocks a side of wfpg-product's products: 4, 8 or 16 (default: 8)");
+                 "blocks a side of wfpg-product's products: 4, 8 or 16 (default: 8)")
+      ->check(CLI::IsMember({4, 8, 16}));
   app.add_option("--rays-per-bin", options.rays_per_bin, "rays that a bin should have (default: 64)");
   app.add_option("--min-bin-level", options.min_bin_level, "octree level of the largest bins (default: 3)");
   app.add_option("--guide-fraction", options.guide_fraction,
@@ -170,6 +171,9 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
     if (given.output.empty() && given.png.empty() && given.stats.empty() && given.reference.empty())
       throw CLI::RequiredError("one of -o, --png, --stats, --reference");
+    if (app.count("--product-resolution") > 0 &&
+        given.options.method != render::sampling_method::wfpg_product)
+      throw CLI::RequiresError("--product-resolution", "--method wfpg-product");
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : failure;
   }

@@ -31,6 +31,8 @@ render_options completed(const scene& scene, render_options options) {
   require(options.height > 0 && options.height <= largest_side, "height", options.height, "1 to 32768");
   require(options.max_depth > 0 && options.max_depth <= largest_depth, "max_depth", options.max_depth,
           "1 to 1024");
+  require(options.method != sampling_method::wfpg_product || options.product_resolution > 0,
+          "product_resolution", options.product_resolution, "4, 8 or 16 for wfpg-product");
   require(options.seconds >= 0.0, "seconds", options.seconds, "0 or more");
   const int least = combination_of(options) == wfpg::sample_combination::discard_first ? 2 : 1;
   require(options.seconds > 0.0 || options.spp >= least, "spp", options.spp,

@@ -121,6 +121,8 @@ class directional_field {
   /// Of the hemisphere.
   WFPG_HD vec3 normal() const { return frame_.z; }
   WFPG_HD const grid_distribution& grid() const { return grid_; }
+  /// The GGX roughness from which on a lobe is nearly as wide as a diffuse one: a field knows no BSDF.
+  WFPG_HD static constexpr float resolved_alpha() { return 0.5f; }
   /// Solid angle of a cell, steradians.
   WFPG_HD float cell_solid_angle() const {
     return domain() / static_cast<float>(grid_.resolution() * grid_.resolution());

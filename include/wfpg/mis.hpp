@@ -1,5 +1,6 @@
-// Multiple importance sampling: Veach's heuristics, and the one-sample mixture of a BSDF and a guide whose
-// density is always the whole mixture's (paper, sections 3.5 and 4, "Multiple Importance Sampling").
+// Multiple importance sampling: Veach's heuristics, and the one-sample mixture of a BSDF and a guide, a field
+// or a product, whose density is always the whole mixture's (paper, sections 3.5, 3.6 and 4, "Multiple
+// Importance Sampling"). That glossy parts are guided less is wfpg's own.
 #pragma once
 
 #include <wfpg/bsdf.hpp>
@@ -45,11 +46,11 @@ struct mixture_shares {
   float smooth = 1.0f;
 };
 
-/// How much of its share a glossy part of GGX roughness `alpha` leaves to the guide: all from 0.5 on, where
-/// the lobe is nearly as wide as a diffuse one; a quarter where it is a mirror's, since fields know nothing
-/// of it.
-WFPG_HD inline float guided_part(float alpha) {
-  const float width = detail::min(alpha / 0.5f, 1.0f);
+/// How much of its share a glossy part of GGX roughness `alpha` leaves to a guide: all where the lobe is as
+/// wide as what the guide resolves, directional_field::resolved_alpha() or product_field::resolved_alpha(); a
+/// quarter where it is a mirror's, of which the guide knows nothing.
+WFPG_HD inline float guided_part(float alpha, float resolved_alpha) {
+  const float width = detail::min(alpha / resolved_alpha, 1.0f);
   return 0.25f + 0.75f * width * width;
 }
 
@@ -95,7 +96,7 @@ struct basic_guide_mixture {
       return {fraction, 0.0f, 1.0f - fraction};
     else {
       const glossy_part part = s.bsdf.glossy(s.outgoing);
-      const float less = fraction * guided_part(part.alpha);
+      const float less = fraction * guided_part(part.alpha, field.resolved_alpha());
       const float guide = fraction + part.share * (less - fraction);
       if constexpr (!has_separate_parts_v<Bsdf>)
         return {guide, 0.0f, 1.0f - guide};
