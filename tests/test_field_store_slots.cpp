@@ -91,7 +91,7 @@ WFPG_TEST_CASE("field store: a budget is spent on its slots and on nothing else"
       CHECK(box.counts().capacity == slots);
       CHECK(box.counts().bytes_a_slot * slots == budget);
       CHECK(box.store.slot_bytes() <= budget);
-      CHECK(field_store<Exec>::bytes_a_slot(resolution) >= 8 * resolution * resolution + 4 * resolution);
+      CHECK(field_store<Exec>::bytes_a_slot(resolution) >= 8 * resolution * resolution);
     }
 }
 

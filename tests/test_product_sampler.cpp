@@ -24,16 +24,6 @@ struct resolutions {
 constexpr resolutions all_resolutions[] = {{16, 4},  {16, 8}, {16, 16}, {24, 8},  {32, 4},  {32, 8},
                                            {32, 16}, {64, 4}, {64, 8},  {64, 16}, {128, 8}, {128, 16}};
 
-struct sum_blocks_once {
-  wfpg::grid_distribution grid;
-  std::uint32_t product_resolution;
-  std::uint32_t* words;
-  template <class Block>
-  void operator()(Block& block, std::size_t) const {
-    wfpg::detail::sum_blocks(block, grid, product_resolution, words);
-  }
-};
-
 struct drawn_direction {
   vec3 direction;
   float pdf, asked;
@@ -42,7 +32,6 @@ struct drawn_direction {
 /// Makes the product by one warp, and draws from it.
 struct draw_product {
   directional_field field;
-  wfpg::block_sums blocks;
   wfpg::product_points points;
   test_surface surface;
   std::uint32_t* weights;
@@ -50,7 +39,7 @@ struct draw_product {
   template <class Block>
   void operator()(Block& block, std::size_t) const {
     block.for_each_warp(1, [&](const auto& warp, int) {
-      const product_field product = wfpg::detail::multiply(warp, field, blocks, points, surface, weights);
+      const product_field product = wfpg::detail::multiply(warp, field, points, surface, weights);
       for (std::size_t i = 0; i < drawn.size(); ++i) {
         drawn[i] = {};
         if (product.empty()) continue;
@@ -77,16 +66,13 @@ struct product_of {
     const directional_field field =
         hemisphere ? directional_field(built.grid(), up) : directional_field(built.grid());
     const std::size_t blocks = std::size_t(r.product) * r.product;
-    const wfpg::buffer<std::uint32_t, Exec> sums(exec, std::size_t(r.field) * r.product), scan(exec, blocks);
+    const wfpg::buffer<std::uint32_t, Exec> scan(exec, blocks);
     const wfpg::buffer<product_point, Exec> points(exec, 2 * blocks);
     const wfpg::buffer<drawn_direction, Exec> results(exec, samples);
-    exec.for_each_block(1, 0, sum_blocks_once{built.grid(), r.product, sums.data()});
     exec.for_each(blocks,
                   wfpg::detail::draw_product_points{points.data(), points.data() + blocks, r.product, seed});
-    const wfpg::block_sums block_sums{sums.data(), r.product};
     exec.for_each_block(1, 0,
                         draw_product{field,
-                                     block_sums,
                                      {points.data(), points.data() + blocks, r.product},
                                      make_surface({}, up, toward_eye, kind),
                                      scan.data(),
@@ -94,7 +80,7 @@ struct product_of {
     drawn = results.to_host(exec);
     was_empty = !(drawn.front().pdf > 0.0f);
     if (was_empty) return;
-    const product_field product(field, block_sums, scan.data());
+    const product_field product(field, r.product, scan.data());
     for (std::uint32_t i = 0; i < r.field * r.field; ++i) {
       const wfpg::vec2 middle(float(i % r.field) + 0.5f, float(i / r.field) + 0.5f);
       cells.push_back(double(product.pdf(field.direction(middle / float(r.field)))) *

@@ -172,17 +172,17 @@ made_fields make_fields(const lit_box<Exec>& box, const std::vector<test_surface
   const stored_surfaces stored{const_view<test_surface>(surfaces)};
   wfpg::spatial_binner<Exec> binner(exec, box.tree.view(), {1, 16}, wave.size());
   const auto bins = binner.bin(exec, wave.size(), wfpg::detail::wave_rays<stored_surfaces>{stored, mode});
-  const wfpg::detail::bin_fields<stored_surfaces> fields{bins, stored, box.cache.view(), {}, mode, resolution,
-                                                         0,    42};
+  const wfpg::detail::bin_fields<stored_surfaces> fields{bins,       stored, box.cache.view(), {}, mode,
+                                                         resolution, 42};
   const std::size_t n = wfpg::read_element(exec, bins.count);
-  const wfpg::buffer<std::uint32_t, Exec> words(exec, n * wfpg::detail::distribution_words(resolution));
+  const wfpg::buffer<std::uint32_t, Exec> words(exec, n * resolution * resolution);
   const wfpg::buffer<wfpg::resident_field, Exec> resident(exec, n);
   const wfpg::buffer<std::uint32_t, Exec> field_of_ray(
       exec, std::vector<std::uint32_t>(wave.size(), wfpg::guide_view::no_field));
   wfpg::detail::for_each_field(
       exec, fields, caster,
       wfpg::detail::resident_sink{
-          bins, words.data(), resident.data(), field_of_ray.data(), {0.5f, 0.5f, 0}, resolution, 0},
+          bins, words.data(), resident.data(), field_of_ray.data(), {0.5f, 0.5f, 0}, resolution},
       0, buffer_bytes);
   made_fields result{words.to_host(exec), field_of_ray.to_host(exec), resident.to_host(exec), {}};
   for (std::size_t bin = 0; bin < n; ++bin) result.orientations.push_back(bins.orientation(bin));
@@ -222,8 +222,7 @@ WFPG_TEST_CASE("radiance field: every ray gets a field, above its own horizon wh
       const wfpg::resident_field& f = made.fields[made.field_of_ray[ray]];
       hemispheres += f.hemisphere;
       CHECK(f.hemisphere == (mode == guiding_mode::oriented && !wave[ray].bsdf.transmits()));
-      const std::uint32_t* words = made.words.data() + made.field_of_ray[ray] * (8 * 8 + 8);
-      const wfpg::grid_distribution grid(words, words + 64, 8);
+      const wfpg::grid_distribution grid(made.words.data() + made.field_of_ray[ray] * 8 * 8, 8);
       if (!f.hemisphere) continue;
       const directional_field field(grid, f.normal);
       for (std::uint32_t i = 0; i < 20; ++i) {

@@ -30,12 +30,12 @@ template <class Exec>
 std::vector<double> finished(const std::vector<float>& values, std::uint32_t resolution, bool hemisphere,
                              const wfpg::field_options& options) {
   const Exec exec;
-  std::vector<std::uint32_t> host(wfpg::detail::distribution_words(resolution));
-  for (std::size_t i = 0; i < values.size(); ++i) host[i] = wfpg::detail::float_bits(values[i]);
+  std::vector<std::uint32_t> host;
+  for (float value : values) host.push_back(wfpg::detail::float_bits(value));
   const wfpg::buffer<std::uint32_t, Exec> words(exec, host);
   exec.for_each_block(1, wfpg::detail::field_scratch_bytes(resolution),
                       finish_cells{words.data(), int(resolution), hemisphere, options});
-  const wfpg::grid_distribution grid(words.data(), words.data() + values.size(), resolution);
+  const wfpg::grid_distribution grid(words.data(), resolution);
   std::vector<double> result;
   for (std::uint32_t i = 0; i < values.size(); ++i)
     result.push_back(double(grid.weight(i % resolution, i / resolution)) / double(grid.total()));

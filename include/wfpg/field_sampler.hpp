@@ -1,10 +1,10 @@
 // Piecewise-constant sampling of a square grid of cells, and of directions through the octahedral map (paper,
-// section 3.5; thesis, section 4.4.2). A distribution is integer weights: each row's inclusive sums and the
-// inclusive sums of the rows. Sums of integers are exact in any order, so a sampler and its density agree to
-// the bit on every policy and warp width: a cell's probability is the difference of two entries that the
-// sampler searched.
+// section 3.5; thesis, section 4.4.2). A distribution is integer weights in a summed-area table (Crow 1984):
+// the sum of any rectangle of cells is four of its entries, so the grid is sampled as a whole and in parts
+// alike. Sums of integers are exact in any order, so a sampler and its density agree to the bit on every
+// policy and warp width.
 //
-// Memory: 4 (F² + F) bytes for F² cells. Sampling: two searches, O(log F). Density: O(1).
+// Memory: 4 F² bytes for F² cells. Sampling: two searches, O(log F). Density: O(1).
 #pragma once
 
 #include <wfpg/detail/math.hpp>
@@ -44,35 +44,54 @@ WFPG_HD inline float inside_cell(float fraction) {
 
 }  // namespace detail
 
+/// Cells of a grid: columns [x, x + side) and rows [y, y + side).
+struct cell_block {
+  std::uint32_t x = 0, y = 0, side = 1;
+};
+
 /// A density over [0,1)², constant in each of F x F cells.
 class grid_distribution {
  public:
   grid_distribution() = default;
-  /// `rows`: F² inclusive sums, each row from its own beginning; `marginal`: F inclusive sums of the rows'
-  /// totals.
-  WFPG_HD grid_distribution(const std::uint32_t* rows, const std::uint32_t* marginal,
-                            std::uint32_t resolution)
-      : rows_(rows), marginal_(marginal), resolution_(resolution) {}
+  /// `sums`: F² words, row by row; entry (x, y) is the sum of the cells of columns 0 to x and rows 0 to y.
+  WFPG_HD grid_distribution(const std::uint32_t* sums, std::uint32_t resolution)
+      : sums_(sums), resolution_(resolution) {}
 
   WFPG_HD std::uint32_t resolution() const { return resolution_; }
-  WFPG_HD std::uint32_t total() const { return marginal_[resolution_ - 1]; }
-  WFPG_HD std::uint32_t weight(std::uint32_t x, std::uint32_t y) const {
-    return width(rows_ + y * resolution_, x);
+  WFPG_HD std::uint32_t total() const { return sums_[resolution_ * resolution_ - 1]; }
+  /// The sum of a block's cells.
+  WFPG_HD std::uint32_t weight(const cell_block& b) const {
+    return before(b.x + b.side, b.y + b.side) - before(b.x, b.y + b.side) - before(b.x + b.side, b.y) +
+           before(b.x, b.y);
   }
+  WFPG_HD std::uint32_t weight(std::uint32_t x, std::uint32_t y) const { return weight(cell_block{x, y, 1}); }
 
   /// A point of [0,1)² from u in [0,1)². Monotone in each coordinate inside a row: stratified u stay
   /// stratified.
   WFPG_HD vec2 sample(vec2 u) const {
-    float density;
-    return sample(u, density);
+    cell_block cell;
+    return sample({0, 0, resolution_}, u, cell);
   }
   /// The same, and pdf() of the point: of the cell that the search ended in.
   WFPG_HD vec2 sample(vec2 u, float& density) const {
-    const detail::sums_position row = find(marginal_, u.y);
-    const detail::sums_position column = find(rows_ + row.index * resolution_, u.x);
-    density = cell_pdf(column.index, row.index);
-    return vec2{static_cast<float>(column.index) + detail::inside_cell(column.fraction),
-                static_cast<float>(row.index) + detail::inside_cell(row.fraction)} /
+    cell_block cell;
+    const vec2 point = sample({0, 0, resolution_}, u, cell);
+    density = cell_pdf(cell.x, cell.y);
+    return point;
+  }
+  /// A point of a block, as its cells' weights have it, and the cell that it lies in. Precondition: the
+  /// block has weight.
+  WFPG_HD vec2 sample(const cell_block& b, vec2 u, cell_block& cell) const {
+    const auto row = detail::find_in_sums(
+        [&](std::uint32_t i) { return before(b.x + b.side, b.y + i + 1) - before(b.x, b.y + i + 1); }, b.side,
+        before(b.x + b.side, b.y) - before(b.x, b.y), u.y);
+    const std::uint32_t y = b.y + row.index;
+    const auto column = detail::find_in_sums(
+        [&](std::uint32_t i) { return before(b.x + i + 1, y + 1) - before(b.x + i + 1, y); }, b.side,
+        before(b.x, y + 1) - before(b.x, y), u.x);
+    cell = {b.x + column.index, y, 1};
+    return vec2{static_cast<float>(cell.x) + detail::inside_cell(column.fraction),
+                static_cast<float>(cell.y) + detail::inside_cell(row.fraction)} /
            static_cast<float>(resolution_);
   }
 
@@ -82,9 +101,6 @@ class grid_distribution {
     return static_cast<std::uint32_t>(
         detail::clamp(coordinate * static_cast<float>(resolution_), 0.0f, last));
   }
-  /// The sum of the cells of row y up to x.
-  WFPG_HD std::uint32_t row_sum(std::uint32_t x, std::uint32_t y) const { return rows_[y * resolution_ + x]; }
-
   /// The density at a point, per unit of the square's area.
   WFPG_HD float pdf(vec2 uv) const { return cell_pdf(cell_along(uv.x), cell_along(uv.y)); }
 
@@ -93,15 +109,12 @@ class grid_distribution {
     const auto cells = static_cast<float>(resolution_ * resolution_);
     return static_cast<float>(weight(x, y)) / static_cast<float>(total()) * cells;
   }
-  WFPG_HD static std::uint32_t width(const std::uint32_t* sums, std::uint32_t i) {
-    return sums[i] - (i ? sums[i - 1] : 0u);
-  }
-  WFPG_HD detail::sums_position find(const std::uint32_t* sums, float u) const {
-    return detail::find_in_sums([sums](std::uint32_t i) { return sums[i]; }, resolution_, 0, u);
+  /// The sum of the cells of the first x columns and y rows.
+  WFPG_HD std::uint32_t before(std::uint32_t x, std::uint32_t y) const {
+    return x > 0 && y > 0 ? sums_[(y - 1) * resolution_ + x - 1] : 0u;
   }
 
-  const std::uint32_t* rows_ = nullptr;
-  const std::uint32_t* marginal_ = nullptr;
+  const std::uint32_t* sums_ = nullptr;
   std::uint32_t resolution_ = 0;
 };
 
@@ -183,15 +196,9 @@ struct cell_words {
   WFPG_HD void set(int i, float value) const { words[i] = float_bits(value); }
 };
 
-/// 4-byte words of a distribution of F² cells.
-WFPG_HD constexpr std::size_t distribution_words(std::uint32_t resolution) {
-  return std::size_t(resolution) * resolution + resolution;
-}
-
-/// sums[i] becomes the sum of value(0) to value(i), for i in [0, n), by one warp; gives the last to all.
-/// value(i) may read sums[i].
+/// sums[i] becomes the sum of value(0) to value(i), for i in [0, n), by one warp. value(i) may read sums[i].
 template <class Warp, class Value>
-WFPG_HD std::uint32_t scan_by_warp(const Warp& warp, int n, std::uint32_t* sums, const Value& value) {
+WFPG_HD void scan_by_warp(const Warp& warp, int n, std::uint32_t* sums, const Value& value) {
   std::uint32_t before = 0;
   for (int first = 0; first < n; first += Warp::width) {
     const auto values =
@@ -202,12 +209,10 @@ WFPG_HD std::uint32_t scan_by_warp(const Warp& warp, int n, std::uint32_t* sums,
     });
     before += warp.shuffle(through, Warp::width - 1);
   }
-  return before;
 }
 
-/// Turns F² non-negative finite cell values, each plus `floor`, into a distribution in place, and the F words
-/// behind them into its marginal. All values zero (their sum below 1e-25): uniform. The values' sum is below
-/// 3e38.
+/// Turns F² non-negative finite cell values, each plus `floor`, into a distribution in place. All values zero
+/// (their sum below 1e-25): uniform. The values' sum is below 3e38.
 template <class Block>
 WFPG_HD grid_distribution build_distribution(const Block& block, const cell_words& cells, int resolution,
                                              float floor) {
@@ -221,18 +226,16 @@ WFPG_HD grid_distribution build_distribution(const Block& block, const cell_word
     cells.words[i] = scale > 0.0f ? (value > 0.0f ? max(weight, 1u) : 0u) : 1u;
   });
   block.sync();
-  std::uint32_t* const marginal = cells.words + n;
   block.for_each_warp(resolution, [&](const auto& warp, int y) {
     std::uint32_t* const row = cells.words + y * resolution;
-    const std::uint32_t sum = scan_by_warp(warp, resolution, row, [&](int x) { return row[x]; });
-    warp.for_each_lane([&](int lane) {
-      if (lane == 0) marginal[y] = sum;
-    });
+    scan_by_warp(warp, resolution, row, [&](int x) { return row[x]; });
   });
   block.sync();
-  block.inclusive_sum(marginal, resolution);
+  block.for_each(resolution, [&](int x) {
+    for (int i = x + resolution; i < n; i += resolution) cells.words[i] += cells.words[i - resolution];
+  });
   block.sync();
-  return {cells.words, marginal, static_cast<std::uint32_t>(resolution)};
+  return {cells.words, static_cast<std::uint32_t>(resolution)};
 }
 
 }  // namespace detail

@@ -27,8 +27,7 @@ namespace wfpg {
 struct kept_field_options {
   std::uint32_t resolution = 24;  ///< cells along a field's side, in [2, 128]
   std::uint32_t recast = 8;       ///< R: a refresh casts one cone in so many again, at least 1
-  std::size_t budget_bytes = std::size_t(16) << 20;  ///< of the slots; one takes about 8 F² + 4 F bytes,
-                                                     ///< and 4 F P for products
+  std::size_t budget_bytes = std::size_t(16) << 20;  ///< of the slots; one takes about 8 F² bytes
   std::uint64_t max_wave_cones = ~0ull;  ///< cones of a wave; what would need more waits, or goes unguided
   std::uint32_t idle_samples = 16;       ///< a slot that no ray used for so many is freed, at least 1
 };
@@ -55,7 +54,7 @@ struct kept_field_wave {
   guiding_mode mode = guiding_mode::oriented;
   float fraction = 0.7f;   ///< of guided samples in the mixture
   std::uint64_t seed = 0;  ///< of the sample and depth
-  product_points points;   ///< of the store's product resolution
+  product_points points;   ///< P divides the store's resolution
 };
 
 /// Owns the slots, in the memory of `Exec`. The octree must outlive it. Results do not depend on the number
@@ -64,11 +63,10 @@ template <class Exec>
 class field_store {
  public:
   field_store() = default;
-  /// Serves waves of up to `max_rays` rays. Slots have what products of `product_resolution` need; 0: none.
-  /// Throws out_of_memory; std::invalid_argument where an option is out of its range, or the octree has 2²⁹
-  /// nodes or more.
+  /// Serves waves of up to `max_rays` rays. Throws out_of_memory; std::invalid_argument where an option is
+  /// out of its range, or the octree has 2²⁹ nodes or more.
   field_store(const Exec& exec, const sparse_voxel_octree_view& tree, const binning_options& binning,
-              const kept_field_options& options, std::size_t max_rays, std::uint32_t product_resolution = 0);
+              const kept_field_options& options, std::size_t max_rays);
 
   /// Begins a sample, counted from 1: frees slots that are no longer used.
   void begin_sample(const Exec& exec, std::uint32_t sample);
@@ -83,8 +81,8 @@ class field_store {
   /// Finds or makes the fields of a wave's rays, and refreshes those that are due; what kernels sample from,
   /// until the next call. A ray without room for its field has its nearest ancestor's, or none. A batch
   /// caster gets at most `caster_buffer_bytes` of cones at once, and the host reads how many fields are
-  /// built. Throws std::invalid_argument beyond max_rays; what a caster throws, and then the wave's fields
-  /// are built again.
+  /// built. Throws std::invalid_argument beyond max_rays, or where P does not divide; what a caster throws,
+  /// and then the wave's fields are built again.
   template <class Surfaces, class Caster>
   guide_view prepare(const Exec& exec, const kept_field_wave<Surfaces>& wave, const Caster& caster,
                      std::size_t caster_buffer_bytes);
@@ -113,11 +111,11 @@ class field_store {
   /// Of a wave in flight.
   std::size_t wave_bytes() const { return field_of_ray_.bytes() + missing_keys_.bytes() + state_.bytes(); }
 
-  /// Bytes of the budget that one slot takes at a resolution, and at one of products.
-  static std::size_t bytes_a_slot(std::uint32_t resolution, std::uint32_t product_resolution = 0) {
+  /// Bytes of the budget that one slot takes at a resolution.
+  static std::size_t bytes_a_slot(std::uint32_t resolution) {
     const std::size_t cells = std::size_t(resolution) * resolution;
-    return sizeof(detail::cone_hit) * cells + 4 * detail::field_words(resolution, product_resolution) +
-           sizeof(detail::field_slot) + sizeof(resident_field) + words_a_slot * sizeof(std::uint32_t);
+    return (sizeof(detail::cone_hit) + sizeof(std::uint32_t)) * cells + sizeof(detail::field_slot) +
+           sizeof(resident_field) + words_a_slot * sizeof(std::uint32_t);
   }
 
  private:
@@ -125,8 +123,7 @@ class field_store {
   // keys with their own through-counts.
   static constexpr std::size_t words_a_slot = 2 + 2 + 1 + 4 + 4 + 4;
 
-  static const kept_field_options& checked(const kept_field_options& options, std::uint32_t nodes,
-                                           std::uint32_t product_resolution);
+  static const kept_field_options& checked(const kept_field_options& options, std::uint32_t nodes);
   detail::field_slots_view view() const { return {slots_.view(), table_.data(), mask()}; }
   detail::wanted_keys wanted() const { return {wanted_.data(), mask()}; }
   // Counts settle soon, and each costs an atomic.
@@ -146,7 +143,6 @@ class field_store {
 
   sparse_voxel_octree_view tree_;
   kept_field_options options_;
-  std::uint32_t product_resolution_ = 0;
   std::size_t capacity_ = 0;  // slots
   std::uint32_t sample_ = 0;
   std::uint32_t counted_samples_ = 0;

@@ -17,25 +17,16 @@ struct resident_field {
   bool hemisphere = false;
 };
 
-/// Fields in memory: what each is, and words of its distribution and its block sums.
+/// Fields in memory: what each is, and its distribution.
 struct resident_fields {
   const resident_field* fields = nullptr;
-  const std::uint32_t* words = nullptr;  ///< detail::field_words(resolution, points.resolution) each
+  const std::uint32_t* words = nullptr;  ///< F² each
   std::uint32_t resolution = 0;          ///< F
   product_points points;                 ///< of this wave
 
   WFPG_HD directional_field field(std::uint32_t i) const {
-    const std::uint32_t* const rows = words_of(i);
-    const grid_distribution grid(rows, rows + std::size_t(resolution) * resolution, resolution);
+    const grid_distribution grid(words + std::size_t(i) * resolution * resolution, resolution);
     return fields[i].hemisphere ? directional_field(grid, fields[i].normal) : directional_field(grid);
-  }
-  WFPG_HD block_sums blocks(std::uint32_t i) const {
-    return {words_of(i) + detail::distribution_words(resolution), points.resolution};
-  }
-
- private:
-  WFPG_HD const std::uint32_t* words_of(std::uint32_t i) const {
-    return words + i * detail::field_words(resolution, points.resolution);
   }
 };
 
@@ -71,7 +62,7 @@ class guide_view {
                                   std::uint32_t* words) const {
     if (!guides(ray)) return {};
     const std::uint32_t field = field_of_ray_[ray];
-    return {detail::multiply(warp, fields_.field(field), fields_.blocks(field), fields_.points, s, words),
+    return {detail::multiply(warp, fields_.field(field), fields_.points, s, words),
             fields_.fields[field].fraction};
   }
   /// The same by one thread.

@@ -1,12 +1,12 @@
 // Product sampling: a ray draws from a field times its own BSDF, in two levels (paper, section 3.6; thesis,
 // section 4.5, Algorithms 6 and 7; after Conty Estevez & Lecocq 2018, "Fast Product Importance Sampling of
-// Environment Maps"). The F x F cells of a field form P x P blocks. One warp multiplies the blocks by the
-// BSDF, which it evaluates at a point in each, and scans them; a direction is drawn from a block and then
-// from the cells inside it. The density is that of what was evaluated, exactly: probability of the block
-// times that of the cell inside it, over the cell's solid angle.
+// Environment Maps"). The F x F cells of a field form P x P blocks, whose sums its summed-area table has. One
+// warp multiplies the blocks by the BSDF, which it evaluates at a point in each, and scans them; a direction
+// is drawn from a block and then from the cells inside it. The density is that of what was evaluated,
+// exactly: probability of the block times that of the cell inside it, over the cell's solid angle.
 //
-// Memory: 4 F P bytes a field, 4 P² a ray in flight. Cost: P² evaluations of the BSDF a ray; a direction
-// takes O(log P + log F), a density O(1).
+// Memory: 4 P² bytes a ray in flight, and nothing a field. Cost: P² evaluations of the BSDF a ray; a
+// direction takes O(log P + log F), a density O(1).
 #pragma once
 
 #include <wfpg/bsdf.hpp>
@@ -21,17 +21,6 @@ namespace wfpg {
 
 /// The largest P of products.
 inline constexpr std::uint32_t max_product_resolution = 16;
-
-/// The sums of a field's blocks: entry (bx, y) is the sum of block column bx over the rows of its block up to
-/// row y. Made once a field, so that a direction inside a block takes a search.
-struct block_sums {
-  const std::uint32_t* words = nullptr;  ///< F · P, row by row
-  std::uint32_t resolution = 0;          ///< P
-
-  WFPG_HD std::uint32_t through(std::uint32_t bx, std::uint32_t y) const {
-    return words[y * resolution + bx];
-  }
-};
 
 /// A block as products see it: where they evaluate BSDFs, jittered anew for each sample and depth, so that a
 /// lobe between points is not missed forever; and the mean of all its directions.
@@ -51,36 +40,29 @@ struct product_points {
 class product_field {
  public:
   product_field() = default;
-  /// `weights`: inclusive sums of the P² products, at most 2³¹; they and the rest outlive this.
-  WFPG_HD product_field(const directional_field& field, const block_sums& blocks,
+  /// `weights`: inclusive sums of the P² products, row by row, at most 2³¹; they and the field outlive this.
+  WFPG_HD product_field(const directional_field& field, std::uint32_t resolution,
                         const std::uint32_t* weights)
-      : field_(field), blocks_(blocks), weights_(weights) {
-    side_ = field.grid().resolution() / blocks.resolution;
-  }
+      : field_(field),
+        weights_(weights),
+        resolution_(resolution),
+        side_(field.grid().resolution() / resolution) {}
 
   /// Nothing to draw from: the BSDF is black wherever the field shines.
   WFPG_HD bool empty() const { return weights_ == nullptr || total() == 0; }
 
   /// The GGX roughness of a lobe as wide as two blocks, which so many points do not miss.
-  WFPG_HD float resolved_alpha() const { return 2.0f / static_cast<float>(blocks_.resolution); }
+  WFPG_HD float resolved_alpha() const { return 2.0f / static_cast<float>(resolution_); }
 
   /// A unit direction from u in [0,1)², and pdf() of it. Precondition: not empty.
   WFPG_HD vec3 sample(vec2 u, float& density) const {
-    const std::uint32_t p = blocks_.resolution;
-    const auto drawn = detail::find_in_sums([this](std::uint32_t i) { return weights_[i]; }, p * p, 0, u.x);
-    const cell_in_block first{drawn.index % p * side_, drawn.index / p * side_, drawn.index};
-    const auto row = detail::find_in_sums(
-        [&](std::uint32_t i) { return blocks_.through(drawn.index % p, first.y + i); }, side_, 0, u.y);
-    const cell_in_block begin{first.x, first.y + row.index, drawn.index};
-    const auto column =
-        detail::find_in_sums([&](std::uint32_t i) { return field_.grid().row_sum(begin.x + i, begin.y); },
-                             side_, begin.x > 0 ? field_.grid().row_sum(begin.x - 1, begin.y) : 0u,
-                             detail::min(drawn.fraction, 1.0f - 0x1p-24f));
-    const cell_in_block cell{begin.x + column.index, begin.y, drawn.index};
-    density = cell_pdf(cell);
-    return field_.direction(vec2{static_cast<float>(cell.x) + detail::inside_cell(column.fraction),
-                                 static_cast<float>(cell.y) + detail::inside_cell(row.fraction)} /
-                            static_cast<float>(field_.grid().resolution()));
+    const auto drawn = detail::find_in_sums([this](std::uint32_t i) { return weights_[i]; },
+                                            resolution_ * resolution_, 0, u.x);
+    cell_block cell;
+    const vec2 uv =
+        field_.grid().sample(block(drawn.index), {detail::min(drawn.fraction, 1.0f - 0x1p-24f), u.y}, cell);
+    density = cell_pdf(cell, drawn.index);
+    return field_.direction(uv);
   }
 
   /// The density of a unit direction, per steradian; 0 outside a hemisphere. Precondition: not empty.
@@ -88,30 +70,28 @@ class product_field {
     vec2 uv;
     if (!field_.locate(d, uv)) return 0.0f;
     const std::uint32_t x = field_.grid().cell_along(uv.x), y = field_.grid().cell_along(uv.y);
-    return cell_pdf({x, y, y / side_ * blocks_.resolution + x / side_});
+    return cell_pdf({x, y, 1}, y / side_ * resolution_ + x / side_);
   }
 
  private:
-  struct cell_in_block {
-    std::uint32_t x, y, block;
-  };
+  WFPG_HD std::uint32_t total() const { return weights_[resolution_ * resolution_ - 1]; }
+  WFPG_HD cell_block block(std::uint32_t i) const {
+    return {i % resolution_ * side_, i / resolution_ * side_, side_};
+  }
 
-  WFPG_HD std::uint32_t total() const { return weights_[blocks_.resolution * blocks_.resolution - 1]; }
-
-  WFPG_HD float cell_pdf(const cell_in_block& cell) const {
-    const std::uint32_t product = weights_[cell.block] - (cell.block > 0 ? weights_[cell.block - 1] : 0u);
+  WFPG_HD float cell_pdf(const cell_block& cell, std::uint32_t i) const {
+    const std::uint32_t product = weights_[i] - (i > 0 ? weights_[i - 1] : 0u);
     if (product == 0) return 0.0f;
-    const std::uint32_t bx = cell.block % blocks_.resolution, by = cell.block / blocks_.resolution;
-    const std::uint32_t inside = field_.grid().weight(cell.x, cell.y);
-    const std::uint32_t whole = blocks_.through(bx, (by + 1) * side_ - 1);
-    return static_cast<float>(product) * static_cast<float>(inside) /
-           (static_cast<float>(total()) * static_cast<float>(whole) * field_.cell_solid_angle());
+    const auto inside = static_cast<float>(field_.grid().weight(cell));
+    const auto whole = static_cast<float>(field_.grid().weight(block(i)));
+    return static_cast<float>(product) * inside /
+           (static_cast<float>(total()) * whole * field_.cell_solid_angle());
   }
 
   directional_field field_;
-  block_sums blocks_;
   const std::uint32_t* weights_ = nullptr;
-  std::uint32_t side_ = 0;  // of a block, in cells
+  std::uint32_t resolution_ = 0;  // P
+  std::uint32_t side_ = 0;        // of a block, in cells
 };
 
 namespace detail {
@@ -122,28 +102,6 @@ inline void require_product_resolution(std::uint32_t p, const char* name, std::u
           "0, 4, 8 or 16");
   require(p == 0 || resolution % p == 0, name, resolution,
           ("a multiple of product_resolution, " + std::to_string(p)).c_str());
-}
-
-/// 4-byte words of a field of F² cells with its block sums; P = 0: without.
-WFPG_HD constexpr std::size_t field_words(std::uint32_t resolution, std::uint32_t product_resolution) {
-  return distribution_words(resolution) + std::size_t(resolution) * product_resolution;
-}
-
-/// Sums the blocks of a distribution, by a whole block of threads.
-template <class Block>
-WFPG_HD void sum_blocks(const Block& block, const grid_distribution& grid, std::uint32_t product_resolution,
-                        std::uint32_t* words) {
-  const auto p = static_cast<int>(product_resolution);
-  const std::uint32_t side = grid.resolution() / product_resolution;
-  block.for_each(p * p, [&](int i) {
-    const auto bx = static_cast<std::uint32_t>(i % p), by = static_cast<std::uint32_t>(i / p);
-    std::uint32_t sum = 0;
-    for (std::uint32_t y = by * side; y < (by + 1) * side; ++y) {
-      sum += grid.row_sum((bx + 1) * side - 1, y) - (bx > 0 ? grid.row_sum(bx * side - 1, y) : 0u);
-      words[y * product_resolution + bx] = sum;
-    }
-  });
-  block.sync();
 }
 
 /// Draws a wave's points: f(i) for i in [0, P²).
@@ -193,19 +151,20 @@ WFPG_HD float block_factor(const surface<Bsdf>& s, const directional_field& fiel
 /// Multiplies a field by a surface's BSDF, by one warp; `words` holds P². Weights are integers, scaled by the
 /// largest of them: alike on every width, and exact in every sum. Of a delta BSDF nothing is left.
 template <class Warp, class Bsdf>
-WFPG_HD product_field multiply(const Warp& warp, const directional_field& field, const block_sums& blocks,
-                               const product_points& points, const surface<Bsdf>& s, std::uint32_t* words) {
+WFPG_HD product_field multiply(const Warp& warp, const directional_field& field, const product_points& points,
+                               const surface<Bsdf>& s, std::uint32_t* words) {
   if (s.bsdf.is_delta()) return {};
-  const auto p = static_cast<int>(blocks.resolution);
-  const int shift = p == 16 ? 4 : p == 8 ? 3 : 2;  // of a power of two, which divides
-  const auto side = static_cast<int>(field.grid().resolution()) >> shift;
+  const auto p = static_cast<int>(points.resolution);
+  const std::uint32_t side = field.grid().resolution() / points.resolution;
   const product_point* const local = field.hemisphere() ? points.hemisphere : points.sphere;
   auto largest = warp.map([](int) { return 0.0f; });
   for (int first = 0; first < p * p; first += Warp::width) {
     const auto products = warp.evaluate([&](int lane) {
       const int i = first + lane;
       if (i >= p * p) return 0.0f;
-      const std::uint32_t sum = blocks.words[((i >> shift) * side + side - 1) * p + (i & (p - 1))];
+      const std::uint32_t x = static_cast<std::uint32_t>(i) % points.resolution;
+      const std::uint32_t y = static_cast<std::uint32_t>(i) / points.resolution;
+      const std::uint32_t sum = field.grid().weight({x * side, y * side, side});
       return sum > 0 ? static_cast<float>(sum) * block_factor(s, field, local[i]) : 0.0f;
     });
     warp.for_each_lane([&](int lane) {
@@ -221,7 +180,7 @@ WFPG_HD product_field multiply(const Warp& warp, const directional_field& field,
     return product > 0.0f ? max(static_cast<std::uint32_t>(product * scale), 1u) : 0u;
   });
   warp.sync();
-  return {field, blocks, words};
+  return {field, points.resolution, words};
 }
 
 }  // namespace detail

@@ -4,7 +4,7 @@
 // scratch while their bin's rays are served, or in memory that the caller gives; the work on cells does not
 // know which.
 //
-// Cost: F² cones and O(F²) a bin; 8 F² + 4 F bytes of scratch a block, and 4 F P for products.
+// Cost: F² cones and O(F²) a bin; 8 F² bytes of scratch a block.
 #pragma once
 
 #include <wfpg/bsdf.hpp>
@@ -71,7 +71,7 @@ struct field_cells {
   std::uint32_t resolution;
 
   WFPG_HD field_cells(const field_origin& from, std::uint32_t size) : origin(from), resolution(size) {
-    const grid_distribution grid(nullptr, nullptr, size);
+    const grid_distribution grid(nullptr, size);
     domain = from.hemisphere ? directional_field(grid, from.normal) : directional_field(grid);
   }
 
@@ -200,8 +200,8 @@ WFPG_HD vec3 off_surface(const surface<Bsdf>& s, const sparse_voxel_octree_view&
 /// The fields of a wave's bins: a functor of blocks that fills each bin's field and hands it to `sink`.
 ///   Surfaces  (std::uint32_t ray) -> surface<Bsdf>
 ///   Hits      (std::size_t bin, std::uint32_t cell, const ray&) -> ray_hit
-///   Sink      words(block&, bin) -> std::uint32_t*, room for field_words(resolution, product_resolution);
-///             finish(block&, bin, directional_field, block_sums), by the whole block
+///   Sink      words(block&, bin) -> std::uint32_t*, room for F²;
+///             finish(block&, bin, directional_field), by the whole block
 template <class Surfaces>
 struct bin_fields {
   bins_view bins;
@@ -210,8 +210,7 @@ struct bin_fields {
   field_options options;
   guiding_mode mode;
   std::uint32_t resolution;
-  std::uint32_t product_resolution;  // 0: no block sums
-  std::uint64_t seed;                // of the sample and depth
+  std::uint64_t seed;  // of the sample and depth
 
   /// The bin's origin: one of its rays, drawn anew in each sample.
   WFPG_HD field_origin origin(std::size_t bin) const {
@@ -242,11 +241,8 @@ struct bin_fields {
     block.sync();
     const bool hemisphere = cells.origin.hemisphere;
     const grid_distribution grid = finish_field(block, words, scratch, size, hemisphere, options);
-    std::uint32_t* const sums = words.words + distribution_words(resolution);
-    if (product_resolution > 0) sum_blocks(block, grid, product_resolution, sums);
     sink.finish(block, bin,
-                hemisphere ? directional_field(grid, cells.origin.normal) : directional_field(grid),
-                block_sums{sums, product_resolution});
+                hemisphere ? directional_field(grid, cells.origin.normal) : directional_field(grid));
   }
 };
 

@@ -62,20 +62,17 @@ class built_field {
  public:
   built_field(const Exec& exec, const std::vector<float>& values, std::uint32_t resolution,
               float floor = 0.0f)
-      : words_(exec, words_of(values, resolution)), resolution_(resolution) {
+      : words_(exec, words_of(values)), resolution_(resolution) {
     exec.for_each_block(1, 0, build_grid{words_.data(), resolution, floor});
   }
 
-  wfpg::grid_distribution grid() const {
-    return {words_.data(), words_.data() + std::size_t(resolution_) * resolution_, resolution_};
-  }
+  wfpg::grid_distribution grid() const { return {words_.data(), resolution_}; }
   std::vector<std::uint32_t> words(const Exec& exec) const { return words_.to_host(exec); }
 
  private:
-  static std::vector<std::uint32_t> words_of(const std::vector<float>& values, std::uint32_t resolution) {
+  static std::vector<std::uint32_t> words_of(const std::vector<float>& values) {
     std::vector<std::uint32_t> words;
     for (float value : values) words.push_back(wfpg::detail::float_bits(value));
-    words.resize(wfpg::detail::distribution_words(resolution), 0xdeadbeefu);
     return words;
   }
 

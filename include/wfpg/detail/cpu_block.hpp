@@ -56,13 +56,6 @@ class cpu_block {
     return all.reduce(partial, [](value a, value b) { return a + b; });
   }
 
-  /// data[i] becomes the sum of data[0] to data[i], for i in [0, n).
-  template <class T>
-  void inclusive_sum(T* data, int n) const {
-    T total(0);
-    for (int i = 0; i < n; ++i) data[i] = total = total + data[i];
-  }
-
  private:
   std::byte* scratch_;
   std::size_t bytes_;

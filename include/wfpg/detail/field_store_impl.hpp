@@ -57,13 +57,11 @@ struct count_served {
 }  // namespace detail
 
 template <class Exec>
-const kept_field_options& field_store<Exec>::checked(const kept_field_options& o, std::uint32_t nodes,
-                                                     std::uint32_t product_resolution) {
+const kept_field_options& field_store<Exec>::checked(const kept_field_options& o, std::uint32_t nodes) {
   using detail::require;
   require(o.resolution >= 2 && o.resolution <= 128, "kept.resolution", o.resolution, "in [2, 128]");
   require(o.recast >= 1, "kept.recast", o.recast, "at least 1");
   require(o.idle_samples >= 1, "kept.idle_samples", o.idle_samples, "at least 1");
-  detail::require_product_resolution(product_resolution, "kept.resolution", o.resolution);
   require(o.budget_bytes / bytes_a_slot(o.resolution) < (1u << 30), "kept.budget_bytes", o.budget_bytes,
           "less than 2^30 slots");
   require(nodes < (1u << 29), "number of octree nodes", nodes, "less than 2^29");
@@ -73,16 +71,14 @@ const kept_field_options& field_store<Exec>::checked(const kept_field_options& o
 template <class Exec>
 field_store<Exec>::field_store(const Exec& exec, const sparse_voxel_octree_view& tree,
                                const binning_options& binning, const kept_field_options& options,
-                               std::size_t max_rays, std::uint32_t product_resolution)
+                               std::size_t max_rays)
     : tree_(tree),
-      options_(checked(options, tree.node_count(), product_resolution)),
-      product_resolution_(product_resolution),
-      capacity_(tree.empty() ? 0
-                             : options.budget_bytes / bytes_a_slot(options.resolution, product_resolution)),
+      options_(checked(options, tree.node_count())),
+      capacity_(tree.empty() ? 0 : options.budget_bytes / bytes_a_slot(options.resolution)),
       marks_(exec, tree, binning),
       slots_(exec, std::vector<detail::field_slot>(capacity_)),
       fields_(exec, std::vector<resident_field>(capacity_)),
-      words_(exec, capacity_ * detail::field_words(options.resolution, product_resolution)),
+      words_(exec, capacity_ * options.resolution * options.resolution),
       hits_(exec, capacity_ * options.resolution * options.resolution),
       free_slots_(exec, capacity_),
       list_(exec, 2 * capacity_),
@@ -130,12 +126,11 @@ guide_view field_store<Exec>::prepare(const Exec& exec, const kept_field_wave<Su
   static_assert(is_ray_caster_v<Caster, Exec>,
                 "caster: needs ray_hit operator()(const ray&) const, or cast(exec, rays, hits) const");
   detail::require(wave.ray_count <= field_of_ray_.size(), "ray_count", wave.ray_count, "at most max_rays");
-  detail::require(wave.points.resolution == product_resolution_, "points.resolution", wave.points.resolution,
-                  "the store's product resolution");
+  detail::require_product_resolution(wave.points.resolution, "kept.resolution", options_.resolution);
   find(exec, wave);
   list(exec, wave.seed);
-  const detail::kept_fields_view kept{slots_.view(),       fields_.data(),      words_.data(),   hits_.data(),
-                                      options_.resolution, product_resolution_, options_.recast, sample_};
+  const detail::kept_fields_view kept{slots_.view(),       fields_.data(),  words_.data(), hits_.data(),
+                                      options_.resolution, options_.recast, sample_};
   build(exec, detail::kept_field_builder<kept_field_wave<Surfaces>>{wave, kept}, caster, caster_buffer_bytes);
   const array_view<const std::uint32_t> field_of_ray(field_of_ray_.data(), wave.ray_count);
   const std::size_t run = detail::count_served::run;
@@ -245,7 +240,7 @@ kept_field_statistics field_store<Exec>::statistics(const Exec& exec) const {
   kept_field_statistics result;
   result.capacity = static_cast<std::uint32_t>(capacity_);
   result.live = sample_ > 0 ? result.capacity - (state.free - state.taken) : 0;
-  result.bytes_a_slot = bytes_a_slot(options_.resolution, product_resolution_);
+  result.bytes_a_slot = bytes_a_slot(options_.resolution);
   result.born = state.born;
   result.freed = state.born - result.live;
   result.refreshed = state.refreshed;

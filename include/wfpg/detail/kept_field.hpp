@@ -30,7 +30,6 @@ struct kept_fields_view {
   std::uint32_t* words;
   cone_hit* hits;
   std::uint32_t resolution;
-  std::uint32_t product_resolution;  // 0: no block sums
   std::uint32_t recast;
   std::uint32_t sample;
 };
@@ -67,7 +66,7 @@ struct kept_field_builder {
   WFPG_HD void finish(Block& block, std::uint32_t slot, const field_cells& cells) const {
     const auto size = static_cast<int>(kept.resolution);
     const cone_hit* const hits = kept.hits + std::size_t(slot) * kept.resolution * kept.resolution;
-    const cell_words words{kept.words + slot * field_words(kept.resolution, kept.product_resolution)};
+    const cell_words words{kept.words + std::size_t(slot) * kept.resolution * kept.resolution};
     float* const scratch = block.template scratch<float>(std::size_t(size) * std::size_t(size));
     block.for_each(size * size, [&](int cell) {
       const float radiance = hits[cell].radiance(wave.cache);
@@ -75,9 +74,7 @@ struct kept_field_builder {
     });
     block.sync();
     const bool hemisphere = cells.origin.hemisphere;
-    const grid_distribution grid = finish_field(block, words, scratch, size, hemisphere, wave.options);
-    if (kept.product_resolution > 0)
-      sum_blocks(block, grid, kept.product_resolution, words.words + distribution_words(kept.resolution));
+    finish_field(block, words, scratch, size, hemisphere, wave.options);
     block.for_each(1, [&](int) {
       kept.fields[slot] = {cells.origin.normal, wave.fraction, hemisphere};
       field_slot& state = kept.slots[slot];

@@ -55,7 +55,9 @@ const guider_options& path_guider<Exec>::checked(const guider_options& o) {
   require(o.max_depth >= 1 && o.max_depth <= 1024, "max_depth", o.max_depth, "in [1, 1024]");
   require(o.max_paths < 0xffffffffull, "max_paths", o.max_paths, "less than 2^32 - 1");
   require(o.max_rays < 0xffffffffull, "max_rays", o.max_rays, "less than 2^32 - 1");
-  if (o.fields == field_lifetime::transient)
+  if (o.fields == field_lifetime::kept)
+    detail::require_product_resolution(o.product_resolution, "kept.resolution", o.kept.resolution);
+  else
     for (std::uint32_t depth = 0; depth < 8; ++depth)  // 128 cells are halved no more than 7 times
       detail::require_product_resolution(o.product_resolution, "field_resolution at a depth",
                                          resolution_at(o, depth));
@@ -88,8 +90,7 @@ path_guider<Exec>::path_guider(const Exec& exec, voxel_fragments<Exec> fragments
       counts_(exec_, options_.max_depth) {
   const binning_options binning{options_.min_bin_level, options_.rays_per_bin};
   if (keeps_fields())
-    store_ = field_store<Exec>(exec_, octree_.view(), binning, options_.kept, options_.max_rays,
-                               options_.product_resolution);
+    store_ = field_store<Exec>(exec_, octree_.view(), binning, options_.kept, options_.max_rays);
   else
     binner_ = spatial_binner<Exec>(exec_, octree_.view(), binning, options_.max_rays);
   octree_.release_build_data();
@@ -147,14 +148,7 @@ detail::bin_fields<Surfaces> path_guider<Exec>::bin_wave(const wave<Surfaces, Ra
       binner_.bin(exec_, w.ray_count, detail::wave_rays<Surfaces>{w.surfaces, options_.mode});
   const std::uint32_t size = field_resolution(w.depth);
   exec_.for_each(1, detail::add_counts{bins, binner_.unbinned(), size * size, depth_counts(w.depth)});
-  return {bins,
-          w.surfaces,
-          cache_.view(),
-          options_.field,
-          options_.mode,
-          size,
-          options_.product_resolution,
-          wave_seed(w.depth)};
+  return {bins, w.surfaces, cache_.view(), options_.field, options_.mode, size, wave_seed(w.depth)};
 }
 
 template <class Exec>
@@ -245,17 +239,16 @@ guide_view path_guider<Exec>::make_resident(const wave<Surfaces, Random>& w, con
   const auto fields = bin_wave(w);
   const auto timed = clock_.time(detail::stage::fields);
   const std::size_t bins = read_element(exec_, fields.bins.count);
-  const std::size_t words = bins * detail::field_words(fields.resolution, fields.product_resolution);
+  const std::size_t words = bins * fields.resolution * fields.resolution;
   // Half more than is needed: the next waves have a few bins more or less, and are not to allocate.
   if (resident_fields_.size() < bins) reallocate(resident_fields_, bins + bins / 2);
   if (resident_words_.size() < words) reallocate(resident_words_, words + words / 2);
   if (field_of_ray_.size() < options_.max_rays) reallocate(field_of_ray_, options_.max_rays);
   ::thrust::fill_n(exec_.thrust(), field_of_ray_.data(), w.ray_count, guide_view::no_field);
-  detail::for_each_field(
-      exec_, fields, caster,
-      detail::resident_sink{fields.bins, resident_words_.data(), resident_fields_.data(),
-                            field_of_ray_.data(), fraction(), fields.resolution, fields.product_resolution},
-      0, options_.caster_buffer_bytes);
+  detail::for_each_field(exec_, fields, caster,
+                         detail::resident_sink{fields.bins, resident_words_.data(), resident_fields_.data(),
+                                               field_of_ray_.data(), fraction(), fields.resolution},
+                         0, options_.caster_buffer_bytes);
   return {{field_of_ray_.data(), w.ray_count},
           {resident_fields_.data(), resident_words_.data(), fields.resolution, points_of(w)}};
 }

@@ -124,16 +124,15 @@ struct transient_sink {
   product_scratch products;
 
   std::size_t scratch_bytes() const {
-    return sizeof(std::uint32_t) * field_words(resolution, points.resolution) + 16 + products.bytes();
+    return sizeof(std::uint32_t) * resolution * resolution + 16 + products.bytes();
   }
 
   template <class Block>
   WFPG_HD std::uint32_t* words(Block& block, std::size_t) const {
-    return block.template scratch<std::uint32_t>(field_words(resolution, points.resolution));
+    return block.template scratch<std::uint32_t>(std::size_t(resolution) * resolution);
   }
   template <class Block>
-  WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field,
-                      const block_sums& blocks) const {
+  WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field) const {
     const float share = fraction(bins.size(bin));
     const std::uint32_t* const rays = bins.permutation.data() + bins.begin(bin);
     const auto count = static_cast<int>(bins.size(bin));
@@ -145,7 +144,7 @@ struct transient_sink {
     }
     products.for_each_warp(block, count, [&](const auto& warp, std::uint32_t* own, int i) {
       serve(rays[i], [&](const auto& s) -> product_mixture {
-        return {multiply(warp, field, blocks, points, s, own), share};
+        return {multiply(warp, field, points, s, own), share};
       });
     });
   }
@@ -159,15 +158,13 @@ struct resident_sink {
   std::uint32_t* field_of_ray;
   mixture_fraction fraction;
   std::uint32_t resolution;
-  std::uint32_t product_resolution;
 
   template <class Block>
   WFPG_HD std::uint32_t* words(Block&, std::size_t bin) const {
-    return storage + bin * field_words(resolution, product_resolution);
+    return storage + bin * resolution * resolution;
   }
   template <class Block>
-  WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field,
-                      const block_sums&) const {
+  WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field) const {
     const std::uint32_t begin = bins.begin(bin);
     block.for_each(static_cast<int>(bins.size(bin)), [&](int i) {
       if (i == 0) fields[bin] = {field.normal(), fraction(bins.size(bin)), field.hemisphere()};
