@@ -157,7 +157,7 @@ WFPG_TEST_CASE("lanes: map, ballot and find_first", "[exec]") {
   }
 }
 
-WFPG_TEST_CASE("lanes: shuffle, inclusive_sum and reduce", "[exec]") {
+WFPG_TEST_CASE("lanes: shuffle and reduce", "[exec]") {
   constexpr int width = Exec::warp_width;
   const warp_of<Exec> warp;
   random_numbers random(2);
@@ -165,17 +165,30 @@ WFPG_TEST_CASE("lanes: shuffle, inclusive_sum and reduce", "[exec]") {
     const auto value = warp.map([&](int) { return static_cast<std::int64_t>(random.below(1000)) - 500; });
     const auto source = warp.map([&](int) { return static_cast<int>(random.below(width)); });
     const auto shuffled = warp.shuffle(value, source);
-    const auto sums = warp.inclusive_sum(value);
     std::int64_t sum = 0, largest = -1000;
     for (int lane = 0; lane < width; ++lane) {
       sum += value[lane];
       largest = std::max(largest, value[lane]);
       REQUIRE(shuffled[lane] == value[source[lane]]);
       REQUIRE(warp.shuffle(value, lane) == value[lane]);
-      REQUIRE(sums[lane] == sum);
     }
     REQUIRE(warp.reduce(value, [](std::int64_t a, std::int64_t b) { return a + b; }) == sum);
     REQUIRE(warp.reduce(value, [](std::int64_t a, std::int64_t b) { return std::max(a, b); }) == largest);
+  }
+}
+
+WFPG_TEST_CASE("a warp visits and scans any number of elements", "[exec]") {
+  const warp_of<Exec> warp;
+  for (const int n : {0, 1, 7, 8, 9, 31, 32, 33, 100}) {
+    words visits(static_cast<std::size_t>(n) + 1, 0), sums(visits.size(), 3);
+    warp.for_each(n, [&](int i) { ++visits[static_cast<std::size_t>(i)]; });
+    warp.inclusive_scan(n, sums.data(), [&](int i) { return sums[static_cast<std::size_t>(i)]; });
+    for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) {
+      REQUIRE(visits[i] == 1);
+      REQUIRE(sums[i] == 3 * (i + 1));
+    }
+    CHECK(visits.back() == 0);
+    CHECK(sums.back() == 3);
   }
 }
 

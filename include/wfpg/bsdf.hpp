@@ -27,13 +27,19 @@ template <class Bsdf>
 struct surface {
   vec3 position{0.0f};          ///< world space
   vec3 geometric_normal{0.0f};  ///< unit length, either side
-  vec3 normal{0.0f};            ///< shading normal, unit length, either side; decides a bin's orientation
+  vec3 normal{0.0f};            ///< shading normal, unit length, on the same side; decides a bin's orientation
   vec3 outgoing{0.0f};          ///< toward the previous vertex, unit length
   Bsdf bsdf{};
   bool active = true;  ///< false: this ray of the capacity is not in use, nothing else is read
 };
 
 namespace detail {
+
+/// A surface's shading normal on the outgoing side.
+template <class Bsdf>
+WFPG_HD vec3 facing_normal(const surface<Bsdf>& s) {
+  return glm::dot(s.normal, s.outgoing) >= 0.0f ? s.normal : -s.normal;
+}
 
 template <class B, class = void>
 struct is_bsdf : std::false_type {};

@@ -196,21 +196,6 @@ struct cell_words {
   WFPG_HD void set(int i, float value) const { words[i] = float_bits(value); }
 };
 
-/// sums[i] becomes the sum of value(0) to value(i), for i in [0, n), by one warp. value(i) may read sums[i].
-template <class Warp, class Value>
-WFPG_HD void scan_by_warp(const Warp& warp, int n, std::uint32_t* sums, const Value& value) {
-  std::uint32_t before = 0;
-  for (int first = 0; first < n; first += Warp::width) {
-    const auto values =
-        warp.map([&](int lane) -> std::uint32_t { return first + lane < n ? value(first + lane) : 0u; });
-    const auto through = warp.inclusive_sum(values);
-    warp.for_each_lane([&](int lane) {
-      if (first + lane < n) sums[first + lane] = before + through[lane];
-    });
-    before += warp.shuffle(through, Warp::width - 1);
-  }
-}
-
 /// Turns F² non-negative finite cell values, each plus `floor`, into a distribution in place. All values zero
 /// (their sum below 1e-25): uniform. The values' sum is below 3e38.
 template <class Block>
@@ -228,7 +213,7 @@ WFPG_HD grid_distribution build_distribution(const Block& block, const cell_word
   block.sync();
   block.for_each_warp(resolution, [&](const auto& warp, int y) {
     std::uint32_t* const row = cells.words + y * resolution;
-    scan_by_warp(warp, resolution, row, [&](int x) { return row[x]; });
+    warp.inclusive_scan(resolution, row, [&](int x) { return row[x]; });
   });
   block.sync();
   block.for_each(resolution, [&](int x) {

@@ -5,8 +5,8 @@
 // is drawn from a block and then from the cells inside it. The density is that of what was evaluated,
 // exactly: probability of the block times that of the cell inside it, over the cell's solid angle.
 //
-// Memory: 4 P² bytes a ray in flight, and nothing a field. Cost: P² evaluations of the BSDF a ray; a
-// direction takes O(log P + log F), a density O(1).
+// Memory: 4 P² bytes a ray in flight, and nothing a field. Cost: P² evaluations of the BSDF a ray, and one
+// more where that is black; a direction takes O(log P + log F), a density O(1).
 #pragma once
 
 #include <wfpg/bsdf.hpp>
@@ -26,7 +26,9 @@ inline constexpr std::uint32_t max_product_resolution = 16;
 /// lobe between points is not missed forever; and the mean of all its directions.
 struct product_point {
   vec3 direction;  ///< unit length
-  vec3 mean;       ///< shorter than 1, by more where the block is wider
+  vec3 opposite;   ///< as far from the block's centre, where the BSDF is black at `direction`
+  vec3 mean;       ///< of the block, shorter than 1
+  float radius;    ///< about the mean, of a disk that spreads as much as the block
 };
 
 /// A wave's P² points over the hemisphere about +z and over the sphere, row by row.
@@ -114,38 +116,54 @@ struct draw_product_points {
   WFPG_HD void operator()(std::size_t i) const {
     constexpr int n = 8;  // of the midpoint rule, along a side
     const vec2 corner(static_cast<float>(i % resolution), static_cast<float>(i / resolution));
-    const vec2 uv = (corner + unit_vec2(hash(seed, i))) / static_cast<float>(resolution);
-    hemisphere[i] = {square_to_hemisphere(uv), vec3(0.0f)};
-    sphere[i] = {square_to_sphere(uv), vec3(0.0f)};
+    const vec2 jitter = unit_vec2(hash(seed, i));
+    const vec2 uv = (corner + jitter) / static_cast<float>(resolution);
+    const vec2 opposite = (corner + 1.0f - jitter) / static_cast<float>(resolution);
+    hemisphere[i] = {square_to_hemisphere(uv), square_to_hemisphere(opposite), vec3(0.0f), 0.0f};
+    sphere[i] = {square_to_sphere(uv), square_to_sphere(opposite), vec3(0.0f), 0.0f};
     for (int k = 0; k < n * n; ++k) {
       const vec2 inside(static_cast<float>(k % n) + 0.5f, static_cast<float>(k / n) + 0.5f);
       const vec2 at = (corner + inside / static_cast<float>(n)) / static_cast<float>(resolution);
       hemisphere[i].mean += square_to_hemisphere(at) / static_cast<float>(n * n);
       sphere[i].mean += square_to_sphere(at) / static_cast<float>(n * n);
     }
+    hemisphere[i].radius = radius(hemisphere[i].mean);
+    sphere[i].radius = radius(sphere[i].mean);
   }
+
+ private:
+  /// 1 - |mean|² is the variance of the block's directions, half of it along any line through the block; an
+  /// even spread over [-r, r] has r²/3.
+  WFPG_HD static float radius(vec3 mean) { return sqrtf(1.5f * max(1.0f - glm::dot(mean, mean), 0.0f)); }
 };
 
-/// The mean over a block of the cosine at a normal, where that is positive: exact for blocks above the
-/// horizon but for 6%, and right at the horizon, where half a block counts.
-WFPG_HD inline float mean_cosine(vec3 mean, vec3 normal) {
-  const float cosine = glm::dot(mean, normal);
-  const float spread = max(1.0f - glm::dot(mean, mean), 0.0f);  // variance of the block's directions
-  return 0.5f * (cosine + sqrtf(cosine * cosine + 0.375f * spread));
+/// The mean over a block of the cosine at a normal where that is positive, if the block's cosines are spread
+/// evenly over `radius` about their mean: exact above the horizon, 0 below it.
+WFPG_HD inline float mean_cosine(float cosine, float radius) {
+  const float above = clamp(cosine + radius, 0.0f, 2.0f * radius);
+  return above * above / (4.0f * radius) + max(cosine - radius, 0.0f);
 }
 
-/// What a BSDF does to a block of a field. Its value at the block's point is that of the block but for the
-/// cosine, which varies most there and is replaced by its mean; and taken out where the field carries it.
+/// What a BSDF does to a block of a field; `up` is the shading normal on the outgoing side. Its value at the
+/// block's point is that of the block but for the cosine, which varies most there and is replaced by its
+/// mean; and taken out where the field carries it. A block across the horizon counts though its point is
+/// below.
 template <class Bsdf>
-WFPG_HD float block_factor(const surface<Bsdf>& s, const directional_field& field,
-                           const product_point& local) {
-  const vec3 direction = field.to_world(local.direction);
-  const float value = s.bsdf.eval(s.outgoing, direction);
+WFPG_HD inline float block_factor(const surface<Bsdf>& s, vec3 up, const directional_field& field,
+                                  const product_point& local) {
+  const float cosine = glm::dot(field.to_world(local.mean), up);
+  if (cosine <= -local.radius && !s.bsdf.transmits()) return 0.0f;
+  vec3 direction = field.to_world(local.direction);
+  float value = s.bsdf.eval(s.outgoing, direction);
+  if (value == 0.0f) {
+    direction = field.to_world(local.opposite);
+    value = s.bsdf.eval(s.outgoing, direction);
+  }
   if (!(value > 0.0f) || !is_finite(value)) return 0.0f;
-  const float cosine = glm::dot(direction, s.normal);
-  const float mean = mean_cosine(field.to_world(local.mean), cosine >= 0.0f ? s.normal : -s.normal);
+  const float there = glm::dot(direction, up);
+  const float mean = mean_cosine(there >= 0.0f ? cosine : -cosine, local.radius);
   const float carried = field.hemisphere() ? local.mean.z : 1.0f;
-  return min(value, 1.0e25f) * mean / (max(fabsf(cosine), 1.0e-3f) * carried);
+  return min(value, 1.0e25f) * mean / (max(fabsf(there), 1.0e-3f) * carried);
 }
 
 /// Multiplies a field by a surface's BSDF, by one warp; `words` holds P². Weights are integers, scaled by the
@@ -154,33 +172,29 @@ template <class Warp, class Bsdf>
 WFPG_HD product_field multiply(const Warp& warp, const directional_field& field, const product_points& points,
                                const surface<Bsdf>& s, std::uint32_t* words) {
   if (s.bsdf.is_delta()) return {};
-  const auto p = static_cast<int>(points.resolution);
-  const std::uint32_t side = field.grid().resolution() / points.resolution;
+  const std::uint32_t p = points.resolution, side = field.grid().resolution() / p;
+  const auto n = static_cast<int>(p * p);
   const product_point* const local = field.hemisphere() ? points.hemisphere : points.sphere;
+  const vec3 up = facing_normal(s);
+  warp.for_each(n, [&](int i) {
+    const std::uint32_t x = static_cast<std::uint32_t>(i) % p, y = static_cast<std::uint32_t>(i) / p;
+    const std::uint32_t sum = field.grid().weight({x * side, y * side, side});
+    words[i] = float_bits(sum > 0 ? static_cast<float>(sum) * block_factor(s, up, field, local[i]) : 0.0f);
+  });
+  warp.sync();
   auto largest = warp.map([](int) { return 0.0f; });
-  for (int first = 0; first < p * p; first += Warp::width) {
-    const auto products = warp.evaluate([&](int lane) {
-      const int i = first + lane;
-      if (i >= p * p) return 0.0f;
-      const std::uint32_t x = static_cast<std::uint32_t>(i) % points.resolution;
-      const std::uint32_t y = static_cast<std::uint32_t>(i) / points.resolution;
-      const std::uint32_t sum = field.grid().weight({x * side, y * side, side});
-      return sum > 0 ? static_cast<float>(sum) * block_factor(s, field, local[i]) : 0.0f;
-    });
-    warp.for_each_lane([&](int lane) {
-      if (first + lane < p * p) words[first + lane] = float_bits(products[lane]);
-    });
-    largest = warp.map([&](int lane) { return max(largest[lane], products[lane]); });
-  }
+  for (int first = 0; first < n; first += Warp::width)  // P² is a power of two: lanes beyond it read again
+    largest =
+        warp.map([&](int lane) { return max(largest[lane], bits_float(words[(first + lane) & (n - 1)])); });
   const float brightest = warp.reduce(largest, [](float a, float b) { return max(a, b); });
   if (!(brightest > 1.0e-25f)) return {};
-  const float scale = 0x1p31f / static_cast<float>(p * p) / brightest;
-  scan_by_warp(warp, p * p, words, [&](int i) {
+  const float scale = 0x1p31f / static_cast<float>(n) / brightest;
+  warp.inclusive_scan(n, words, [&](int i) {
     const float product = bits_float(words[i]);
     return product > 0.0f ? max(static_cast<std::uint32_t>(product * scale), 1u) : 0u;
   });
   warp.sync();
-  return {field, points.resolution, words};
+  return {field, p, words};
 }
 
 }  // namespace detail

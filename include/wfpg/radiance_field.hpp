@@ -182,12 +182,6 @@ WFPG_HD grid_distribution finish_field(const Block& block, const cell_words& cel
   return build_distribution(block, cells, resolution, floor);
 }
 
-/// A surface's shading normal on the outgoing side.
-template <class Bsdf>
-WFPG_HD vec3 facing_normal(const surface<Bsdf>& s) {
-  return glm::dot(s.normal, s.outgoing) >= 0.0f ? s.normal : -s.normal;
-}
-
 /// Where cones from a surface start: off it, on the outgoing side.
 template <class Bsdf>
 WFPG_HD vec3 off_surface(const surface<Bsdf>& s, const sparse_voxel_octree_view& tree) {

@@ -39,20 +39,25 @@ class emulated_warp {
     return result;
   }
 
-  /// The same of an f that calls the host's code, which nobody asked to vectorise.
-  template <class F>
-  WFPG_HD auto evaluate(F f) const {
-    using value = std::decay_t<decltype(f(0))>;
-    lanes<value, W> result;
-    for (int lane = 0; lane < W; ++lane) result[lane] = f(lane);
-    return result;
-  }
-
   /// f(lane) for each lane, for what it does.
   template <class F>
   WFPG_HD void for_each_lane(F f) const {
     WFPG_VECTORIZE
     for (int lane = 0; lane < W; ++lane) f(lane);
+  }
+
+  /// f(i) for i in [0, n), lane i mod W each. f may call the host's code, which nobody asked to vectorise.
+  template <class F>
+  WFPG_HD void for_each(int n, F f) const {
+    for (int i = 0; i < n; ++i) f(i);
+  }
+
+  /// sums[i] becomes the sum of f(0) to f(i), for i in [0, n); f(i) may read sums[i]. One by one: lanes
+  /// shifted against each other are read from memory before their stores have got there.
+  template <class T, class F>
+  WFPG_HD void inclusive_scan(int n, T* sums, F f) const {
+    T sum(0);
+    for (int i = 0; i < n; ++i) sums[i] = sum += f(i);
   }
 
   /// Which warp of its block this is.
@@ -79,18 +84,6 @@ class emulated_warp {
   WFPG_HD lanes<T, W> shuffle(const lanes<T, W>& value, const lanes<int, W>& source) const {
     lanes<T, W> result;
     for (int lane = 0; lane < W; ++lane) result[lane] = value[source[lane]];
-    return result;
-  }
-
-  /// Lane l receives the sum of lanes 0 to l.
-  template <class T>
-  WFPG_HD lanes<T, W> inclusive_sum(const lanes<T, W>& value) const {
-    lanes<T, W> result = value;
-    for (int distance = 1; distance < W; distance *= 2) {
-      const lanes<T, W> before = result;
-      WFPG_VECTORIZE
-      for (int lane = distance; lane < W; ++lane) result[lane] = before[lane] + before[lane - distance];
-    }
     return result;
   }
 
