@@ -172,6 +172,10 @@ TEST_CASE("glTF: what materials become", "[renderer][gltf]") {
       "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_ior": {"ior": 1.7}}})");
   CHECK(glass.kind == material_kind::dielectric);
   CHECK(glass.ior == Approx(1.7f));
+  const auto frosted = read(R"({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.5},
+      "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}})");
+  CHECK(frosted.kind == material_kind::rough_dielectric);
+  CHECK(frosted.alpha == Approx(0.25f));
   const auto lamp = read(R"({"emissiveFactor": [1, 0.5, 0],
                              "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 300}}})");
   check_close(lamp.emission, {300.0f, 150.0f, 0.0f}, 1e-3f);

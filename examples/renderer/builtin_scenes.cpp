@@ -254,6 +254,30 @@ scene thin_wall() {
   return b.finish(6);
 }
 
+scene glossy_room() {
+  scene_builder b("glossy-room");
+  const auto white = b.diffuse(vec3(0.75f));
+  const auto metal = [&](vec3 colour, float alpha) {
+    material m;
+    m.kind = material_kind::conductor;
+    m.base_color = colour;
+    m.alpha = alpha;
+    return b.add(m);
+  };
+  const auto steel = metal(vec3(0.75f), 0.3f), copper = metal({0.9f, 0.6f, 0.45f}, 0.3f);
+  const auto light = b.lamp(vec3(150.0f));
+  b.room({{-2.0f, 0.0f, -2.0f}, {2.0f, 3.0f, 2.0f}}, {copper, steel, steel, white, steel, steel});
+  // A trough of metal hides the lamp from below: all light comes by way of the ceiling.
+  b.parallelogram({-1.5f, 2.2f, -1.9f}, {0.5f, 0.0f, 0.0f}, {0.0f, 0.0f, 3.0f}, {-up, white});
+  b.parallelogram({-1.5f, 2.2f, -1.9f}, {0.0f, 0.25f, 0.0f}, {0.0f, 0.0f, 3.0f},
+                  {{-1.0f, 0.0f, 0.0f}, white});
+  b.parallelogram({-1.0f, 2.2f, -1.9f}, {0.0f, 0.25f, 0.0f}, {0.0f, 0.0f, 3.0f}, {{1.0f, 0.0f, 0.0f}, white});
+  b.parallelogram({-1.35f, 2.25f, -1.0f}, {0.2f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.2f}, {up, light});
+  b.box({{0.7f, 0.4f, -0.6f}, {0.8f, 0.8f, 0.8f}, 0.4f}, copper);
+  b.look({0.9f, 1.5f, 1.85f}, {-0.1f, 1.2f, -1.0f}, 1.1f);
+  return b.finish(8);
+}
+
 scene furnace() {
   scene_builder b("furnace");
   material wall;
@@ -268,11 +292,9 @@ scene furnace() {
 using maker = scene (*)();
 
 const std::vector<std::pair<std::string, maker>>& makers() {
-  static const std::vector<std::pair<std::string, maker>> all = {{"cornell-box", cornell_box},
-                                                                 {"cornell-enclosed", cornell_enclosed},
-                                                                 {"ajar", ajar},
-                                                                 {"thin-wall", thin_wall},
-                                                                 {"furnace", furnace}};
+  static const std::vector<std::pair<std::string, maker>> all = {
+      {"cornell-box", cornell_box}, {"cornell-enclosed", cornell_enclosed}, {"ajar", ajar},
+      {"thin-wall", thin_wall},     {"glossy-room", glossy_room},           {"furnace", furnace}};
   return all;
 }
 

@@ -117,7 +117,7 @@ struct scene_view {
     bsdf& f = result.surface.bsdf;
     f.kind = scatters.kind;
     // A dielectric has to know inside from outside; the others reflect on either side.
-    const float outward = scatters.kind == material_kind::dielectric ? side : 1.0f;
+    const float outward = f.transmits() ? side : 1.0f;
     f.normal = outward * facing;
     f.geometric_normal = outward * side * at.geometric_normal;
     f.colour = scatters.base_color;

@@ -108,8 +108,9 @@ class material_reader {
     if (source.pbrMetallicRoughness.metallicFactor >= 0.5) {
       result.kind = roughness == 0.0 ? material_kind::mirror : material_kind::conductor;
     } else if (extension_number(source, "KHR_materials_transmission", "transmissionFactor", 0.0) > 0.5) {
-      result.kind = material_kind::dielectric;
-      if (roughness > 0.0) warn("rough transmission is not supported: the surface is taken as smooth");
+      // Without a change of index facets refract nothing.
+      const bool rough = roughness > 0.0 && result.ior > 1.01f;
+      result.kind = rough ? material_kind::rough_dielectric : material_kind::dielectric;
     } else if (specular <= 0.0 || roughness >= 1.0) {
       result.kind = material_kind::lambert;
     } else {

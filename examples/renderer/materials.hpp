@@ -11,7 +11,7 @@
 
 namespace render {
 
-/// How one point scatters. Reflecting kinds do so on the side that both normals face; a dielectric's normals
+/// How one point scatters. Reflecting kinds do so on the side that both normals face; dielectrics' normals
 /// face outward. Directions that the two normals put on different sides carry nothing: no light leaks through
 /// a surface because its shading normal leans.
 struct bsdf {
@@ -23,10 +23,13 @@ struct bsdf {
   material_kind kind = material_kind::lambert;
 
   WFPG_HD bool is_delta() const { return kind == material_kind::mirror || kind == material_kind::dielectric; }
-  WFPG_HD bool transmits() const { return kind == material_kind::dielectric; }
+  WFPG_HD bool transmits() const {
+    return kind == material_kind::dielectric || kind == material_kind::rough_dielectric;
+  }
 
   /// f |cos| per channel, per steradian; 0 for delta lobes.
   WFPG_HD vec3 eval_rgb(vec3 outgoing, vec3 incident) const {
+    if (kind == material_kind::rough_dielectric) return eval_rough(outgoing, incident);
     if (is_delta() || !reflects(outgoing, incident)) return vec3(0.0f);
     const frame local(normal);
     const vec3 wo = local.to_local(outgoing);
@@ -43,9 +46,9 @@ struct bsdf {
     return reflects(outgoing, incident) ? wfpg::luminance(colour) * glm::dot(incident, normal) / pi : 0.0f;
   }
 
-  /// The coat of the plastic and the conductor, and how often sample() draws from it.
+  /// The plastic's coat, or all of what has facets alone; and how often sample() draws from it.
   WFPG_HD wfpg::glossy_part glossy(vec3 outgoing) const {
-    if (kind == material_kind::conductor) return {1.0f, alpha};
+    if (kind == material_kind::conductor || kind == material_kind::rough_dielectric) return {1.0f, alpha};
     if (kind == material_kind::plastic) return {coat_probability(glm::dot(outgoing, normal)), alpha};
     return {};
   }
@@ -58,6 +61,7 @@ struct bsdf {
   }
   /// The same of one part.
   WFPG_HD float pdf_part(bool coat, vec3 outgoing, vec3 incident) const {
+    if (kind == material_kind::rough_dielectric) return coat ? pdf_rough(outgoing, incident) : 0.0f;
     if (is_delta() || is_black() || !reflects(outgoing, incident)) return 0.0f;
     if (!coat) return glm::dot(incident, normal) / pi;
     const frame local(normal);
@@ -81,6 +85,8 @@ struct bsdf {
   }
   /// The same from one part, with its density.
   WFPG_HD wfpg::bsdf_sample sample_part(bool coat, vec3 outgoing, vec2 u) const {
+    if (kind == material_kind::rough_dielectric)
+      return coat ? sample_rough(outgoing, u) : wfpg::bsdf_sample{};
     const frame local(normal);
     const vec3 wo = local.to_local(outgoing);
     if (is_delta() || is_black() || wo.z <= 0.0f) return {};
@@ -104,7 +110,10 @@ struct bsdf {
   WFPG_HD float reflectance(vec3 outgoing, vec3 incident) const {
     if (is_delta()) return wfpg::luminance(colour);
     const float density = pdf(outgoing, incident);
-    return density > 0.0f ? eval(outgoing, incident) / density : 0.0f;
+    if (!(density > 0.0f)) return 0.0f;
+    const float above = glm::dot(outgoing, normal);
+    const float eta = above * glm::dot(incident, normal) < 0.0f ? relative_ior(above) : 1.0f;
+    return eta * eta * eval(outgoing, incident) / density;
   }
 
  private:
@@ -132,6 +141,76 @@ struct bsdf {
     return glm::min(0.9f, glm::max(0.1f, coat / (coat + (1.0f - coat) * base)));
   }
 
+  /// Two directions and the facet between them, where there is one, on a rough boundary: turned so that
+  /// `outgoing` is above it.
+  struct facet {
+    vec3 outgoing{0.0f}, incident{0.0f}, h{0.0f};
+    float eta = 1.0f;
+    bool exists = false;
+
+    WFPG_HD bool mirrors() const { return incident.z > 0.0f; }
+  };
+
+  WFPG_HD facet facet_between(vec3 outgoing, vec3 incident) const {
+    facet f;
+    const frame local(normal);
+    const float above = glm::dot(outgoing, normal), side = above < 0.0f ? -1.0f : 1.0f;
+    f.outgoing = side * local.to_local(outgoing);
+    f.incident = side * local.to_local(incident);
+    f.eta = relative_ior(above);
+    const vec3 sum = f.outgoing + (f.mirrors() ? 1.0f : f.eta) * f.incident;
+    f.h = glm::normalize(sum.z < 0.0f ? -sum : sum);
+    const bool sides_agree = above * glm::dot(outgoing, geometric_normal) > 0.0f &&
+                             glm::dot(incident, normal) * glm::dot(incident, geometric_normal) > 0.0f;
+    f.exists =
+        sides_agree && glm::dot(f.outgoing, f.h) > 0.0f && (f.mirrors() || glm::dot(f.incident, f.h) < 0.0f);
+    return f;
+  }
+
+  WFPG_HD vec3 eval_rough(vec3 outgoing, vec3 incident) const {
+    const facet f = facet_between(outgoing, incident);
+    if (!f.exists) return vec3(0.0f);
+    const float cosine = glm::dot(f.outgoing, f.h);
+    if (f.mirrors())
+      return vec3(fresnel_dielectric(cosine, f.eta) * ggx{alpha}.eval(f.outgoing, f.incident, f.h));
+    const float reflected = fresnel_dielectric(cosine, -glm::dot(f.incident, f.h), f.eta);
+    return colour * ((1.0f - reflected) * ggx{alpha}.eval_through(f.outgoing, f.incident, f.h, f.eta));
+  }
+
+  // As the boundary would if it were smooth: two numbers do not suffice to ask the facet that was drawn.
+  WFPG_HD static float mirror_probability(float cosine, float eta) {
+    return glm::clamp(fresnel_dielectric(cosine, eta), 0.1f, 0.9f);
+  }
+
+  WFPG_HD float pdf_rough(vec3 outgoing, vec3 incident) const {
+    const facet f = facet_between(outgoing, incident);
+    if (!f.exists) return 0.0f;
+    const float mirrored = mirror_probability(f.outgoing.z, f.eta);
+    if (f.mirrors()) return mirrored * ggx{alpha}.pdf(f.outgoing, f.h);
+    return (1.0f - mirrored) * ggx{alpha}.pdf_through(f.outgoing, f.incident, f.h, f.eta);
+  }
+
+  WFPG_HD wfpg::bsdf_sample sample_rough(vec3 outgoing, vec2 u) const {
+    const frame local(normal);
+    const float above = glm::dot(outgoing, normal), side = above < 0.0f ? -1.0f : 1.0f;
+    const vec3 wo = side * local.to_local(outgoing);
+    if (wo.z <= 0.0f) return {};
+    const float eta = relative_ior(above), mirrors = mirror_probability(wo.z, eta);
+    const bool reflect = u.x < mirrors;
+    u.x = reflect ? u.x / mirrors : (u.x - mirrors) / (1.0f - mirrors);
+    const vec3 h = ggx{alpha}.sample(wo, {glm::min(0x1.fffffep-1f, u.x), u.y});
+    const vec3 wi = reflect ? mirrored(wo, h) : refracted(wo, h, eta);
+    if (wi.z == 0.0f || (wi.z > 0.0f) != reflect) return {};
+    const vec3 incident = glm::normalize(local.to_world(side * wi));
+    return {incident, pdf_rough(outgoing, incident)};
+  }
+
+  /// 0 where all is reflected.
+  WFPG_HD static vec3 refracted(vec3 w, vec3 about, float eta) {
+    const float cosine = glm::dot(w, about), square = 1.0f - (1.0f - cosine * cosine) / (eta * eta);
+    return square > 0.0f ? (cosine / eta - std::sqrt(square)) * about - w / eta : vec3(0.0f);
+  }
+
   WFPG_HD wfpg::bsdf_sample sample_dielectric(vec3 outgoing, float u) const {
     const float above = glm::dot(outgoing, normal);
     const vec3 facing = above < 0.0f ? -normal : normal;
@@ -139,9 +218,8 @@ struct bsdf {
     const float eta = relative_ior(above);
     const float reflected = fresnel_dielectric(cosine, eta);
     const bool reflect = u < reflected;
-    const float beyond = std::sqrt(glm::max(0.0f, 1.0f - (1.0f - cosine * cosine) / (eta * eta)));
-    const vec3 incident = glm::normalize(reflect ? mirrored(outgoing, facing)
-                                                 : (cosine / eta - beyond) * facing - outgoing / eta);
+    const vec3 incident =
+        glm::normalize(reflect ? mirrored(outgoing, facing) : refracted(outgoing, facing, eta));
     const bool same_side = glm::dot(outgoing, geometric_normal) * glm::dot(incident, geometric_normal) > 0.0f;
     if (same_side != reflect) return {};
     return {incident, reflect ? reflected : 1.0f - reflected};

@@ -1,5 +1,6 @@
 // Fresnel reflectances, and the GGX distribution of microfacets (Walter et al. 2007) with visible normals
-// (Heitz 2018). Directions are in the frame of the surface, z along its normal.
+// (Heitz 2018). Directions are in the frame of the surface, z along its normal; `eta` is the index beyond the
+// surface over that on the outgoing side.
 #pragma once
 
 #include "frame.hpp"
@@ -7,14 +8,17 @@
 namespace render {
 
 /// Unpolarised reflectance of a smooth boundary; `eta` is the index beyond over the index on the incident
-/// side, `cosine` >= 0 is the incident one. 1 for total reflection.
-WFPG_HD inline float fresnel_dielectric(float cosine, float eta) {
-  const float sine2 = glm::max(0.0f, 1.0f - cosine * cosine) / (eta * eta);
-  if (sine2 >= 1.0f) return 1.0f;
-  const float transmitted = std::sqrt(1.0f - sine2);
+/// side, both cosines are positive.
+WFPG_HD inline float fresnel_dielectric(float cosine, float transmitted, float eta) {
   const float parallel = (eta * cosine - transmitted) / (eta * cosine + transmitted);
   const float perpendicular = (cosine - eta * transmitted) / (cosine + eta * transmitted);
   return 0.5f * (parallel * parallel + perpendicular * perpendicular);
+}
+
+/// The same from the incident cosine, at least 0. 1 for total reflection.
+WFPG_HD inline float fresnel_dielectric(float cosine, float eta) {
+  const float sine2 = glm::max(0.0f, 1.0f - cosine * cosine) / (eta * eta);
+  return sine2 < 1.0f ? fresnel_dielectric(cosine, std::sqrt(1.0f - sine2), eta) : 1.0f;
 }
 
 /// Schlick's approximation from the reflectance at normal incidence, per channel.
@@ -46,6 +50,22 @@ struct ggx {
   /// Density of the reflected direction when h is drawn by sample().
   WFPG_HD float pdf(vec3 outgoing, vec3 h) const {
     return distribution(h) / (2.0f * (outgoing.z + slope_term(outgoing.z)));
+  }
+
+  /// Of light refracted by facets of normal `h`, `outgoing` above the surface and `incident` below: the
+  /// BTDF's value times |cos(incident)|, but Fresnel's term (Walter et al. 2007, Eq. 21, of radiance).
+  WFPG_HD float eval_through(vec3 outgoing, vec3 incident, vec3 h, float eta) const {
+    const float below = -incident.z, out = glm::dot(outgoing, h), in = glm::dot(incident, h);
+    const float terms = outgoing.z * slope_term(below) + below * slope_term(outgoing.z);
+    const float q = out + eta * in;
+    return 2.0f * distribution(h) * below * out * std::abs(in) / (terms * q * q);
+  }
+
+  /// Density of the refracted direction when h is drawn by sample().
+  WFPG_HD float pdf_through(vec3 outgoing, vec3 incident, vec3 h, float eta) const {
+    const float out = glm::dot(outgoing, h), in = glm::dot(incident, h);
+    const float q = (out + eta * in) / eta;
+    return 4.0f * pdf(outgoing, h) * out * std::abs(in) / (q * q);
   }
 
   /// A facet's normal seen from `outgoing`, above the surface.

@@ -22,11 +22,12 @@ struct texture {
 };
 
 enum class material_kind : std::uint32_t {
-  lambert,     ///< diffuse reflection
-  plastic,     ///< diffuse below a GGX dielectric coat
-  conductor,   ///< GGX with Schlick's Fresnel from base_color
-  mirror,      ///< perfect reflection times base_color
-  dielectric,  ///< smooth, reflects and refracts
+  lambert,           ///< diffuse reflection
+  plastic,           ///< diffuse below a GGX dielectric coat
+  conductor,         ///< GGX with Schlick's Fresnel from base_color
+  mirror,            ///< perfect reflection times base_color
+  dielectric,        ///< smooth, reflects and refracts, what it refracts times base_color
+  rough_dielectric,  ///< the same of GGX facets
 };
 
 /// How a surface scatters and emits.
@@ -35,7 +36,7 @@ struct material {
   vec3 base_color{0.8f};           ///< reflectance, per channel in [0, 1]
   std::int32_t base_texture = -1;  ///< multiplies base_color; index into scene::textures, -1: none
   float alpha = 0.1f;              ///< GGX roughness (not perceptual), (0, 1]
-  float ior = 1.5f;                ///< inside over outside, for plastic and dielectric
+  float ior = 1.5f;                ///< inside over outside, for plastic and dielectrics; not 1 of a rough one
   vec3 emission{0.0f};             ///< emitted radiance, W/(m² sr), on the counter-clockwise side
 };
 
