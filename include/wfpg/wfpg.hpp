@@ -1,5 +1,5 @@
-// Everything of the library that needs no optional dependency. Policies beside the serial one are included by
-// name.
+// Everything of the library that needs no optional dependency. Policies beside the serial one, and
+// testing.hpp for a host's own tests, are included by name.
 #pragma once
 
 #include <wfpg/bsdf.hpp>

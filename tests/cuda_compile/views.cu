@@ -1,5 +1,6 @@
 // Compiled, never run: each view of the library goes to a kernel by value and is called there, so that
 // whatever a device will run is annotated for it.
+#include <wfpg/testing.hpp>
 #include <wfpg/wfpg.hpp>
 
 namespace cuda_compile {
@@ -120,4 +121,13 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(d::match_sides{});
   launch(d::fill_top{});
   launch(d::adapt_pressure{state});
+
+  // Checks for hosts.
+  launch(d::probe_bsdf<cuda_compile::grey>{});
+  launch(d::draw_bsdf<cuda_compile::grey>{});
+  launch(d::tabulate_bsdf<cuda_compile::grey>{});
+  launch(d::pair_bsdf<cuda_compile::grey>{});
+  launch(d::probe_surfaces<surfaces>{});
+  launch(d::cast_inline<wfpg::svo_ray_caster>{wfpg::svo_ray_caster(tree), {}, {}});
+  launch(d::find_hit_leaves{});
 }

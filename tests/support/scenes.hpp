@@ -138,16 +138,18 @@ struct box_caster {
 
   wfpg::ray_hit operator()(const wfpg::ray& r) const {
     float nearest = r.t_max;
-    bool leaves = false;
+    bool hits = false, leaves = false;
     for (int axis = 0; axis < 3; ++axis) {
       if (r.direction[axis] == 0.0f) continue;
       const float face = r.direction[axis] > 0.0f ? 1.0f : 0.0f;
       const float t = std::fmax((face - r.origin[axis]) / r.direction[axis], 0.0f);
       if (t >= nearest) continue;
       nearest = t;
+      hits = true;
       leaves = open_top && axis == 1 && face == 1.0f;
     }
-    return leaves ? wfpg::ray_hit{-1.0f, 5.0f} : wfpg::ray_hit{nearest, 0.0f};
+    if (leaves) return {-1.0f, 5.0f};
+    return {hits ? nearest : -1.0f, 0.0f};
   }
 };
 
