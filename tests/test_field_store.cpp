@@ -1,12 +1,12 @@
 // Kept fields: what a cell remembers and which are cast again; distributions against their own densities and
 // against brute force; the same bits on any number of threads and from casters of both forms. Who gets a slot
 // and when it is built is test_field_store_slots.cpp's.
-#include "support/chi_square.hpp"
 #include "support/fields.hpp"
 #include "support/kept_fields.hpp"
 #include "support/lit_box.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
+#include "support/statistics.hpp"
 
 #include <wfpg/field_store.hpp>
 
@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -112,21 +113,14 @@ namespace {
 /// Draws directions of a field.
 struct draw_field {
   directional_field field;
-  wfpg::array_view<vec3> directions;
+  wfpg::array_view<drawn_direction> drawn;
   void operator()(std::size_t i) const {
-    directions[i] = field.sample(hashed_numbers{99}(static_cast<std::uint32_t>(i), 0));
+    drawn[i].direction = field.sample(hashed_numbers{99}(static_cast<std::uint32_t>(i), 0), drawn[i].pdf);
   }
 };
 
-double sum_of(const std::vector<double>& values) {
-  double sum = 0.0;
-  for (double value : values) sum += value;
-  return sum;
-}
-
 WFPG_TEST_CASE("field store: directions have the density that fields report, which sums to one",
                "[field_store]") {
-  const sphere_bins bins{12, 24};
   constexpr std::size_t samples = 20000;
   chi_square_family family;
   int below = 0;
@@ -140,17 +134,18 @@ WFPG_TEST_CASE("field store: directions have the density that fields report, whi
       REQUIRE(view.guides(ray));
       const directional_field field = view.mixture(ray).field;
       CHECK(field.hemisphere() == (mode == guiding_mode::oriented && ray % 5 != 0));
-      const auto density = [&](vec3 d) { return field.pdf(d); };
-      CHECK(sum_of(bins.expected(density, 1.0, 12)) == Approx(1.0).epsilon(5e-3));
-      const wfpg::buffer<vec3, Exec> drawn(box.exec(), samples);
+      const wfpg::buffer<drawn_direction, Exec> drawn(box.exec(), samples);
       box.exec().for_each(samples, draw_field{field, drawn.view()});
-      std::vector<double> observed(bins.size(), 0.0);
-      for (vec3 d : drawn.to_host(box.exec())) {
-        observed[bins.of(d)] += 1.0;
-        below += field.hemisphere() && glm::dot(d, wave[ray].normal) < -1e-6f;
-      }
-      family.add(chi_square_test(observed, bins.expected(density, samples, 12)),
-                 "ray " + std::to_string(ray));
+      const std::vector<drawn_direction> directions = drawn.to_host(box.exec());
+      for (const drawn_direction& d : directions)
+        below += field.hemisphere() && glm::dot(d.direction, wave[ray].normal) < -1e-6f;
+      sampler_check_options options;
+      options.moments = ray == 0;
+      const auto report = check_sampler(
+          directions, [&](vec3 d) { return field.pdf(d); }, options);
+      INFO("ray " << ray << ": " << report.message);
+      CHECK(report);
+      family.add(report.frequencies, "ray " + std::to_string(ray));
     }
   }
   CHECK(below == 0);
@@ -193,7 +188,7 @@ double largest_error(const directional_field& field, std::vector<double> seen) {
   const std::uint32_t n = field.grid().resolution();
   if (field.hemisphere())
     for (std::size_t i = 0; i < seen.size(); ++i) seen[i] *= central_cosine(i, n);
-  const double sum = sum_of(seen);
+  const double sum = std::accumulate(seen.begin(), seen.end(), 0.0);
   double largest = 0.0;
   for (std::uint32_t i = 0; i < n * n; ++i) {
     const double p = double(field.grid().weight(i % n, i / n)) / double(field.grid().total());

@@ -1,9 +1,9 @@
 // Multiple importance sampling: the heuristics, and the mixture of a field and a BSDF, whose density has to
 // be how often it draws a direction.
-#include "support/chi_square.hpp"
 #include "support/fields.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
+#include "support/statistics.hpp"
 
 #include <wfpg/mis.hpp>
 
@@ -68,7 +68,6 @@ namespace {
 
 WFPG_TEST_CASE("MIS: the mixture's density is its sampling frequency", "[mis]") {
   const Exec exec;
-  const sphere_bins bins{10, 20};
   const std::size_t samples = 20000;
   const built_field<Exec> built(exec, field_values(field_kind::noise, 16, 3), 16, 0.05f);
   chi_square_family family;
@@ -79,11 +78,15 @@ WFPG_TEST_CASE("MIS: the mixture's density is its sampling frequency", "[mis]") 
         const test_surface surface = make_surface({}, up, toward_eye, kind);
         const guide_mixture mixture{field, fraction};
         const auto drawn = draw(exec, mixture, surface, samples, 5 + family.size());
-        std::vector<double> observed(bins.size(), 0.0);
-        for (const sampled_direction& d : drawn) observed[bins.of(d.direction)] += 1.0;
-        const auto expected =
-            bins.expected([&](vec3 d) { return mixture.pdf(surface, d); }, double(samples), 10);
-        family.add(chi_square_test(observed, expected), "fraction " + std::to_string(fraction));
+        std::vector<drawn_direction> directions;
+        for (const sampled_direction& d : drawn) directions.push_back({d.direction, d.pdf});
+        sampler_check_options options;
+        options.moments = fraction == 0.3f;
+        const auto report = check_sampler(
+            directions, [&](vec3 d) { return mixture.pdf(surface, d); }, options);
+        INFO("fraction " << fraction << ": " << report.message);
+        CHECK(report);
+        family.add(report.frequencies, "fraction " + std::to_string(fraction));
 
         const double guided = double(count(drawn, sampling_technique::guide)) / double(samples);
         const double sigma = std::sqrt(fraction * (1.0 - fraction) / double(samples));

@@ -80,41 +80,4 @@ class built_field {
   std::uint32_t resolution_;
 };
 
-/// Equal-area bins of the sphere in (cos theta, phi), for tests that must not share the map's own cells.
-struct sphere_bins {
-  std::uint32_t rows, columns;
-
-  std::size_t size() const { return std::size_t(rows) * columns; }
-  std::size_t of(wfpg::vec3 d) const {
-    const double turn = std::atan2(double(d.y), double(d.x)) / (2.0 * 3.14159265358979) + 0.5;
-    return index(0.5 * (double(d.z) + 1.0), turn);
-  }
-  /// The direction at the middle of fine cell i of n² in a bin.
-  wfpg::vec3 inside(std::size_t bin, std::uint32_t i, std::uint32_t n) const {
-    const double v = (double(bin / columns) + (i / n + 0.5) / n) / rows;
-    const double turn = (double(bin % columns) + (i % n + 0.5) / n) / columns;
-    const double z = 2.0 * v - 1.0, r = std::sqrt(1.0 - z * z);
-    const double phi = (turn - 0.5) * 2.0 * 3.14159265358979;
-    return {float(r * std::cos(phi)), float(r * std::sin(phi)), float(z)};
-  }
-  /// What `samples` samples of a density, per steradian, put into each bin: the midpoint rule with n² points.
-  template <class Density>
-  std::vector<double> expected(const Density& density, double samples, std::uint32_t n) const {
-    const double area = 4.0 * 3.14159265358979 / double(size());
-    std::vector<double> result(size(), 0.0);
-    for (std::size_t bin = 0; bin < size(); ++bin) {
-      for (std::uint32_t i = 0; i < n * n; ++i) result[bin] += double(density(inside(bin, i, n)));
-      result[bin] *= samples * area / (double(n) * n);
-    }
-    return result;
-  }
-
- private:
-  std::size_t index(double v, double turn) const {
-    const auto row = std::min(std::uint32_t(v * rows), rows - 1);
-    const auto column = std::min(std::uint32_t(turn * columns), columns - 1);
-    return std::size_t(row) * columns + column;
-  }
-};
-
 }  // namespace wfpg_test

@@ -1,0 +1,199 @@
+// What every sampler of directions has to pass: its frequencies, its energy, its moments, and that it reports
+// the density that it answers when asked. Made of <wfpg/testing.hpp>'s own parts, for densities on the host.
+#pragma once
+
+#include "support/chi_square.hpp"
+
+#include <wfpg/types.hpp>
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace wfpg_test {
+
+/// A direction, and the density per steradian that the sampler says it drew it with.
+struct drawn_direction {
+  wfpg::vec3 direction{0.0f};
+  float pdf = 0.0f;
+};
+
+/// What was found; `frequencies` is for a chi_square_family that judges many samplers together.
+struct sampler_report : wfpg::testing::check_report {
+  chi_square_result frequencies;
+};
+
+struct sampler_check_options {
+  double total = 1.0;            ///< what the density integrates to: the share of samples that succeed
+  double tolerance = 1.0e-3;     ///< of that integral, beside the quadrature's own error
+  float query = 1.0e-5f;         ///< relative, between a reported density and the one asked for
+  double significance = 1.0e-3;  ///< the probability that a correct sampler is rejected, about
+  bool moments = true;           ///< six more quadratures, each as long as all else
+};
+
+/// Checks one sampler; the first that fails is in words.
+///   query        a direction has unit length, and a positive density that is pdf() of it
+///   energy       pdf() integrates to `total`
+///   frequencies  chi² of directions over adaptive bins of the sphere, pooled where fewer than 5 are expected
+///   moments      the means of x, y, z and of their squares are those of the density
+/// An eighth of the directions guide the bins, the rest are counted.
+template <class Density>
+class sampler_check {
+ public:
+  sampler_check(const std::vector<drawn_direction>& drawn, const Density& pdf,
+                const sampler_check_options& options)
+      : drawn_(drawn), pdf_(pdf), options_(options) {
+    const std::size_t hints = drawn.size() / 8;
+    for (std::size_t i = 0; i < drawn.size(); ++i)
+      (i < hints ? hints_ : counted_).push_back(drawn[i].direction);
+  }
+
+  sampler_report run() const {
+    sampler_report report;
+    report.message = query();
+    if (!report) return report;
+    const bins_type bins = integrate([](wfpg::vec3) { return 1.0f; });
+    report.message = energy(bins);
+    if (!report) return report;
+    report.frequencies = wfpg::detail::test_directions(bins, counted_);
+    report.message = frequencies(bins, report.frequencies);
+    if (report && options_.moments) report.message = moments(bins);
+    return report;
+  }
+
+ private:
+  using bins_type = wfpg::detail::sphere_bins;
+  static constexpr double tests = 7.0;  // frequencies and moments share the significance
+
+  /// Of pdf() times `factor`, at least 0.
+  template <class Factor>
+  bins_type integrate(const Factor& factor) const {
+    const auto values = [&](const std::vector<wfpg::vec3>& directions) {
+      std::vector<float> result;
+      for (const wfpg::vec3 d : directions) result.push_back(pdf_(d) * factor(d));
+      return result;
+    };
+    return {wfpg::detail::frame(wfpg::vec3(0.0f, 0.0f, 1.0f)), values, double(counted_.size()), hints_};
+  }
+
+  std::string query() const {
+    for (std::size_t i = 0; i < drawn_.size(); ++i) {
+      const drawn_direction& d = drawn_[i];
+      const wfpg::detail::in_words toward{d.direction};
+      if (!(std::fabs(glm::length(d.direction) - 1.0f) < 1.0e-4f))
+        return wfpg::detail::sentence("query: sample ", i, ", ", toward, ", has not unit length");
+      const float asked = pdf_(d.direction);
+      if (!(d.pdf > 0.0f && std::fabs(asked - d.pdf) <= options_.query * d.pdf))
+        return wfpg::detail::sentence("query: sample ", i, " toward ", toward, " was drawn with density ",
+                                      d.pdf, ", pdf() says ", asked);
+    }
+    return {};
+  }
+
+  std::string energy(const bins_type& bins) const {
+    const double allowed = options_.tolerance * options_.total + bins.integral_error();
+    if (std::fabs(bins.integral() - options_.total) <= allowed) return {};
+    return wfpg::detail::sentence("energy: pdf() integrates to ", bins.integral(),
+                                  " over the sphere, expected ", options_.total, " within ", allowed);
+  }
+
+  std::string frequencies(const bins_type& bins, const chi_square_result& result) const {
+    if (result.p >= options_.significance / tests) return {};
+    const chi_square_bin& worst = result.worst;
+    return wfpg::detail::sentence("frequencies: too ", worst.observed > worst.expected ? "many" : "few",
+                                  " directions in ", bins.describe(worst), ": observed ", worst.observed,
+                                  ", expected ", worst.expected, "; chi^2 = ", result.statistic, " with ",
+                                  result.degrees, " degrees, p = ", result.p);
+  }
+
+  std::string moments(const bins_type& bins) const {
+    for (int k = 0; k < 6; ++k) {
+      const bool square = k >= 3;
+      // Of a quantity in [0, 1], which a quadrature takes.
+      const auto quantity = [&](wfpg::vec3 d) {
+        const float c = d[k % 3];
+        return square ? c * c : 0.5f * (1.0f + c);
+      };
+      const bins_type weighted = integrate(quantity);
+      wfpg::detail::sample_mean mean;
+      for (const wfpg::vec3 d : counted_) mean.add(double(quantity(d)));
+      const double expected = weighted.integral() / bins.integral();
+      const double allowance = 5.0e-4 * expected + weighted.integral_error() + bins.integral_error();
+      const double p = wfpg::detail::two_sided_tail(mean.mean() - expected, allowance, mean.error());
+      if (p >= options_.significance / tests) continue;
+      const char* const names[] = {"(1 + x) / 2", "(1 + y) / 2", "(1 + z) / 2", "x^2", "y^2", "z^2"};
+      return wfpg::detail::sentence("moments: the mean of ", names[k], " over the samples is ", mean.mean(),
+                                    " +- ", mean.error(), ", of the density ", expected, ", p = ", p);
+    }
+    return {};
+  }
+
+  const std::vector<drawn_direction>& drawn_;
+  const Density& pdf_;
+  sampler_check_options options_;
+  std::vector<wfpg::vec3> hints_, counted_;
+};
+
+/// The same in one call. `pdf`: (vec3) -> float, on the host.
+template <class Density>
+sampler_report check_sampler(const std::vector<drawn_direction>& drawn, const Density& pdf,
+                             const sampler_check_options& options = {}) {
+  return sampler_check<Density>(drawn, pdf, options).run();
+}
+
+/// Means of a picture's tiles over independent renderings of one method, each with its own variance.
+class tile_means {
+ public:
+  explicit tile_means(std::size_t tiles) : sums_(tiles), squares_(tiles) {}
+
+  /// The tiles of one rendering.
+  void add(const std::vector<double>& tiles) {
+    ++renderings_;
+    for (std::size_t i = 0; i < sums_.size(); ++i) {
+      sums_[i] += tiles[i];
+      squares_[i] += tiles[i] * tiles[i];
+    }
+  }
+
+  std::size_t size() const { return sums_.size(); }
+  double mean(std::size_t tile) const { return sums_[tile] / renderings_; }
+  double variance_of_mean(std::size_t tile) const {
+    return (squares_[tile] / renderings_ - mean(tile) * mean(tile)) / (renderings_ - 1.0);
+  }
+
+ private:
+  double renderings_ = 0.0;
+  std::vector<double> sums_, squares_;
+};
+
+/// Checks that two renderers have one mean, by tiles that each know their variance. With some 20 renderings
+/// or more of each, Student's t exceeds 6 in no tile of correct ones and 4 in 0.02% of them. A bias too small
+/// for one tile shows in all of them together: the mean of t² is 1 within four standard errors.
+inline wfpg::testing::check_report check_unbiased(const tile_means& truth, const tile_means& tested) {
+  double sum_of_squares = 0.0, count = 0.0, beyond = 0.0;
+  for (std::size_t tile = 0; tile < truth.size(); ++tile) {
+    const double variance = truth.variance_of_mean(tile) + tested.variance_of_mean(tile);
+    const double difference = tested.mean(tile) - truth.mean(tile);
+    const bool constant = variance <= 1.0e-12 * truth.mean(tile) * truth.mean(tile);
+    const double t = constant ? 0.0 : difference / std::sqrt(variance);
+    if (std::fabs(t) >= 6.0 || (constant && std::fabs(difference) > 1.0e-5 * truth.mean(tile)))
+      return {wfpg::detail::sentence("tile ", tile, ": observed ", tested.mean(tile), ", expected ",
+                                     truth.mean(tile), ", ", t, " standard errors apart")};
+    if (constant) continue;
+    sum_of_squares += t * t;
+    beyond += std::fabs(t) >= 4.0 ? 1.0 : 0.0;
+    count += 1.0;
+  }
+  if (beyond > 0.001 * count)
+    return {
+        wfpg::detail::sentence(beyond, " of ", count, " tiles are 4 standard errors apart, expected 0.02%")};
+  if (count > 0.0 && sum_of_squares / count >= 1.0 + 4.0 * std::sqrt(2.0 / count))
+    return {
+        wfpg::detail::sentence("tiles together: the mean of their squared differences in standard errors is ",
+                               sum_of_squares / count, ", expected 1 within ", 4.0 * std::sqrt(2.0 / count))};
+  return {};
+}
+
+}  // namespace wfpg_test

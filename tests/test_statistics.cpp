@@ -1,0 +1,176 @@
+// The statistics kit: correct samplers pass, each of several broken ones is caught and named.
+#include "support/catch.hpp"
+#include "support/fields.hpp"
+#include "support/scenes.hpp"
+#include "support/statistics.hpp"
+
+#include <wfpg/exec/seq.hpp>
+
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+using namespace wfpg_test;
+using wfpg::directional_field;
+
+namespace {
+
+constexpr std::size_t samples = 200000;
+constexpr std::uint32_t cells = 16;
+
+/// A field's sampler in the open, so that each of its steps can be broken.
+class open_sampler {
+ public:
+  open_sampler()
+      : built_(exec_, field_values(field_kind::noise, cells, 5), cells, 0.2f), field_(built_.grid()) {}
+
+  const directional_field& field() const { return field_; }
+  float pdf(vec3 d) const { return field_.pdf(d); }
+
+  /// Directions of `where(uv)` for points uv of the field's square, with the densities that `pdf` gives them.
+  std::vector<drawn_direction> draw(const std::function<vec2(vec2)>& where,
+                                    const std::function<float(vec3)>& pdf, std::size_t n = samples) const {
+    std::vector<drawn_direction> drawn;
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const vec3 d = field_.direction(where(field_.grid().sample(hashed_numbers{3}(i, 0))));
+      drawn.push_back({d, pdf(d)});
+    }
+    return drawn;
+  }
+
+ private:
+  wfpg::exec::seq exec_;
+  built_field<wfpg::exec::seq> built_;
+  directional_field field_;
+};
+
+vec2 as_it_is(vec2 uv) {
+  return uv;
+}
+
+void check_caught(const sampler_report& report, const std::vector<std::string>& words) {
+  INFO(report.message);
+  CHECK(!report);
+  for (const std::string& word : words) {
+    INFO(word);
+    CHECK(report.message.find(word) != std::string::npos);
+  }
+}
+
+/// Tiles of a renderer whose noise is normal, by sums of twelve uniform numbers.
+tile_means rendered(double mean, std::uint64_t seed) {
+  random_numbers random(seed);
+  tile_means result(256);
+  for (int rendering = 0; rendering < 24; ++rendering) {
+    std::vector<double> tiles;
+    for (std::size_t tile = 0; tile < result.size(); ++tile) {
+      double normal = -6.0;
+      for (int i = 0; i < 12; ++i) normal += double(random.unit());
+      tiles.push_back(mean + 0.1 * normal);
+    }
+    result.add(tiles);
+  }
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("statistics: a correct sampler passes", "[statistics]") {
+  const open_sampler sampler;
+  const auto pdf = [&](vec3 d) { return sampler.pdf(d); };
+  const sampler_report report = check_sampler(sampler.draw(as_it_is, pdf), pdf);
+  INFO(report.message);
+  CHECK(report);
+  CHECK(report.frequencies.degrees > 100.0);
+}
+
+TEST_CASE("statistics: correct samplers are rejected as rarely as they are to be", "[statistics]") {
+  int rejected = 0;
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    std::vector<drawn_direction> drawn;
+    random_numbers random(seed);
+    for (int i = 0; i < 4000; ++i) drawn.push_back({random.direction(), 0.25f / wfpg::detail::pi});
+    sampler_check_options options;
+    options.significance = 0.05;
+    rejected += !check_sampler(
+        drawn, [](vec3) { return 0.25f / wfpg::detail::pi; }, options);
+  }
+  CHECK(rejected <= 12);  // 5 expected, 0.1% of 13 or more
+}
+
+TEST_CASE("statistics: a density wrong by 2% is caught", "[statistics]") {
+  const open_sampler sampler;
+  const auto larger = [&](vec3 d) { return 1.02f * sampler.pdf(d); };
+  check_caught(check_sampler(sampler.draw(as_it_is, larger), larger), {"energy", "integrates to 1.02"});
+
+  // Of the right sum: 2% too much above, 2% too little below.
+  double above = 0.0;
+  for (std::uint32_t i = 0; i < cells * cells; ++i) {
+    const vec2 uv = (vec2(float(i % cells), float(i / cells)) + 0.5f) / float(cells);
+    const auto cell = double(sampler.field().grid().weight(i % cells, i / cells));
+    if (sampler.field().direction(uv).z > 0.0f) above += cell / double(sampler.field().grid().total());
+  }
+  const auto tilted = [&](vec3 d) {
+    const double factor = d.z > 0.0f ? 1.02 : (1.0 - 1.02 * above) / (1.0 - above);
+    return float(factor) * sampler.pdf(d);
+  };
+  check_caught(check_sampler(sampler.draw(as_it_is, tilted, 5 * samples), tilted),
+               {"frequencies", "observed", "expected", "p = "});
+}
+
+TEST_CASE("statistics: a cell shifted by one is caught", "[statistics]") {
+  const open_sampler sampler;
+  const auto shifted = [](vec2 uv) { return vec2(glm::fract(uv.x + 1.0f / float(cells)), uv.y); };
+  const auto pdf = [&](vec3 d) { return sampler.pdf(d); };
+  check_caught(check_sampler(sampler.draw(shifted, pdf), pdf),
+               {"frequencies", "observed", "expected", "z in [", "phi in [", "p = "});
+
+  // And where the density reported is that of the cell that was drawn.
+  std::vector<drawn_direction> drawn = sampler.draw(as_it_is, pdf);
+  const std::vector<drawn_direction> moved = sampler.draw(shifted, pdf);
+  for (std::size_t i = 0; i < drawn.size(); ++i) drawn[i].direction = moved[i].direction;
+  check_caught(check_sampler(drawn, pdf), {"query", "was drawn with density", "pdf() says"});
+}
+
+TEST_CASE("statistics: a missing Jacobian is caught", "[statistics]") {
+  const open_sampler sampler;
+  const auto of_the_square = [&](vec3 d) { return 4.0f * wfpg::detail::pi * sampler.pdf(d); };
+  check_caught(check_sampler(sampler.draw(as_it_is, of_the_square), of_the_square), {"energy", "12.57"});
+
+  // Even in theta and phi, where the density is said to be even over the sphere: its sum is right.
+  std::vector<drawn_direction> drawn;
+  const auto even = [](vec3) { return 0.25f / wfpg::detail::pi; };
+  for (std::uint32_t i = 0; i < samples; ++i) {
+    const vec2 u = hashed_numbers{9}(i, 0);
+    const float theta = wfpg::detail::pi * u.x, phi = 2.0f * wfpg::detail::pi * u.y;
+    drawn.push_back(
+        {{std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)}, even({})});
+  }
+  check_caught(check_sampler(drawn, even), {"frequencies", "observed", "expected"});
+}
+
+TEST_CASE("statistics: a row that is never reached is caught", "[statistics]") {
+  const open_sampler sampler;
+  const auto without_row = [](vec2 uv) {
+    const bool missed = std::uint32_t(uv.y * float(cells)) == 7;
+    return missed ? uv + vec2(0.0f, 1.0f / float(cells)) : uv;
+  };
+  const auto pdf = [&](vec3 d) { return sampler.pdf(d); };
+  check_caught(check_sampler(sampler.draw(without_row, pdf), pdf), {"frequencies", "observed", "expected"});
+}
+
+TEST_CASE("statistics: tiles of two renderers", "[statistics]") {
+  const tile_means truth = rendered(1.0, 1);
+  INFO(check_unbiased(truth, rendered(1.0, 2)).message);
+  CHECK(check_unbiased(truth, rendered(1.0, 2)));
+  const auto far = check_unbiased(truth, rendered(1.2, 3));
+  CHECK(!far);
+  INFO(far.message);
+  CHECK(far.message.find("standard errors apart") != std::string::npos);
+  // Too little for a single tile, whose mean has a standard error of 2%.
+  const auto near = check_unbiased(truth, rendered(1.02, 4));
+  CHECK(!near);
+  INFO(near.message);
+  CHECK(near.message.find("tiles together") != std::string::npos);
+}
