@@ -95,6 +95,11 @@ struct scalar_product {
   static drawn_direction of_ray(const workload& w, const ray& r) {
     std::uint32_t weights[block_count];
     drawn_direction result;
+    if (wfpg::detail::has_product(w.field, r.hit, wfpg::detail::facing_normal(r.hit))) {
+      result.direction = w.field.sample(r.u, result.density);
+      result.other_density = w.field.pdf(r.other);
+      return result;
+    }
     if (!multiply(w, r.hit, weights)) return result;
     result.direction = sample(w, weights, r.u, result.density);
     vec2 uv;
@@ -118,7 +123,7 @@ struct scalar_product {
     const std::uint32_t p = w.points.resolution;
     const bool hemisphere = w.field.hemisphere();
     const wfpg::product_point* point = hemisphere ? w.points.hemisphere : w.points.sphere;
-    const vec3 up = glm::dot(s.normal, s.outgoing) >= 0.0f ? s.normal : -s.normal;
+    const vec3 up = wfpg::detail::facing_normal(s);
     float products[block_count];
     float brightest = 0.0f;
     for (std::uint32_t i = 0; i < p * p; ++i) {

@@ -101,6 +101,24 @@ TEST_CASE("mixtures of products and BSDFs are what they say, over the sphere", "
   }
 }
 
+TEST_CASE("a diffuse surface's product is its field, where that carries its cosine", "[renderer][products]") {
+  const wfpg::exec::seq exec;
+  const auto values = field_values(field_kind::noise, 16, 3);
+  const auto is_field = [&](material_kind kind, bool hemisphere, vec3 normal) {
+    wfpg::surface<bsdf> s;
+    s.normal = s.outgoing = normal;
+    s.bsdf = {normal, normal, vec3(0.8f, 0.5f, 0.3f), 0.3f, 1.5f, kind};
+    const made_product<wfpg::exec::seq, bsdf> made(exec, {16, 8}, values, hemisphere, s, 1, 100);
+    for (const product_draw& d : made.drawn())
+      if (d.product.pdf != made.field().pdf(d.product.direction)) return false;
+    return true;
+  };
+  CHECK(is_field(material_kind::lambert, true, up));
+  CHECK_FALSE(is_field(material_kind::lambert, true, glm::normalize(up + vec3(0.3f, 0.0f, 0.0f))));
+  CHECK_FALSE(is_field(material_kind::lambert, false, up));
+  CHECK_FALSE(is_field(material_kind::plastic, true, up));
+}
+
 TEST_CASE("glossy parts leave the guide less, the narrower they are", "[renderer][products]") {
   CHECK(wfpg::guided_part(0.5f, 0.5f) == 1.0f);
   CHECK(wfpg::guided_part(1.0f, 0.5f) == 1.0f);

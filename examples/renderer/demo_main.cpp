@@ -1,5 +1,5 @@
-// wfpg-demo: path tracing and path tracing guided by transient and by kept fields at equal samples, beside a
-// reference, as pictures, a table, and plots of error over time.
+// wfpg-demo: path tracing and path tracing guided by transient fields, by kept ones and by their products
+// with BSDFs at equal samples, beside a reference, as pictures, a table, and plots of error over time.
 #include "builtin_scenes.hpp"
 #include "image_io.hpp"
 #include "metrics.hpp"
@@ -37,16 +37,19 @@ struct demo_scene {
   int reference_wfpg;
 };
 constexpr demo_scene demo_scenes[] = {{"cornell-enclosed", false, 1.0f, 1024, 384},
-                                      {"ajar", true, 1.0f, 1024, 384}};
+                                      {"ajar", true, 1.0f, 1024, 384},
+                                      {"glossy-room", false, 1.0f, 1024, 384}};
 
 struct demo_method {
   const char* name;
   sampling_method method;
   render::fields lifetime;
 };
-constexpr demo_method demo_methods[] = {{"pt", sampling_method::pt, render::fields::kept},
-                                        {"transient", sampling_method::wfpg, render::fields::transient},
-                                        {"kept", sampling_method::wfpg, render::fields::kept}};
+constexpr demo_method demo_methods[] = {
+    {"pt", sampling_method::pt, render::fields::kept},
+    {"transient", sampling_method::wfpg, render::fields::transient},
+    {"wfpg", sampling_method::wfpg, render::fields::kept},
+    {"wfpg-product", sampling_method::wfpg_product, render::fields::kept}};
 
 struct method_result {
   const char* method;
@@ -154,7 +157,7 @@ nlohmann::ordered_json row(const method_result& result, const image_error& pt, d
 }
 
 void print_row(const char* scene, const nlohmann::ordered_json& row) {
-  std::printf("%-17s %-9s %4d  %10.3e %6.2f  %10.3e %6.2f  %8.2f %8.2f  %7.1f %6.2f  %6.0f  %6.2f\n", scene,
+  std::printf("%-17s %-12s %4d  %10.3e %6.2f  %10.3e %6.2f  %8.2f %8.2f  %7.1f %6.2f  %6.0f  %6.2f\n", scene,
               row["method"].get<std::string>().c_str(), row["spp"].get<int>(),
               row["mse_reinhard"].get<double>(), row["ratio_to_pt"].get<double>(),
               row["relmse_trimmed"].get<double>(), row["relmse_trimmed_ratio_to_pt"].get<double>(),
@@ -199,7 +202,7 @@ void run(const std::filesystem::path& directory) {
   nlohmann::ordered_json summary = nlohmann::ordered_json::array();
   for (const demo_scene& demo : demo_scenes) summary.push_back(run_scene(demo, directory));
 
-  std::printf("\n%-17s %-9s %4s  %10s %6s  %10s %6s  %8s %8s  %7s %6s  %6s  %6s\n", "scene", "method", "spp",
+  std::printf("\n%-17s %-12s %4s  %10s %6s  %10s %6s  %8s %8s  %7s %6s  %6s  %6s\n", "scene", "method", "spp",
               "error", "ratio", "relmse", "ratio", "held MiB", "temp MiB", "seconds", "equal", "bins",
               "cones");
   for (const auto& scene : summary)
@@ -211,7 +214,8 @@ void run(const std::filesystem::path& directory) {
       "for\n"
       "guiding, across samples and while one is in flight. bins: a sample, all depths, whose fields were "
       "made.\n"
-      "cones: a path segment. Pictures, left to right pt, transient, kept, reference, and plots of error "
+      "cones: a path segment. Pictures, left to right pt, transient, wfpg, wfpg-product, reference, and "
+      "plots of error "
       "over "
       "time: %s\n",
       directory.string().c_str());

@@ -18,7 +18,7 @@ struct bsdf_sample {
 
 /// The narrow part of a BSDF: a lobe that reflects about a mirrored direction.
 struct glossy_part {
-  float share = 0.0f;  ///< of sample()'s directions that it draws, in [0, 1]
+  float share = 0.0f;  ///< of sample()'s directions that it draws, in [0, 1]; 0: nothing but a cosine is left
   float alpha = 1.0f;  ///< its GGX roughness, or what is as wide, in (0, 1]
 };
 

@@ -38,10 +38,12 @@ struct product_points {
   std::uint32_t resolution = 0;  ///< P; 0: no products
 };
 
-/// A density over directions: a field times a BSDF, of one ray. A default one is empty.
+/// A density over directions: a field times a BSDF, of one ray; or the field as it is, where it has the BSDF
+/// in it already. A default one is empty.
 class product_field {
  public:
   product_field() = default;
+  WFPG_HD explicit product_field(const directional_field& field) : field_(field) {}
   /// `weights`: inclusive sums of the P² products, row by row, at most 2³¹; they and the field outlive this.
   WFPG_HD product_field(const directional_field& field, std::uint32_t resolution,
                         const std::uint32_t* weights)
@@ -51,13 +53,16 @@ class product_field {
         side_(field.grid().resolution() / resolution) {}
 
   /// Nothing to draw from: the BSDF is black wherever the field shines.
-  WFPG_HD bool empty() const { return weights_ == nullptr || total() == 0; }
+  WFPG_HD bool empty() const { return field_.empty() || (resolution_ > 0 && total() == 0); }
 
   /// The GGX roughness of a lobe as wide as two blocks, which so many points do not miss.
-  WFPG_HD float resolved_alpha() const { return 2.0f / static_cast<float>(resolution_); }
+  WFPG_HD float resolved_alpha() const {
+    return resolution_ > 0 ? 2.0f / static_cast<float>(resolution_) : field_.resolved_alpha();
+  }
 
   /// A unit direction from u in [0,1)², and pdf() of it. Precondition: not empty.
   WFPG_HD vec3 sample(vec2 u, float& density) const {
+    if (resolution_ == 0) return field_.sample(u, density);
     const auto drawn = detail::find_in_sums([this](std::uint32_t i) { return weights_[i]; },
                                             resolution_ * resolution_, 0, u.x);
     cell_block cell;
@@ -69,6 +74,7 @@ class product_field {
 
   /// The density of a unit direction, per steradian; 0 outside a hemisphere. Precondition: not empty.
   WFPG_HD float pdf(vec3 d) const {
+    if (resolution_ == 0) return field_.pdf(d);
     vec2 uv;
     if (!field_.locate(d, uv)) return 0.0f;
     const std::uint32_t x = field_.grid().cell_along(uv.x), y = field_.grid().cell_along(uv.y);
@@ -92,7 +98,7 @@ class product_field {
 
   directional_field field_;
   const std::uint32_t* weights_ = nullptr;
-  std::uint32_t resolution_ = 0;  // P
+  std::uint32_t resolution_ = 0;  // P; 0: no product
   std::uint32_t side_ = 0;        // of a block, in cells
 };
 
@@ -166,16 +172,28 @@ WFPG_HD inline float block_factor(const surface<Bsdf>& s, vec3 up, const directi
   return min(value, 1.0e25f) * mean / (max(fabsf(there), 1.0e-3f) * carried);
 }
 
+/// Whether a field has a surface's BSDF in it already: the cosine about its normal, and there is no narrow
+/// part. Fields over hemispheres carry the cosine.
+template <class Bsdf>
+WFPG_HD bool has_product(const directional_field& field, const surface<Bsdf>& s, vec3 up) {
+  if constexpr (!has_glossy_part_v<Bsdf>)
+    return false;
+  else
+    return field.hemisphere() && glm::dot(field.normal(), up) > 0.99f && !s.bsdf.transmits() &&
+           s.bsdf.glossy(s.outgoing).share == 0.0f;
+}
+
 /// Multiplies a field by a surface's BSDF, by one warp; `words` holds P². Weights are integers, scaled by the
 /// largest of them: alike on every width, and exact in every sum. Of a delta BSDF nothing is left.
 template <class Warp, class Bsdf>
 WFPG_HD product_field multiply(const Warp& warp, const directional_field& field, const product_points& points,
                                const surface<Bsdf>& s, std::uint32_t* words) {
   if (s.bsdf.is_delta()) return {};
+  const vec3 up = facing_normal(s);
+  if (has_product(field, s, up)) return product_field(field);
   const std::uint32_t p = points.resolution, side = field.grid().resolution() / p;
   const auto n = static_cast<int>(p * p);
   const product_point* const local = field.hemisphere() ? points.hemisphere : points.sphere;
-  const vec3 up = facing_normal(s);
   warp.for_each(n, [&](int i) {
     const std::uint32_t x = static_cast<std::uint32_t>(i) % p, y = static_cast<std::uint32_t>(i) / p;
     const std::uint32_t sum = field.grid().weight({x * side, y * side, side});

@@ -36,24 +36,25 @@ struct draw_product {
   wfpg::product_points points;
   wfpg::surface<Bsdf> surface;
   std::uint32_t* weights;
+  wfpg::product_field* product;
   wfpg::array_view<product_draw> drawn;
 
   template <class Block>
   void operator()(Block& block, std::size_t) const {
     block.for_each_warp(1, [&](const auto& warp, int) {
-      const wfpg::product_field product = wfpg::detail::multiply(warp, field, points, surface, weights);
-      for (std::size_t i = 0; i < drawn.size(); ++i) drawn[i] = draw(product, static_cast<std::uint32_t>(i));
+      *product = wfpg::detail::multiply(warp, field, points, surface, weights);
+      for (std::size_t i = 0; i < drawn.size(); ++i) drawn[i] = draw(static_cast<std::uint32_t>(i));
     });
   }
 
  private:
-  product_draw draw(const wfpg::product_field& product, std::uint32_t i) const {
+  product_draw draw(std::uint32_t i) const {
     const hashed_numbers random{5};
     product_draw d;
-    if (product.empty()) return d;
-    d.product.direction = product.sample(random(i, 0), d.product.pdf);
-    d.asked = product.pdf(d.product.direction);
-    const wfpg::product_mixture mixture{product, 0.7f};
+    if (product->empty()) return d;
+    d.product.direction = product->sample(random(i, 0), d.product.pdf);
+    d.asked = product->pdf(d.product.direction);
+    const wfpg::product_mixture mixture{*product, 0.7f};
     d.mixed = mixture.sample(surface, random(i, 1).x, random(i, 2));
     if (d.mixed.pdf > 0.0f) d.mixed_asked = mixture.pdf(surface, d.mixed.direction);
     return d;
@@ -72,15 +73,19 @@ class made_product {
                           : wfpg::directional_field(built_.grid())),
         resolution_(size.product),
         weights_(exec, blocks()),
-        points_(exec, 2 * blocks()),
-        surface_(surface) {
+        points_(exec, 2 * blocks()) {
     wfpg::product_point* const sphere = points_.data() + blocks();
     exec.for_each(blocks(), wfpg::detail::draw_product_points{points_.data(), sphere, resolution_, seed});
+    const wfpg::buffer<wfpg::product_field, Exec> product(exec, 1);
     const wfpg::buffer<product_draw, Exec> results(exec, samples);
-    exec.for_each_block(
-        1, 0,
-        draw_product<Bsdf>{
-            field_, {points_.data(), sphere, resolution_}, surface, weights_.data(), results.view()});
+    exec.for_each_block(1, 0,
+                        draw_product<Bsdf>{field_,
+                                           {points_.data(), sphere, resolution_},
+                                           surface,
+                                           weights_.data(),
+                                           product.data(),
+                                           results.view()});
+    product_ = product.to_host(exec).front();
     drawn_ = results.to_host(exec);
   }
 
@@ -88,8 +93,8 @@ class made_product {
   bool empty() const { return !(drawn_.front().product.pdf > 0.0f); }
   const wfpg::directional_field& field() const { return field_; }
   /// Precondition: not empty.
-  wfpg::product_field product() const { return {field_, resolution_, weights_.data()}; }
-  wfpg::product_mixture mixture() const { return {product(), 0.7f}; }
+  const wfpg::product_field& product() const { return product_; }
+  wfpg::product_mixture mixture() const { return {product_, 0.7f}; }
 
   /// The integral of the density over each cell.
   std::vector<double> cells() const {
@@ -97,7 +102,7 @@ class made_product {
     const std::uint32_t n = field_.grid().resolution();
     for (std::uint32_t i = 0; i < n * n; ++i) {
       const vec2 middle = (vec2(float(i % n), float(i / n)) + 0.5f) / float(n);
-      result.push_back(double(product().pdf(field_.direction(middle))) * double(field_.cell_solid_angle()));
+      result.push_back(double(product_.pdf(field_.direction(middle))) * double(field_.cell_solid_angle()));
     }
     return result;
   }
@@ -121,7 +126,7 @@ class made_product {
   std::uint32_t resolution_;
   wfpg::buffer<std::uint32_t, Exec> weights_;
   wfpg::buffer<wfpg::product_point, Exec> points_;
-  wfpg::surface<Bsdf> surface_;
+  wfpg::product_field product_;
   std::vector<product_draw> drawn_;
 };
 
