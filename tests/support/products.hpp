@@ -18,8 +18,8 @@ namespace wfpg_test {
 struct product_size {
   std::uint32_t field, product;
 };
-constexpr product_size product_sizes[] = {{16, 4},  {16, 8}, {16, 16}, {24, 8},  {32, 4},  {32, 8},
-                                          {32, 16}, {64, 4}, {64, 8},  {64, 16}, {128, 8}, {128, 16}};
+constexpr product_size product_sizes[] = {{16, 4}, {16, 8}, {16, 16}, {24, 8},  {32, 4},  {32, 8},  {32, 16},
+                                          {64, 4}, {64, 8}, {64, 16}, {128, 4}, {128, 8}, {128, 16}};
 
 /// A direction of the product alone, with what pdf() says of it, and one of its mixture with the BSDF.
 struct product_draw {
