@@ -35,12 +35,12 @@ struct test_bsdf {
   bsdf_kind kind = bsdf_kind::lambert;
   vec3 normal{0.0f, 0.0f, 1.0f};
 
-  bool is_delta() const { return kind == bsdf_kind::mirror; }
-  bool transmits() const { return kind == bsdf_kind::glass; }
+  WFPG_HD bool is_delta() const { return kind == bsdf_kind::mirror; }
+  WFPG_HD bool transmits() const { return kind == bsdf_kind::glass; }
 
-  float eval(vec3 outgoing, vec3 incident) const { return 0.8f * pdf(outgoing, incident); }
+  WFPG_HD float eval(vec3 outgoing, vec3 incident) const { return 0.8f * pdf(outgoing, incident); }
 
-  float pdf(vec3 outgoing, vec3 incident) const {
+  WFPG_HD float pdf(vec3 outgoing, vec3 incident) const {
     const vec3 up = facing(outgoing);
     const float cosine = glm::dot(up, incident);
     if (kind == bsdf_kind::glass) return 0.25f / wfpg::detail::pi;
@@ -50,7 +50,7 @@ struct test_bsdf {
     return along > 0.0f ? std::pow(along, exponent) * (exponent + 1.0f) / (2.0f * wfpg::detail::pi) : 0.0f;
   }
 
-  wfpg::bsdf_sample sample(vec3 outgoing, vec2 u) const {
+  WFPG_HD wfpg::bsdf_sample sample(vec3 outgoing, vec2 u) const {
     const float turn = 2.0f * wfpg::detail::pi * u.y;
     if (kind == bsdf_kind::black) return {};
     if (is_delta()) return {mirrored(outgoing), 0.75f};
@@ -67,8 +67,8 @@ struct test_bsdf {
  private:
   static constexpr float exponent = 20.0f;
 
-  vec3 facing(vec3 outgoing) const { return glm::dot(normal, outgoing) >= 0.0f ? normal : -normal; }
-  vec3 mirrored(vec3 outgoing) const { return 2.0f * glm::dot(normal, outgoing) * normal - outgoing; }
+  WFPG_HD vec3 facing(vec3 outgoing) const { return glm::dot(normal, outgoing) >= 0.0f ? normal : -normal; }
+  WFPG_HD vec3 mirrored(vec3 outgoing) const { return 2.0f * glm::dot(normal, outgoing) * normal - outgoing; }
 };
 
 /// A normal and a viewer above it, along no axis.
@@ -77,31 +77,31 @@ inline const vec3 toward_eye = glm::normalize(vec3(0.5f, 0.6f, 0.3f));
 
 using test_surface = wfpg::surface<test_bsdf>;
 
-inline test_surface make_surface(vec3 position, vec3 normal, vec3 outgoing,
-                                 bsdf_kind kind = bsdf_kind::lambert) {
+WFPG_HD inline test_surface make_surface(vec3 position, vec3 normal, vec3 outgoing,
+                                         bsdf_kind kind = bsdf_kind::lambert) {
   return {position, normal, normal, outgoing, {kind, normal}, true};
 }
 
 /// Surfaces that lie in an array.
 struct stored_surfaces {
   wfpg::array_view<const test_surface> surfaces;
-  test_surface operator()(std::uint32_t ray) const { return surfaces[ray]; }
+  WFPG_HD test_surface operator()(std::uint32_t ray) const { return surfaces[ray]; }
 };
 
 struct hashed_numbers {
   std::uint64_t seed = 1;
-  vec2 operator()(std::uint32_t ray, std::uint32_t dimension) const {
+  WFPG_HD vec2 operator()(std::uint32_t ray, std::uint32_t dimension) const {
     return wfpg::detail::unit_vec2(wfpg::detail::hash(wfpg::detail::hash(seed, ray), dimension));
   }
 };
 
 /// Faces of the unit box, numbered as dominant_axis numbers their inward normals: x = 0 is 0, x = 1 is 1, ...
-inline vec3 face_normal(std::uint32_t face) {
+WFPG_HD inline vec3 face_normal(std::uint32_t face) {
   vec3 n(0.0f);
   n[int(face / 2)] = face % 2 ? -1.0f : 1.0f;
   return n;
 }
-inline vec3 face_point(std::uint32_t face, float u, float v) {
+WFPG_HD inline vec3 face_point(std::uint32_t face, float u, float v) {
   vec3 p;
   const int axis = int(face / 2);
   p[axis] = face % 2 ? 1.0f : 0.0f;
@@ -136,7 +136,7 @@ struct box_mesh {
 struct box_caster {
   bool open_top = false;
 
-  wfpg::ray_hit operator()(const wfpg::ray& r) const {
+  WFPG_HD wfpg::ray_hit operator()(const wfpg::ray& r) const {
     float nearest = r.t_max;
     bool hits = false, leaves = false;
     for (int axis = 0; axis < 3; ++axis) {

@@ -15,28 +15,28 @@ class cpu_block {
  public:
   using warp = emulated_warp<W>;
 
-  cpu_block(std::byte* scratch, std::size_t bytes) : scratch_(scratch), bytes_(bytes) {}
+  WFPG_HD cpu_block(std::byte* scratch, std::size_t bytes) : scratch_(scratch), bytes_(bytes) {}
 
   /// f(i) for i in [0, n), in no order. What it wrote is seen by the team after sync().
   template <class F>
-  void for_each(int n, F f) const {
+  WFPG_HD void for_each(int n, F f) const {
     for (int i = 0; i < n; ++i) f(i);
   }
 
   /// f(warp, i) for i in [0, n): each i is one warp's. warp.index() is below the policy's warps_per_block.
   template <class F>
-  void for_each_warp(int n, F f) const {
+  WFPG_HD void for_each_warp(int n, F f) const {
     const warp all;
     for (int i = 0; i < n; ++i) f(all, i);
   }
 
   /// Waits until the whole team is here.
-  void sync() const {}
+  WFPG_HD void sync() const {}
 
   /// n uninitialised elements of the scratch memory, until the block ends. The sum of all requests, each
   /// rounded up to 16 bytes, stays within what for_each_block was given.
   template <class T>
-  T* scratch(std::size_t n) {
+  WFPG_HD T* scratch(std::size_t n) {
     std::byte* result = scratch_ + used_;
     used_ += (n * sizeof(T) + 15) / 16 * 16;
     assert(used_ <= bytes_);
@@ -45,7 +45,7 @@ class cpu_block {
 
   /// Sum of f(i) for i in [0, n), given to all; W partial sums, so that floats add up alike on any team.
   template <class F>
-  auto sum(int n, F f) const {
+  WFPG_HD auto sum(int n, F f) const {
     const warp all;
     using value = std::decay_t<decltype(f(0))>;
     auto partial = all.map([](int) { return value(0); });

@@ -1,0 +1,201 @@
+// The CUDA policy: every call is ordered on one stream, none waits but copies to the host. Needs nvcc.
+#pragma once
+
+#if !defined(__CUDACC__)
+#error "wfpg/exec/cuda.hpp needs a CUDA compiler: include it in .cu files"
+#endif
+
+#include <wfpg/detail/cuda_block.hpp>
+#include <wfpg/detail/thrust.hpp>
+#include <wfpg/error.hpp>
+#include <wfpg/exec/policy.hpp>
+
+#include <cuda_runtime_api.h>
+#include <thrust/system/cuda/execution_policy.h>
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <new>
+#include <stdexcept>
+#include <string>
+
+namespace wfpg {
+
+/// A call of the CUDA runtime failed; an error that an earlier kernel of the host left behind is reported by
+/// the first call after it.
+class cuda_error : public std::runtime_error {
+ public:
+  cuda_error(const char* call, cudaError_t code)
+      : std::runtime_error(std::string(call) + ": " + cudaGetErrorString(code)), code_(code) {}
+  cudaError_t code() const { return code_; }
+
+ private:
+  cudaError_t code_;
+};
+
+namespace detail {
+
+/// Throws cuda_error where `code` is one, which the next call is then not to find.
+inline void check_cuda(cudaError_t code, const char* call) {
+  if (code == cudaSuccess) return;
+  cudaGetLastError();
+  throw cuda_error(call, code);
+}
+
+/// Device memory from the stream-ordered pool of the current device.
+class stream_resource : public memory_resource {
+ public:
+  explicit stream_resource(cudaStream_t stream) : stream_(stream) {}
+
+  /// The one of a stream, for as long as the process lives.
+  static memory_resource* of(cudaStream_t stream) {
+    static std::mutex guard;
+    static std::map<cudaStream_t, std::unique_ptr<stream_resource>> made;
+    const std::lock_guard<std::mutex> lock(guard);
+    std::unique_ptr<stream_resource>& resource = made[stream];
+    if (!resource) resource = std::make_unique<stream_resource>(stream);
+    return resource.get();
+  }
+
+ private:
+  void* do_allocate(std::size_t bytes, std::size_t) override {
+    void* block = nullptr;
+    const cudaError_t code = cudaMallocAsync(&block, bytes, stream_);
+    if (code == cudaErrorMemoryAllocation) {
+      cudaGetLastError();
+      throw std::bad_alloc();
+    }
+    check_cuda(code, "cudaMallocAsync");
+    return block;
+  }
+  void do_deallocate(void* block, std::size_t, std::size_t) override { cudaFreeAsync(block, stream_); }
+  bool do_is_equal(const memory_resource& other) const noexcept override { return this == &other; }
+
+  cudaStream_t stream_;
+};
+
+inline __device__ std::size_t count_of(std::size_t n) {
+  return n;
+}
+inline __device__ std::size_t count_of(exec::device_count n) {
+  return n.get();
+}
+
+template <class Count, class F>
+__global__ void for_each_kernel(Count n, F f) {
+  const std::size_t count = count_of(n), stride = std::size_t(gridDim.x) * blockDim.x;
+  for (std::size_t i = std::size_t(blockIdx.x) * blockDim.x + threadIdx.x; i < count; i += stride) f(i);
+}
+
+template <class Block, class Count, class F>
+__global__ void __launch_bounds__(Block::threads)
+    for_each_block_kernel(Count n, std::size_t scratch_bytes, F f) {
+  extern __shared__ __align__(16) unsigned char block_scratch[];
+  const std::size_t count = count_of(n);
+  for (std::size_t i = blockIdx.x; i < count; i += gridDim.x) {
+    Block team(reinterpret_cast<std::byte*>(block_scratch), scratch_bytes);
+    f(team, i);
+    __syncthreads();  // before the next block writes to scratch memory
+  }
+}
+
+}  // namespace detail
+
+namespace exec {
+
+/// The CUDA policy on a stream. Copies of one share the stream and the memory.
+class cuda {
+ public:
+  static constexpr const char* name = "cuda";
+  static constexpr int warp_width = 32;
+  static constexpr int warps_per_block = 8;
+  using block = wfpg::detail::cuda_block<warps_per_block>;
+
+  /// `resource` hands out device memory, ordered on the stream, and outlives what is allocated; null stands
+  /// for cudaMallocAsync on that stream.
+  explicit cuda(cudaStream_t stream = nullptr, memory_resource* resource = nullptr)
+      : stream_(stream), resource_(resource ? resource : wfpg::detail::stream_resource::of(stream)) {}
+
+  memory_resource* resource() const { return resource_; }
+  cuda with_resource(memory_resource* resource) const { return cuda(stream_, resource); }
+  cudaStream_t stream() const { return stream_; }
+
+  auto thrust() const {
+    return ::thrust::cuda::par_nosync(wfpg::detail::resource_allocator<char>(resource_)).on(stream_);
+  }
+
+  /// Waits for the work before it.
+  void copy_to_host(void* to, const void* from, std::size_t bytes) const {
+    copy(to, from, bytes, cudaMemcpyDeviceToHost);
+    wfpg::detail::check_cuda(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
+  }
+  void copy_from_host(void* to, const void* from, std::size_t bytes) const {
+    copy(to, from, bytes, cudaMemcpyHostToDevice);
+  }
+
+  template <class F>
+  void for_each(std::size_t n, const F& f) const {
+    if (n == 0) return;
+    const std::size_t blocks = (n + threads - 1) / threads;
+    launch(wfpg::detail::for_each_kernel<std::size_t, F>, blocks, 0, n, f);
+  }
+  template <class F>
+  void for_each(device_count n, const F& f) const {
+    if (n.capacity == 0) return;
+    const std::size_t blocks = (n.capacity + threads - 1) / threads;
+    launch(wfpg::detail::for_each_kernel<device_count, F>, blocks < resident() ? blocks : resident(), 0, n,
+           f);
+  }
+
+  template <class F>
+  void for_each_block(std::size_t n, std::size_t scratch_bytes, const F& f) const {
+    if (n > 0) launch_blocks(n, n, scratch_bytes, f);
+  }
+  template <class F>
+  void for_each_block(device_count n, std::size_t scratch_bytes, const F& f) const {
+    if (n.capacity > 0) launch_blocks(n, n.capacity, scratch_bytes, f);
+  }
+
+ private:
+  static constexpr unsigned threads = static_cast<unsigned>(block::threads);
+
+  void copy(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind) const {
+    if (bytes) wfpg::detail::check_cuda(cudaMemcpyAsync(to, from, bytes, kind, stream_), "cudaMemcpyAsync");
+  }
+
+  /// More blocks than the device runs at once.
+  static std::size_t resident() {
+    int device = 0, processors = 0;
+    wfpg::detail::check_cuda(cudaGetDevice(&device), "cudaGetDevice");
+    wfpg::detail::check_cuda(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device),
+                             "cudaDeviceGetAttribute");
+    return 16 * static_cast<std::size_t>(processors);
+  }
+
+  template <class Count, class F>
+  void launch_blocks(Count n, std::size_t most, std::size_t scratch_bytes, const F& f) const {
+    void (*const kernel)(Count, std::size_t, F) = wfpg::detail::for_each_block_kernel<block, Count, F>;
+    constexpr std::size_t without_asking = 48 * 1024;
+    if (scratch_bytes > without_asking)
+      wfpg::detail::check_cuda(
+          cudaFuncSetAttribute(reinterpret_cast<const void*>(kernel),
+                               cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(scratch_bytes)),
+          "cudaFuncSetAttribute for shared memory");
+    launch(kernel, most < resident() ? most : resident(), scratch_bytes, n, scratch_bytes, f);
+  }
+
+  template <class... Parameters, class... Arguments>
+  void launch(void (*kernel)(Parameters...), std::size_t blocks, std::size_t shared_bytes,
+              const Arguments&... arguments) const {
+    kernel<<<static_cast<unsigned>(blocks), threads, shared_bytes, stream_>>>(Parameters(arguments)...);
+    wfpg::detail::check_cuda(cudaGetLastError(), "kernel launch");
+  }
+
+  cudaStream_t stream_;
+  memory_resource* resource_;
+};
+
+}  // namespace exec
+}  // namespace wfpg

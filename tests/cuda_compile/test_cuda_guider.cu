@@ -1,0 +1,124 @@
+// The guider on the CUDA policy: its integer stages against the serial policy's, its directions but for
+// rounding, and one seed twice.
+#include "support/scenes.hpp"
+
+#include <wfpg/exec/cuda.hpp>
+#include <wfpg/exec/seq.hpp>
+#include <wfpg/path_guider.hpp>
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+using namespace wfpg_test;
+using cuda_policy = wfpg::exec::cuda;
+using serial_policy = wfpg::exec::seq;
+
+namespace {
+
+constexpr std::uint32_t rays = 20000, deposits = 50000;
+constexpr int samples = 4;
+
+/// Points of the unit box's walls, of three BSDFs.
+struct walls {
+  WFPG_HD test_surface operator()(std::uint32_t ray) const {
+    const vec2 u = hashed_numbers{3}(ray, 0);
+    const vec3 normal = face_normal(ray % 6);
+    const bsdf_kind kind = ray % 5 < 3    ? bsdf_kind::lambert
+                           : ray % 5 == 3 ? bsdf_kind::glossy
+                                          : bsdf_kind::glass;
+    return make_surface(face_point(ray % 6, u.x, u.y), normal, normal, kind);
+  }
+};
+
+struct do_nothing {
+  template <class Block>
+  WFPG_HD void operator()(Block&, std::size_t) const {}
+};
+
+/// Light on the walls, most of it in a corner of the ceiling.
+struct light_walls {
+  wfpg::exitance_cache_view cache;
+  WFPG_HD void operator()(std::size_t i) const {
+    const test_surface s = walls()(static_cast<std::uint32_t>(i));
+    const bool bright = s.position.y == 1.0f && s.position.x > 0.7f;
+    cache.deposit(s.position, s.normal, bright ? 10.0f : 0.1f);
+  }
+};
+
+struct guided {
+  wfpg::guider_statistics statistics;
+  std::uint32_t nodes = 0;
+  std::size_t persistent_bytes = 0;
+  std::vector<wfpg::sampled_direction> directions;
+};
+
+template <class Exec>
+guided guide(wfpg::field_lifetime lifetime, std::uint32_t product_resolution) {
+  const Exec exec;
+  wfpg::guider_options options;
+  options.fields = lifetime;
+  options.product_resolution = product_resolution;
+  options.octree_resolution = 64;
+  options.max_rays = rays;
+  options.deposit_capacity = 2 * deposits;
+  options.unguided_samples = 0;
+  options.kept.budget_bytes = std::size_t(4) << 20;
+  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
+  const wfpg::buffer<wfpg::sampled_direction, Exec> directions(exec, rays);
+  for (std::uint32_t sample = 0; sample < samples; ++sample) {
+    guider.begin_sample();
+    exec.for_each(deposits, light_walls{guider.cache()});
+    guider.sample_directions(wfpg::wave{0u, rays, walls{}, hashed_numbers{sample}}, box_caster{},
+                             directions.view());
+    guider.end_sample();
+  }
+  return {guider.statistics(), guider.octree().node_count(), guider.memory().persistent(),
+          directions.to_host(exec)};
+}
+
+bool close(const wfpg::sampled_direction& a, const wfpg::sampled_direction& b) {
+  return a.technique == b.technique && glm::length(a.direction - b.direction) < 1.0e-3f &&
+         std::fabs(a.pdf - b.pdf) <= 1.0e-3f * a.pdf;
+}
+
+void compare(wfpg::field_lifetime lifetime, std::uint32_t product_resolution) {
+  INFO((lifetime == wfpg::field_lifetime::kept ? "kept" : "transient")
+       << ", products " << product_resolution);
+  const guided host = guide<serial_policy>(lifetime, product_resolution),
+               device = guide<cuda_policy>(lifetime, product_resolution);
+  CHECK(device.nodes == host.nodes);
+  CHECK(device.persistent_bytes == host.persistent_bytes);
+  CHECK(device.statistics.kept.live == host.statistics.kept.live);
+  CHECK(device.statistics.kept.refreshed == host.statistics.kept.refreshed);
+  CHECK(device.statistics.depths[0].bins == host.statistics.depths[0].bins);
+  CHECK(device.statistics.depths[0].rays == host.statistics.depths[0].rays);
+  CHECK(device.statistics.depths[0].cones == host.statistics.depths[0].cones);
+  std::size_t closely = 0, guided_rays = 0;
+  for (std::size_t i = 0; i < rays; ++i) {
+    closely += close(device.directions[i], host.directions[i]);
+    guided_rays += device.directions[i].technique == wfpg::sampling_technique::guide;
+  }
+  // A cone that lands on a voxel's border reads another voxel where rounding differs.
+  CHECK(closely >= rays / 100 * 99);
+  CHECK(guided_rays > rays / 4);
+  const guided again = guide<cuda_policy>(lifetime, product_resolution);
+  CHECK(std::memcmp(again.directions.data(), device.directions.data(),
+                    rays * sizeof(wfpg::sampled_direction)) == 0);
+}
+
+}  // namespace
+
+TEST_CASE("the guider on the CUDA policy does what it does on the serial one", "[cuda]") {
+  for (const auto lifetime : {wfpg::field_lifetime::kept, wfpg::field_lifetime::transient})
+    for (const std::uint32_t product_resolution : {0u, 8u}) compare(lifetime, product_resolution);
+}
+
+TEST_CASE("the CUDA policy tells of errors", "[cuda]") {
+  const cuda_policy exec;
+  CHECK_THROWS_AS((wfpg::buffer<char, cuda_policy>(exec, std::size_t(1) << 50)), wfpg::out_of_memory);
+  const wfpg::buffer<std::uint32_t, cuda_policy> works_after(exec, std::vector<std::uint32_t>{1, 2, 3});
+  CHECK((works_after.to_host(exec) == std::vector<std::uint32_t>{1, 2, 3}));
+  CHECK_THROWS_AS(exec.for_each_block(std::size_t(1), std::size_t(1) << 20, do_nothing{}), wfpg::cuda_error);
+}
