@@ -62,7 +62,11 @@ struct workload {
         wfpg::detail::build_distribution(block, cells, static_cast<int>(field_resolution), 0.01f);
     field = wfpg::directional_field(grid, up);
     const wfpg::detail::draw_product_points draw{hemisphere.data(), sphere.data(), product_resolution, 2};
-    for (std::uint32_t i = 0; i < block_count; ++i) draw(i);
+    const wfpg::detail::measure_product_blocks measure{hemisphere.data(), sphere.data(), product_resolution};
+    for (std::uint32_t i = 0; i < block_count; ++i) {
+      measure(i);
+      draw(i);
+    }
     for (std::uint32_t i = 0; i < rays.size(); ++i) rays[i] = make_ray(kind, i);
   }
   workload(const workload&) = delete;

@@ -71,13 +71,7 @@ vec3 uniform_sphere(vec2 u) {
   return {r * std::cos(2.0f * render::pi * u.y), r * std::sin(2.0f * render::pi * u.y), z};
 }
 
-/// Mean and its standard error.
-struct estimate {
-  double sum = 0.0, squares = 0.0, n = 0.0;
-  void add(double x) { sum += x, squares += x * x, n += 1.0; }
-  double mean() const { return sum / n; }
-  double error() const { return std::sqrt(std::max(0.0, squares / n - mean() * mean()) / n); }
-};
+using estimate = wfpg::detail::sample_mean;
 
 void check(const std::string& name, const bsdf& f) {
   wfpg::testing::bsdf_check_options options;

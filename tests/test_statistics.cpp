@@ -1,6 +1,7 @@
 // The statistics kit: correct samplers pass, each of several broken ones is caught and named.
 #include "support/catch.hpp"
 #include "support/fields.hpp"
+#include "support/reports.hpp"
 #include "support/scenes.hpp"
 #include "support/statistics.hpp"
 
@@ -49,15 +50,6 @@ vec2 as_it_is(vec2 uv) {
   return uv;
 }
 
-void check_caught(const sampler_report& report, const std::vector<std::string>& words) {
-  INFO(report.message);
-  CHECK(!report);
-  for (const std::string& word : words) {
-    INFO(word);
-    CHECK(report.message.find(word) != std::string::npos);
-  }
-}
-
 /// Tiles of a renderer whose noise is normal, by sums of twelve uniform numbers.
 tile_means rendered(double mean, std::uint64_t seed) {
   random_numbers random(seed);
@@ -102,7 +94,7 @@ TEST_CASE("statistics: correct samplers are rejected as rarely as they are to be
 TEST_CASE("statistics: a density wrong by 2% is caught", "[statistics]") {
   const open_sampler sampler;
   const auto larger = [&](vec3 d) { return 1.02f * sampler.pdf(d); };
-  check_caught(check_sampler(sampler.draw(as_it_is, larger), larger), {"energy", "integrates to 1.02"});
+  check_names(check_sampler(sampler.draw(as_it_is, larger), larger), {"energy", "integrates to 1.02"});
 
   // Of the right sum: 2% too much above, 2% too little below.
   double above = 0.0;
@@ -115,28 +107,28 @@ TEST_CASE("statistics: a density wrong by 2% is caught", "[statistics]") {
     const double factor = d.z > 0.0f ? 1.02 : (1.0 - 1.02 * above) / (1.0 - above);
     return float(factor) * sampler.pdf(d);
   };
-  check_caught(check_sampler(sampler.draw(as_it_is, tilted, 5 * samples), tilted),
-               {"frequencies", "observed", "expected", "p = "});
+  check_names(check_sampler(sampler.draw(as_it_is, tilted, 5 * samples), tilted),
+              {"frequencies", "observed", "expected", "p = "});
 }
 
 TEST_CASE("statistics: a cell shifted by one is caught", "[statistics]") {
   const open_sampler sampler;
   const auto shifted = [](vec2 uv) { return vec2(glm::fract(uv.x + 1.0f / float(cells)), uv.y); };
   const auto pdf = [&](vec3 d) { return sampler.pdf(d); };
-  check_caught(check_sampler(sampler.draw(shifted, pdf), pdf),
-               {"frequencies", "observed", "expected", "z in [", "phi in [", "p = "});
+  check_names(check_sampler(sampler.draw(shifted, pdf), pdf),
+              {"frequencies", "observed", "expected", "z in [", "phi in [", "p = "});
 
   // And where the density reported is that of the cell that was drawn.
   std::vector<drawn_direction> drawn = sampler.draw(as_it_is, pdf);
   const std::vector<drawn_direction> moved = sampler.draw(shifted, pdf);
   for (std::size_t i = 0; i < drawn.size(); ++i) drawn[i].direction = moved[i].direction;
-  check_caught(check_sampler(drawn, pdf), {"query", "was drawn with density", "pdf() says"});
+  check_names(check_sampler(drawn, pdf), {"query", "was drawn with density", "pdf() says"});
 }
 
 TEST_CASE("statistics: a missing Jacobian is caught", "[statistics]") {
   const open_sampler sampler;
   const auto of_the_square = [&](vec3 d) { return 4.0f * wfpg::detail::pi * sampler.pdf(d); };
-  check_caught(check_sampler(sampler.draw(as_it_is, of_the_square), of_the_square), {"energy", "12.57"});
+  check_names(check_sampler(sampler.draw(as_it_is, of_the_square), of_the_square), {"energy", "12.57"});
 
   // Even in theta and phi, where the density is said to be even over the sphere: its sum is right.
   std::vector<drawn_direction> drawn;
@@ -147,7 +139,7 @@ TEST_CASE("statistics: a missing Jacobian is caught", "[statistics]") {
     drawn.push_back(
         {{std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)}, even({})});
   }
-  check_caught(check_sampler(drawn, even), {"frequencies", "observed", "expected"});
+  check_names(check_sampler(drawn, even), {"frequencies", "observed", "expected"});
 }
 
 TEST_CASE("statistics: a row that is never reached is caught", "[statistics]") {
@@ -157,7 +149,7 @@ TEST_CASE("statistics: a row that is never reached is caught", "[statistics]") {
     return missed ? uv + vec2(0.0f, 1.0f / float(cells)) : uv;
   };
   const auto pdf = [&](vec3 d) { return sampler.pdf(d); };
-  check_caught(check_sampler(sampler.draw(without_row, pdf), pdf), {"frequencies", "observed", "expected"});
+  check_names(check_sampler(sampler.draw(without_row, pdf), pdf), {"frequencies", "observed", "expected"});
 }
 
 TEST_CASE("statistics: tiles of two renderers", "[statistics]") {

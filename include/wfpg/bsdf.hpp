@@ -18,7 +18,7 @@ struct bsdf_sample {
 
 /// The narrow part of a BSDF: a lobe that reflects about a mirrored direction.
 struct glossy_part {
-  float share = 0.0f;  ///< of sample()'s directions that it draws, in [0, 1]; 0: nothing but a cosine is left
+  float share = 0.0f;  ///< of sample()'s directions that it draws, in [0, 1]; 0: the rest is the cosine's
   float alpha = 1.0f;  ///< its GGX roughness, or what is as wide, in (0, 1]
 };
 
@@ -27,8 +27,8 @@ template <class Bsdf>
 struct surface {
   vec3 position{0.0f};          ///< world space
   vec3 geometric_normal{0.0f};  ///< unit length, either side
-  vec3 normal{0.0f};            ///< shading normal, unit length, on the same side; decides a bin's orientation
-  vec3 outgoing{0.0f};          ///< toward the previous vertex, unit length
+  vec3 normal{0.0f};    ///< shading normal, unit length, on the same side; decides a bin's orientation
+  vec3 outgoing{0.0f};  ///< toward the previous vertex, unit length
   Bsdf bsdf{};
   bool active = true;  ///< false: this ray of the capacity is not in use, nothing else is read
 };

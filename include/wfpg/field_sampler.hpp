@@ -15,7 +15,8 @@ namespace wfpg {
 
 namespace detail {
 
-/// Where a number fell among inclusive sums: the entry, and how far into its width, in [0,1).
+/// Where a number fell among inclusive sums: the entry, and how far into its width, in [0,1]: it may round
+/// to 1.
 struct sums_position {
   std::uint32_t index = 0;
   float fraction = 0.0f;

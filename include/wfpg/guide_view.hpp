@@ -55,8 +55,8 @@ class guide_view {
     const std::uint32_t field = field_of_ray_[ray];
     return {fields_.field(field), fields_.fields[field].fraction};
   }
-  /// The ray's mixture of product and BSDF, made by a warp: P² evaluations of the BSDF into `words`, P² of
-  /// them, which it reads as long as it lives. Precondition: product_resolution() > 0.
+  /// The ray's mixture of product and BSDF, made by a warp: P² to 2 P² evaluations of the BSDF into `words`,
+  /// P² of them, which it reads as long as it lives. Precondition: product_resolution() > 0.
   template <class Warp, class Bsdf>
   WFPG_HD product_mixture product(const Warp& warp, std::uint32_t ray, const surface<Bsdf>& s,
                                   std::uint32_t* words) const {

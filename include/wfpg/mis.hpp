@@ -121,12 +121,12 @@ struct basic_guide_mixture {
       return s.bsdf.sample(s.outgoing, u);
   }
 
-  /// The BSDF's share of the density.
+  /// The BSDF's share of the density. A part that is never drawn is not asked.
   template <class Bsdf>
   WFPG_HD static float bsdf_pdf(const surface<Bsdf>& s, const mixture_shares& shares, vec3 direction) {
     if constexpr (has_separate_parts_v<Bsdf>)
-      return shares.glossy * s.bsdf.pdf_part(true, s.outgoing, direction) +
-             shares.smooth * s.bsdf.pdf_part(false, s.outgoing, direction);
+      return (shares.glossy > 0.0f ? shares.glossy * s.bsdf.pdf_part(true, s.outgoing, direction) : 0.0f) +
+             (shares.smooth > 0.0f ? shares.smooth * s.bsdf.pdf_part(false, s.outgoing, direction) : 0.0f);
     else
       return shares.smooth * s.bsdf.pdf(s.outgoing, direction);
   }

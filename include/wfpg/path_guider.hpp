@@ -50,10 +50,12 @@ struct guider_options {
       32;  ///< cells along a transient field's side at depth 0, in [2, 128]; halves at each depth
   std::uint32_t min_field_resolution = 16;  ///< down to this, in [2, 128]
   field_options field;                      ///< filter and floor
-  std::uint32_t product_resolution = 0;     ///< P: draw from products of field and BSDF in P x P blocks, 4, 8
-                                            ///< or 16, a divisor of the fields' resolutions; 0: from fields
-  float guide_fraction = 0.0f;  ///< share of guided samples, (0, 1]; 0: 0.5 in plain mode, 0.7 in oriented
-                                ///< mode; 0.5 in transient oriented bins of less than c_ray rays
+  /// P: draw from products of field and BSDF in P x P blocks, 4, 8 or 16, a divisor of the fields'
+  /// resolutions (16 is none of kept.resolution's default); 0: from fields.
+  std::uint32_t product_resolution = 0;
+  /// Share of guided samples, (0, 1], less than 1 with products; 0: 0.5 in plain mode, 0.7 in oriented mode,
+  /// 0.5 in transient oriented bins of less than c_ray rays.
+  float guide_fraction = 0.0f;
   bool include_emission =
       true;  ///< guide toward emitters themselves; false where next-event estimation finds them
   std::uint32_t unguided_samples =
@@ -74,7 +76,7 @@ template <class Exec>
 class path_guider {
  public:
   static_assert(exec::is_execution_policy_v<Exec>,
-                "Exec needs resource, with_resource, thrust and warp_width");
+                "Exec needs resource, with_resource, thrust, warp_width and warps_per_block");
 
   /// A guider over triangles, read only here. Throws std::invalid_argument for options out of range,
   /// out_of_memory.

@@ -1,12 +1,12 @@
 // Product sampling: a ray draws from a field times its own BSDF, in two levels (paper, section 3.6; thesis,
 // section 4.5, Algorithms 6 and 7; after Conty Estevez & Lecocq 2018, "Fast Product Importance Sampling of
 // Environment Maps"). The F x F cells of a field form P x P blocks, whose sums its summed-area table has. One
-// warp multiplies the blocks by the BSDF, which it evaluates at a point in each, and scans them; a direction
-// is drawn from a block and then from the cells inside it. The density is that of what was evaluated,
-// exactly: probability of the block times that of the cell inside it, over the cell's solid angle.
+// warp multiplies the blocks by the BSDF, which it evaluates at a point or two in each, and scans them; a
+// direction is drawn from a block and then from the cells inside it. The density is that of what was
+// evaluated, exactly: probability of the block times that of the cell inside it, over the cell's solid angle.
 //
-// Memory: 4 P² bytes a ray in flight, and nothing a field. Cost: P² evaluations of the BSDF a ray, and one
-// more where that is black; a direction takes O(log P + log F), a density O(1).
+// Memory: 4 P² bytes a warp, and nothing a field. Cost: P² evaluations of the BSDF a ray, and one more for
+// each that is black; a direction takes O(log P + log F), a density O(1).
 #pragma once
 
 #include <wfpg/bsdf.hpp>
@@ -44,7 +44,7 @@ class product_field {
  public:
   product_field() = default;
   WFPG_HD explicit product_field(const directional_field& field) : field_(field) {}
-  /// `weights`: inclusive sums of the P² products, row by row, at most 2³¹; they and the field outlive this.
+  /// `weights`: inclusive sums of the P² products, row by row, below 2³²; they and the field outlive this.
   WFPG_HD product_field(const directional_field& field, std::uint32_t resolution,
                         const std::uint32_t* weights)
       : field_(field),
@@ -112,7 +112,33 @@ inline void require_product_resolution(std::uint32_t p, const char* name, std::u
           ("a multiple of product_resolution, " + std::to_string(p)).c_str());
 }
 
-/// Draws a wave's points: f(i) for i in [0, P²).
+/// Measures the blocks, once: f(i) for i in [0, P²).
+struct measure_product_blocks {
+  product_point* hemisphere;
+  product_point* sphere;
+  std::uint32_t resolution;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    constexpr int n = 8;  // of the midpoint rule, along a side
+    const vec2 corner(static_cast<float>(i % resolution), static_cast<float>(i / resolution));
+    vec3 above(0.0f), around(0.0f);
+    for (int k = 0; k < n * n; ++k) {
+      const vec2 inside(static_cast<float>(k % n) + 0.5f, static_cast<float>(k / n) + 0.5f);
+      const vec2 uv = (corner + inside / static_cast<float>(n)) / static_cast<float>(resolution);
+      above += square_to_hemisphere(uv) / static_cast<float>(n * n);
+      around += square_to_sphere(uv) / static_cast<float>(n * n);
+    }
+    hemisphere[i] = {vec3(0.0f), vec3(0.0f), above, radius(above)};
+    sphere[i] = {vec3(0.0f), vec3(0.0f), around, radius(around)};
+  }
+
+ private:
+  /// 1 - |mean|² is the variance of the block's directions, half of it along any line through the block; an
+  /// even spread over [-r, r] has r²/3.
+  WFPG_HD static float radius(vec3 mean) { return sqrtf(1.5f * max(1.0f - glm::dot(mean, mean), 0.0f)); }
+};
+
+/// Draws a wave's points in measured blocks: f(i) for i in [0, P²).
 struct draw_product_points {
   product_point* hemisphere;
   product_point* sphere;
@@ -120,27 +146,15 @@ struct draw_product_points {
   std::uint64_t seed;
 
   WFPG_HD void operator()(std::size_t i) const {
-    constexpr int n = 8;  // of the midpoint rule, along a side
     const vec2 corner(static_cast<float>(i % resolution), static_cast<float>(i / resolution));
     const vec2 jitter = unit_vec2(hash(seed, i));
     const vec2 uv = (corner + jitter) / static_cast<float>(resolution);
     const vec2 opposite = (corner + 1.0f - jitter) / static_cast<float>(resolution);
-    hemisphere[i] = {square_to_hemisphere(uv), square_to_hemisphere(opposite), vec3(0.0f), 0.0f};
-    sphere[i] = {square_to_sphere(uv), square_to_sphere(opposite), vec3(0.0f), 0.0f};
-    for (int k = 0; k < n * n; ++k) {
-      const vec2 inside(static_cast<float>(k % n) + 0.5f, static_cast<float>(k / n) + 0.5f);
-      const vec2 at = (corner + inside / static_cast<float>(n)) / static_cast<float>(resolution);
-      hemisphere[i].mean += square_to_hemisphere(at) / static_cast<float>(n * n);
-      sphere[i].mean += square_to_sphere(at) / static_cast<float>(n * n);
-    }
-    hemisphere[i].radius = radius(hemisphere[i].mean);
-    sphere[i].radius = radius(sphere[i].mean);
+    hemisphere[i].direction = square_to_hemisphere(uv);
+    hemisphere[i].opposite = square_to_hemisphere(opposite);
+    sphere[i].direction = square_to_sphere(uv);
+    sphere[i].opposite = square_to_sphere(opposite);
   }
-
- private:
-  /// 1 - |mean|² is the variance of the block's directions, half of it along any line through the block; an
-  /// even spread over [-r, r] has r²/3.
-  WFPG_HD static float radius(vec3 mean) { return sqrtf(1.5f * max(1.0f - glm::dot(mean, mean), 0.0f)); }
 };
 
 /// The mean over a block of the cosine at a normal where that is positive, if the block's cosines are spread

@@ -4,7 +4,7 @@
 // scratch while their bin's rays are served, or in memory that the caller gives; the work on cells does not
 // know which.
 //
-// Cost: F² cones and O(F²) a bin; 8 F² bytes of scratch a block.
+// Cost: F² cones and O(F²) a bin; 8 F² bytes of scratch a block, and 4 P² a warp for products.
 #pragma once
 
 #include <wfpg/bsdf.hpp>

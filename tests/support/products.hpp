@@ -75,6 +75,7 @@ class made_product {
         weights_(exec, blocks()),
         points_(exec, 2 * blocks()) {
     wfpg::product_point* const sphere = points_.data() + blocks();
+    exec.for_each(blocks(), wfpg::detail::measure_product_blocks{points_.data(), sphere, resolution_});
     exec.for_each(blocks(), wfpg::detail::draw_product_points{points_.data(), sphere, resolution_, seed});
     const wfpg::buffer<wfpg::product_field, Exec> product(exec, 1);
     const wfpg::buffer<product_draw, Exec> results(exec, samples);

@@ -95,6 +95,10 @@ path_guider<Exec>::path_guider(const Exec& exec, voxel_fragments<Exec> fragments
     binner_ = spatial_binner<Exec>(exec_, octree_.view(), binning, options_.max_rays);
   octree_.release_build_data();
   ::thrust::fill_n(exec_.thrust(), counts_.data(), counts_.size(), depth_statistics{});
+  const std::uint32_t p = options_.product_resolution;
+  product_point* const hemisphere = product_points_.data();
+  if (p > 0)
+    exec_.for_each(std::size_t(p) * p, detail::measure_product_blocks{hemisphere, hemisphere + p * p, p});
 }
 
 template <class Exec>
@@ -127,10 +131,10 @@ template <class Surfaces, class Random>
 product_points path_guider<Exec>::points_of(const wave<Surfaces, Random>& w) {
   const std::uint32_t p = options_.product_resolution;
   if (p == 0) return {};
-  product_point* const sphere = product_points_.data() + std::size_t(p) * p;
+  product_point* const hemisphere = product_points_.data();
   exec_.for_each(std::size_t(p) * p,
-                 detail::draw_product_points{product_points_.data(), sphere, p, wave_seed(w.depth)});
-  return {product_points_.data(), sphere, p};
+                 detail::draw_product_points{hemisphere, hemisphere + p * p, p, wave_seed(w.depth)});
+  return {hemisphere, hemisphere + p * p, p};
 }
 
 template <class Exec>

@@ -76,6 +76,7 @@ struct product_scratch {
     auto* const all = block.template scratch<std::uint32_t>(words());
     block.for_each_warp(n, [&](const auto& warp, int i) {
       f(warp, all + words_a_warp() * static_cast<std::size_t>(warp.index()), i);
+      warp.sync();  // its words are read until here
     });
   }
 };

@@ -131,6 +131,7 @@ class cuda {
     copy(to, from, bytes, cudaMemcpyDeviceToHost);
     wfpg::detail::check_cuda(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
   }
+  /// Pinned memory on the host has to outlive the copy.
   void copy_from_host(void* to, const void* from, std::size_t bytes) const {
     copy(to, from, bytes, cudaMemcpyHostToDevice);
   }
@@ -145,8 +146,7 @@ class cuda {
   void for_each(device_count n, const F& f) const {
     if (n.capacity == 0) return;
     const std::size_t blocks = (n.capacity + threads - 1) / threads;
-    launch(wfpg::detail::for_each_kernel<device_count, F>, blocks < resident() ? blocks : resident(), 0, n,
-           f);
+    launch(wfpg::detail::for_each_kernel<device_count, F>, at_most_resident(blocks), 0, n, f);
   }
 
   template <class F>
@@ -165,25 +165,26 @@ class cuda {
     if (bytes) wfpg::detail::check_cuda(cudaMemcpyAsync(to, from, bytes, kind, stream_), "cudaMemcpyAsync");
   }
 
-  /// More blocks than the device runs at once.
-  static std::size_t resident() {
+  /// So many blocks, or more than the device runs at once.
+  static std::size_t at_most_resident(std::size_t blocks) {
     int device = 0, processors = 0;
     wfpg::detail::check_cuda(cudaGetDevice(&device), "cudaGetDevice");
     wfpg::detail::check_cuda(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device),
                              "cudaDeviceGetAttribute");
-    return 16 * static_cast<std::size_t>(processors);
+    const std::size_t most = 16 * static_cast<std::size_t>(processors);
+    return blocks < most ? blocks : most;
   }
 
   template <class Count, class F>
   void launch_blocks(Count n, std::size_t most, std::size_t scratch_bytes, const F& f) const {
     void (*const kernel)(Count, std::size_t, F) = wfpg::detail::for_each_block_kernel<block, Count, F>;
-    constexpr std::size_t without_asking = 48 * 1024;
+    constexpr std::size_t without_asking = 32 * 1024;  // of 48 KiB, in which static arrays lie too
     if (scratch_bytes > without_asking)
       wfpg::detail::check_cuda(
           cudaFuncSetAttribute(reinterpret_cast<const void*>(kernel),
                                cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(scratch_bytes)),
           "cudaFuncSetAttribute for shared memory");
-    launch(kernel, most < resident() ? most : resident(), scratch_bytes, n, scratch_bytes, f);
+    launch(kernel, at_most_resident(most), scratch_bytes, n, scratch_bytes, f);
   }
 
   template <class... Parameters, class... Arguments>

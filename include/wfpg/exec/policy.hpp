@@ -1,5 +1,5 @@
 // What an execution policy is. Algorithms are templates over one and mention no backend; the policies are
-// exec/seq.hpp, exec/omp.hpp and exec/tbb.hpp.
+// exec/seq.hpp, exec/omp.hpp, exec/tbb.hpp and exec/cuda.hpp.
 //
 // A policy is a small copyable object that answers four questions:
 //
