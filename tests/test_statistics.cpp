@@ -156,13 +156,7 @@ TEST_CASE("statistics: tiles of two renderers", "[statistics]") {
   const tile_means truth = rendered(1.0, 1);
   INFO(check_unbiased(truth, rendered(1.0, 2)).message);
   CHECK(check_unbiased(truth, rendered(1.0, 2)));
-  const auto far = check_unbiased(truth, rendered(1.2, 3));
-  CHECK(!far);
-  INFO(far.message);
-  CHECK(far.message.find("standard errors apart") != std::string::npos);
+  check_names(check_unbiased(truth, rendered(1.2, 3)), {"standard errors apart"});
   // Too little for a single tile, whose mean has a standard error of 2%.
-  const auto near = check_unbiased(truth, rendered(1.02, 4));
-  CHECK(!near);
-  INFO(near.message);
-  CHECK(near.message.find("tiles together") != std::string::npos);
+  check_names(check_unbiased(truth, rendered(1.02, 4)), {"tiles together"});
 }

@@ -210,14 +210,10 @@ void run(const std::filesystem::path& directory) {
   std::printf(
       "\nerror: MSE after c / (1 + c); relmse: relative MSE without the worst 0.1%% of pixels; both less "
       "the\n"
-      "reference's own noise. ratio: error of pt / error; equal: the same at equal time. held, temp: memory "
-      "for\n"
-      "guiding, across samples and while one is in flight. bins: a sample, all depths, whose fields were "
-      "made.\n"
-      "cones: a path segment. Pictures, left to right pt, transient, wfpg, wfpg-product, reference, and "
-      "plots of error "
-      "over "
-      "time: %s\n",
+      "reference's own noise. ratio: error of pt / error; equal: the same at equal time. held, temp: memory\n"
+      "for guiding, across samples and while one is in flight. bins: a sample, all depths, whose fields\n"
+      "were made. cones: a path segment. Pictures, left to right pt, transient, wfpg, wfpg-product,\n"
+      "reference, and plots of error over time: %s\n",
       directory.string().c_str());
   std::ofstream file(directory / "summary.json");
   file << summary.dump(2) << '\n';

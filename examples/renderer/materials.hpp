@@ -77,9 +77,8 @@ struct bsdf {
       return {incident, reflects(outgoing, incident) ? 1.0f : 0.0f};
     }
     const float coat = glossy(outgoing).share;
-    const bool from_coat = u.x < coat;
-    u.x = from_coat ? u.x / coat : (u.x - coat) / (1.0f - coat);
-    wfpg::bsdf_sample drawn = sample_part(from_coat, outgoing, {glm::min(0x1.fffffep-1f, u.x), u.y});
+    const bool from_coat = chosen(u.x, coat);
+    wfpg::bsdf_sample drawn = sample_part(from_coat, outgoing, u);
     if (drawn.pdf > 0.0f && coat > 0.0f) drawn.pdf = pdf(outgoing, drawn.direction);
     return drawn;
   }
@@ -131,6 +130,14 @@ struct bsdf {
 
   WFPG_HD float relative_ior(float outgoing_cosine) const {
     return outgoing_cosine > 0.0f ? ior : 1.0f / ior;
+  }
+
+  /// True with a probability, from a number in [0,1), which is one again after it.
+  WFPG_HD static bool chosen(float& u, float probability) {
+    const bool is_chosen = u < probability;
+    u = is_chosen ? u / probability : (u - probability) / (1.0f - probability);
+    u = glm::min(0x1.fffffep-1f, u);
+    return is_chosen;
   }
 
   // How often a plastic's sample comes from its coat: as the two reflect, but neither is ever left out.
@@ -196,9 +203,8 @@ struct bsdf {
     const vec3 wo = side * local.to_local(outgoing);
     if (wo.z <= 0.0f) return {};
     const float eta = relative_ior(above), mirrors = mirror_probability(wo.z, eta);
-    const bool reflect = u.x < mirrors;
-    u.x = reflect ? u.x / mirrors : (u.x - mirrors) / (1.0f - mirrors);
-    const vec3 h = ggx{alpha}.sample(wo, {glm::min(0x1.fffffep-1f, u.x), u.y});
+    const bool reflect = chosen(u.x, mirrors);
+    const vec3 h = ggx{alpha}.sample(wo, u);
     const vec3 wi = reflect ? mirrored(wo, h) : refracted(wo, h, eta);
     if (wi.z == 0.0f || (wi.z > 0.0f) != reflect) return {};
     const vec3 incident = glm::normalize(local.to_world(side * wi));

@@ -146,8 +146,7 @@ class path_guider {
   void serve_transient(const wave<Surfaces, Random>& w, const Caster& caster, const Serve& serve);
   template <class Surfaces, class Random>
   detail::bin_fields<Surfaces> bin_wave(const wave<Surfaces, Random>& w);
-  template <class Surfaces, class Random>
-  product_points points_of(const wave<Surfaces, Random>& w);
+  product_points points_at(std::uint32_t depth);
   detail::mixture_fraction fraction() const;
   depth_statistics* depth_counts(std::uint32_t depth) {
     return counts_.data() + detail::min(depth, options_.max_depth - 1);

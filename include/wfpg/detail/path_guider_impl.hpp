@@ -125,15 +125,14 @@ std::uint32_t path_guider<Exec>::resolution_at(const guider_options& options, st
   return depth < 32 ? detail::max(options.field_resolution >> depth, least) : least;
 }
 
-/// Where this wave's products evaluate BSDFs.
+/// Where a wave's products evaluate BSDFs.
 template <class Exec>
-template <class Surfaces, class Random>
-product_points path_guider<Exec>::points_of(const wave<Surfaces, Random>& w) {
+product_points path_guider<Exec>::points_at(std::uint32_t depth) {
   const std::uint32_t p = options_.product_resolution;
   if (p == 0) return {};
   product_point* const hemisphere = product_points_.data();
   exec_.for_each(std::size_t(p) * p,
-                 detail::draw_product_points{hemisphere, hemisphere + p * p, p, wave_seed(w.depth)});
+                 detail::draw_product_points{hemisphere, hemisphere + p * p, p, wave_seed(depth)});
   return {hemisphere, hemisphere + p * p, p};
 }
 
@@ -206,9 +205,9 @@ guide_view path_guider<Exec>::keep_wave(const wave<Surfaces, Random>& w, const C
     store_.count(exec_, w.ray_count, detail::wave_rays<Surfaces>{w.surfaces, options_.mode});
     return {};
   }
-  const kept_field_wave<Surfaces> wave{w.ray_count,        w.surfaces,    cache_.view(),
-                                       options_.field,     options_.mode, fraction().with_enough_rays,
-                                       wave_seed(w.depth), points_of(w)};
+  const kept_field_wave<Surfaces> wave{w.ray_count,        w.surfaces,        cache_.view(),
+                                       options_.field,     options_.mode,     fraction().with_enough_rays,
+                                       wave_seed(w.depth), points_at(w.depth)};
   const guide_view view = store_.prepare(exec_, wave, caster, options_.caster_buffer_bytes);
   exec_.for_each(1, detail::add_kept_counts{store_.state(), store_.resolution() * store_.resolution(),
                                             store_.refresh_cones(), depth_counts(w.depth)});
@@ -225,7 +224,7 @@ void path_guider<Exec>::serve_transient(const wave<Surfaces, Random>& w, const C
     const auto fields = bin_wave(w);
     rest.ray_keys = fields.bins.ray_keys;
     const auto timed = clock_.time(detail::stage::fields);
-    const product_points points = points_of(w);
+    const product_points points = points_at(w.depth);
     const detail::transient_sink<Serve> sink{fields.bins, serve,
                                              fraction(),  fields.resolution,
                                              points,      {points.resolution, Exec::warps_per_block}};
@@ -254,7 +253,7 @@ guide_view path_guider<Exec>::make_resident(const wave<Surfaces, Random>& w, con
                                                field_of_ray_.data(), fraction(), fields.resolution},
                          0, options_.caster_buffer_bytes);
   return {{field_of_ray_.data(), w.ray_count},
-          {resident_fields_.data(), resident_words_.data(), fields.resolution, points_of(w)}};
+          {resident_fields_.data(), resident_words_.data(), fields.resolution, points_at(w.depth)}};
 }
 
 template <class Exec>
