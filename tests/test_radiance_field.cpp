@@ -183,7 +183,7 @@ made_fields make_fields(const lit_box<Exec>& box, const std::vector<test_surface
       exec, fields, caster,
       wfpg::detail::resident_sink{
           bins, words.data(), resident.data(), field_of_ray.data(), {0.5f, 0.5f, 0}, resolution},
-      0, buffer_bytes);
+      buffer_bytes);
   made_fields result{words.to_host(exec), field_of_ray.to_host(exec), resident.to_host(exec), {}};
   for (std::size_t bin = 0; bin < n; ++bin) result.orientations.push_back(bins.orientation(bin));
   return result;

@@ -20,8 +20,7 @@ struct finish_cells {
   wfpg::field_options options;
   template <class Block>
   void operator()(Block& block, std::size_t) const {
-    float* const scratch = block.template scratch<float>(std::size_t(resolution) * resolution);
-    wfpg::detail::finish_field(block, {words}, scratch, resolution, hemisphere, options);
+    wfpg::detail::finish_field(block, {words}, resolution, hemisphere, options);
   }
 };
 
@@ -33,7 +32,7 @@ std::vector<double> finished(const std::vector<float>& values, std::uint32_t res
   std::vector<std::uint32_t> host;
   for (float value : values) host.push_back(wfpg::detail::float_bits(value));
   const wfpg::buffer<std::uint32_t, Exec> words(exec, host);
-  exec.for_each_block(1, wfpg::detail::field_scratch_bytes(resolution),
+  exec.for_each_block(1, wfpg::detail::field_scratch_bytes(resolution, Exec::warps_per_block),
                       finish_cells{words.data(), int(resolution), hemisphere, options});
   const wfpg::grid_distribution grid(words.data(), resolution);
   std::vector<double> result;

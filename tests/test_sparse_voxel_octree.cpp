@@ -113,16 +113,12 @@ const wfpg::vec3 grid_origin(-3.0f, 10.0f, 0.5f);
 template <class Exec>
 wfpg::voxel_fragments<Exec> make_fragments(const Exec& exec, const std::vector<morton_code>& codes,
                                            std::uint32_t resolution) {
-  std::vector<float> areas(codes.size());
-  std::vector<std::uint32_t> normals(codes.size());
-  for (std::size_t i = 0; i < codes.size(); ++i) {
-    areas[i] = static_cast<float>(i);
-    normals[i] = static_cast<std::uint32_t>(7 * i);
-  }
+  std::vector<wfpg::fragment_surface> surfaces(codes.size());
+  for (std::size_t i = 0; i < codes.size(); ++i)
+    surfaces[i] = {static_cast<std::uint32_t>(7 * i), static_cast<float>(i)};
   wfpg::voxel_fragments<Exec> fragments;
   fragments.codes = wfpg::buffer<morton_code, Exec>(exec, codes);
-  fragments.areas = wfpg::buffer<float, Exec>(exec, areas);
-  fragments.normals = wfpg::buffer<std::uint32_t, Exec>(exec, normals);
+  fragments.surfaces = wfpg::buffer<wfpg::fragment_surface, Exec>(exec, surfaces);
   fragments.grid = {grid_origin, 2.5f, resolution};
   return fragments;
 }
@@ -207,13 +203,12 @@ WFPG_TEST_CASE("the build sorts fragments by voxel and keeps their order inside"
     std::stable_sort(order.begin(), order.end(),
                      [&](std::size_t a, std::size_t b) { return c.codes[a] < c.codes[b]; });
     const auto codes = fragments.codes.to_host(exec);
-    const auto areas = fragments.areas.to_host(exec);
-    const auto normals = fragments.normals.to_host(exec);
+    const auto surfaces = fragments.surfaces.to_host(exec);
     std::vector<std::uint32_t> begin;
     std::size_t wrong = 0;
     for (std::size_t i = 0; i < order.size(); ++i) {
-      wrong += codes[i] != c.codes[order[i]] || areas[i] != static_cast<float>(order[i]) ||
-               normals[i] != 7 * order[i];
+      wrong += codes[i] != c.codes[order[i]] || surfaces[i].area != static_cast<float>(order[i]) ||
+               surfaces[i].normal != 7 * order[i];
       if (i == 0 || codes[i] != codes[i - 1]) begin.push_back(static_cast<std::uint32_t>(i));
     }
     CHECK(wrong == 0);

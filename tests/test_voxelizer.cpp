@@ -40,10 +40,13 @@ struct fragments {
   template <class Exec>
   fragments(const Exec& exec, const wfpg::voxel_fragments<Exec>& device)
       : codes(device.codes.to_host(exec)),
-        normals(device.normals.to_host(exec)),
-        areas(device.areas.to_host(exec)),
         grid(device.grid),
-        report(device.report) {}
+        report(device.report) {
+    for (const wfpg::fragment_surface& s : device.surfaces.to_host(exec)) {
+      normals.push_back(s.normal);
+      areas.push_back(s.area);
+    }
+  }
   double area() const {
     double sum = 0.0;
     for (const float a : areas) sum += a;

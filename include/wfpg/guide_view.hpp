@@ -71,6 +71,24 @@ class guide_view {
     return product(detail::emulated_warp<8>(), ray, s, words);
   }
 
+  /// The same in two steps, that the lanes of a warp may each keep another ray's: the words by a warp, where
+  /// they are needed; and the mixture.
+  template <class Warp, class Bsdf>
+  WFPG_HD void weigh(const Warp& warp, std::uint32_t ray, const surface<Bsdf>& s,
+                     std::uint32_t* words) const {
+    if (!s.active || !guides(ray)) return;
+    const directional_field field = fields_.field(field_of_ray_[ray]);
+    if (detail::needs_weights(field, s)) detail::weigh_blocks(warp, field, fields_.points, s, words);
+  }
+  template <class Bsdf>
+  WFPG_HD product_mixture weighed(std::uint32_t ray, const surface<Bsdf>& s,
+                                  const std::uint32_t* words) const {
+    if (!guides(ray)) return {};
+    const std::uint32_t field = field_of_ray_[ray];
+    return {detail::weighed_product(fields_.field(field), product_resolution(), s, words),
+            fields_.fields[field].fraction};
+  }
+
   /// A direction and its density from the field alone. Precondition: guides(ray).
   WFPG_HD sampled_direction sample(std::uint32_t ray, vec2 u) const {
     sampled_direction result;

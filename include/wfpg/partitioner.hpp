@@ -9,11 +9,11 @@
 #include <wfpg/error.hpp>
 #include <wfpg/types.hpp>
 
-#include <thrust/copy.h>
 #include <thrust/fill.h>
-#include <thrust/scan.h>
+#include <thrust/functional.h>
+#include <thrust/iterator/counting_iterator.h>
 #include <thrust/sequence.h>
-#include <thrust/sort.h>
+#include <thrust/transform_scan.h>
 
 namespace wfpg {
 
@@ -34,12 +34,12 @@ struct partition_view {
 
 namespace detail {
 
-struct flag_group_starts {
+/// 1 for the first element of a group, 0 for the others.
+struct starts_key_group {
   array_view<const std::uint32_t> keys;
-  array_view<std::uint32_t> flags;
   std::uint32_t excluded;
-  WFPG_HD void operator()(std::size_t i) const {
-    flags[i] = keys[i] != excluded && (i == 0 || keys[i] != keys[i - 1]) ? 1u : 0u;
+  WFPG_HD std::uint32_t operator()(std::size_t i) const {
+    return keys[i] != excluded && (i == 0 || keys[i] != keys[i - 1]) ? 1u : 0u;
   }
 };
 
@@ -77,18 +77,19 @@ class partitioner {
         offsets_(exec, capacity + 1),
         count_(exec, 1) {}
 
-  /// Groups the indices [0, keys.size()) by their keys. Throws std::invalid_argument beyond the capacity. The
-  /// view holds until the next call.
-  partition_view partition(const Exec& exec, array_view<const std::uint32_t> keys) {
+  /// Groups the indices [0, keys.size()) by their keys: below 2^key_bits - 1, or `excluded`; fewer bits are
+  /// sorted sooner. Throws std::invalid_argument beyond the capacity. The view holds until the next call.
+  partition_view partition(const Exec& exec, array_view<const std::uint32_t> keys, int key_bits = 32) {
     const std::size_t n = keys.size();
     detail::require(n <= permutation_.size(), "number of keys", n, "at most the partitioner's capacity");
-    ::thrust::copy_n(exec.thrust(), keys.data(), n, keys_.data());
-    ::thrust::sequence(exec.thrust(), permutation_.data(), permutation_.data() + n);
-    ::thrust::stable_sort_by_key(exec.thrust(), keys_.data(), keys_.data() + n, permutation_.data());
-    const array_view<const std::uint32_t> sorted(keys_.data(), n);
     const array_view<std::uint32_t> through(group_through_.data(), n);
-    exec.for_each(n, detail::flag_group_starts{sorted, through, excluded});
-    ::thrust::inclusive_scan(exec.thrust(), through.begin(), through.end(), through.begin());
+    ::thrust::sequence(exec.thrust(), through.begin(), through.end());
+    exec.sort_pairs(n, key_bits, keys.data(), through.data(), keys_.data(), permutation_.data());
+    const array_view<const std::uint32_t> sorted(keys_.data(), n);
+    const ::thrust::counting_iterator<std::size_t> first(0);
+    ::thrust::transform_inclusive_scan(exec.thrust(), first, first + static_cast<std::ptrdiff_t>(n),
+                                       through.begin(), detail::starts_key_group{sorted, excluded},
+                                       ::thrust::plus<std::uint32_t>());
     ::thrust::fill_n(exec.thrust(), count_.data(), 1, 0u);
     ::thrust::fill_n(exec.thrust(), offsets_.data(), 1, 0u);
     exec.for_each(n, detail::write_group_offsets{sorted, through, excluded, offsets_.data(), count_.data()});

@@ -197,14 +197,18 @@ WFPG_HD bool has_product(const directional_field& field, const surface<Bsdf>& s,
            s.bsdf.glossy(s.outgoing).share == 0.0f;
 }
 
-/// Multiplies a field by a surface's BSDF, by one warp; `words` holds P². Weights are integers, scaled by the
-/// largest of them: alike on every width, and exact in every sum. Of a delta BSDF nothing is left.
+/// Whether a field is to be multiplied for a surface, block by block. Of a delta BSDF nothing would be left.
+template <class Bsdf>
+WFPG_HD bool needs_weights(const directional_field& field, const surface<Bsdf>& s) {
+  return !s.bsdf.is_delta() && !has_product(field, s, facing_normal(s));
+}
+
+/// Multiplies a field's blocks by a surface's BSDF, by one warp, into P² words. Weights are integers, scaled
+/// by the largest of them: alike on every width, and exact in every sum.
 template <class Warp, class Bsdf>
-WFPG_HD product_field multiply(const Warp& warp, const directional_field& field, const product_points& points,
-                               const surface<Bsdf>& s, std::uint32_t* words) {
-  if (s.bsdf.is_delta()) return {};
+WFPG_HD void weigh_blocks(const Warp& warp, const directional_field& field, const product_points& points,
+                          const surface<Bsdf>& s, std::uint32_t* words) {
   const vec3 up = facing_normal(s);
-  if (has_product(field, s, up)) return product_field(field);
   const std::uint32_t p = points.resolution, side = field.grid().resolution() / p;
   const auto n = static_cast<int>(p * p);
   const product_point* const local = field.hemisphere() ? points.hemisphere : points.sphere;
@@ -219,14 +223,29 @@ WFPG_HD product_field multiply(const Warp& warp, const directional_field& field,
     largest =
         warp.map([&](int lane) { return max(largest[lane], bits_float(words[(first + lane) & (n - 1)])); });
   const float brightest = warp.reduce(largest, [](float a, float b) { return max(a, b); });
-  if (!(brightest > 1.0e-25f)) return {};
-  const float scale = 0x1p31f / static_cast<float>(n) / brightest;
+  const float scale = brightest > 1.0e-25f ? 0x1p31f / static_cast<float>(n) / brightest : 0.0f;
   warp.inclusive_scan(n, words, [&](int i) {
     const float product = bits_float(words[i]);
-    return product > 0.0f ? max(static_cast<std::uint32_t>(product * scale), 1u) : 0u;
+    return product > 0.0f && scale > 0.0f ? max(static_cast<std::uint32_t>(product * scale), 1u) : 0u;
   });
   warp.sync();
-  return {field, p, words};
+}
+
+/// The product that weigh_blocks made where it was needed.
+template <class Bsdf>
+WFPG_HD product_field weighed_product(const directional_field& field, std::uint32_t resolution,
+                                      const surface<Bsdf>& s, const std::uint32_t* words) {
+  if (s.bsdf.is_delta()) return {};
+  if (has_product(field, s, facing_normal(s))) return product_field(field);
+  return words[resolution * resolution - 1] > 0 ? product_field(field, resolution, words) : product_field();
+}
+
+/// Multiplies a field by a surface's BSDF, by one warp; `words` holds P².
+template <class Warp, class Bsdf>
+WFPG_HD product_field multiply(const Warp& warp, const directional_field& field, const product_points& points,
+                               const surface<Bsdf>& s, std::uint32_t* words) {
+  if (needs_weights(field, s)) weigh_blocks(warp, field, points, s, words);
+  return weighed_product(field, points.resolution, s, words);
 }
 
 }  // namespace detail

@@ -4,11 +4,13 @@
 // scratch while their bin's rays are served, or in memory that the caller gives; the work on cells does not
 // know which.
 //
-// Cost: F² cones and O(F²) a bin; 8 F² bytes of scratch a block, and 4 P² a warp for products.
+// Cost: F² cones and O(F²) a bin; 4 F² bytes of scratch a block, and the more of a few rows for the filter
+// and 2 KiB a warp for products: at 128² and 16 warps less than the 99 KiB that small devices have.
 #pragma once
 
 #include <wfpg/bsdf.hpp>
 #include <wfpg/buffer.hpp>
+#include <wfpg/detail/field_filter.hpp>
 #include <wfpg/exitance_cache.hpp>
 #include <wfpg/field_sampler.hpp>
 #include <wfpg/product_sampler.hpp>
@@ -107,72 +109,18 @@ struct field_cells {
   }
 };
 
-/// A normalised Gaussian of a few taps on either side.
-struct gaussian_taps {
-  static constexpr int radius = 2;
-  float weights[radius + 1];
-
-  WFPG_HD explicit gaussian_taps(float alpha) {
-    float sum = 0.0f;
-    for (int i = 0; i <= radius; ++i) {
-      const float x = static_cast<float>(i) / alpha;
-      weights[i] = expf(-x * x);
-      sum += i ? 2.0f * weights[i] : weights[i];
-    }
-    for (float& w : weights) w /= sum;
-  }
-};
-
-/// The cell that a tap reads: across the sphere's edges as the sphere goes on, mirrored at the hemisphere's
-/// horizon.
-WFPG_HD inline int tap_index(int x, int y, int resolution, bool hemisphere) {
-  if (hemisphere) {
-    x = x < 0 ? -1 - x : (x >= resolution ? 2 * resolution - 1 - x : x);
-    y = y < 0 ? -1 - y : (y >= resolution ? 2 * resolution - 1 - y : y);
-  } else {
-    wrap_octahedral(x, y, resolution);
-  }
-  return y * resolution + x;
-}
-
-/// One direction of the separable filter. First as if the cells were one long row, which vectorises, and then
-/// again where taps leave the grid.
-template <class Block, class Get, class Set>
-WFPG_HD void filter_along(const Block& block, int resolution, bool hemisphere, const gaussian_taps& taps,
-                          bool along_x, const Get& get, const Set& set) {
-  constexpr int r = gaussian_taps::radius;
-  const int stride = along_x ? 1 : resolution;
-  const float w0 = taps.weights[0], w1 = taps.weights[1], w2 = taps.weights[2];
-  block.for_each(resolution * resolution - 2 * r * stride, [&](int inner) {
-    const int i = inner + r * stride;
-    set(i, w0 * get(i) + w1 * (get(i - stride) + get(i + stride)) +
-               w2 * (get(i - 2 * stride) + get(i + 2 * stride)));
-  });
-  block.sync();
-  block.for_each(2 * r * resolution, [&](int edge) {
-    const int across = edge / (2 * r);
-    const int along = edge % (2 * r) < r ? edge % (2 * r) : resolution - 2 * r + edge % (2 * r);
-    const int x = along_x ? along : across, y = along_x ? across : along;
-    const auto tap = [&](int d) {
-      return get(tap_index(along_x ? x + d : x, along_x ? y : y + d, resolution, hemisphere));
-    };
-    set(y * resolution + x, w0 * tap(0) + w1 * (tap(-1) + tap(1)) + w2 * (tap(-2) + tap(2)));
-  });
-  block.sync();
-}
-
-/// Filters, floors and scans F² cell values in place; `scratch` holds F² floats.
+/// Filters, floors and scans F² cell values in place. Takes field_scratch_bytes() of scratch memory, and
+/// gives it back.
 template <class Block>
-WFPG_HD grid_distribution finish_field(const Block& block, const cell_words& cells, float* scratch,
-                                       int resolution, bool hemisphere, const field_options& options) {
+WFPG_HD grid_distribution finish_field(Block& block, const cell_words& cells, int resolution, bool hemisphere,
+                                       const field_options& options) {
   if (options.filter_alpha > 0.0f && resolution >= 2 * gaussian_taps::radius) {
-    const gaussian_taps taps(hemisphere ? options.filter_alpha * 1.41421356f : options.filter_alpha);
-    filter_along(
-        block, resolution, hemisphere, taps, true, [&](int i) { return cells.get(i); },
-        [&](int i, float value) { scratch[i] = value; });
-    filter_along(
-        block, resolution, hemisphere, taps, false, [&](int i) { return scratch[i]; },
-        [&](int i, float value) { cells.set(i, value); });
+    const std::size_t before = block.scratch_used();
+    auto* const scratch = block.template scratch<float>(
+        field_filter::scratch_floats(static_cast<std::uint32_t>(resolution), Block::warps));
+    const float alpha = hemisphere ? options.filter_alpha * 1.41421356f : options.filter_alpha;
+    field_filter(cells, resolution, hemisphere, alpha).apply(block, scratch);
+    block.release_scratch(before);
   }
   float floor = options.floor;
   if (!options.absolute_floor) {
@@ -195,7 +143,8 @@ WFPG_HD vec3 off_surface(const surface<Bsdf>& s, const sparse_voxel_octree_view&
 ///   Surfaces  (std::uint32_t ray) -> surface<Bsdf>
 ///   Hits      (std::size_t bin, std::uint32_t cell, const ray&) -> ray_hit
 ///   Sink      words(block&, bin) -> std::uint32_t*, room for F²;
-///             finish(block&, bin, directional_field), by the whole block
+///             finish(block&, bin, directional_field), by the whole block;
+///             scratch_bytes(std::size_t making): what it takes, given what is free again when it finishes
 template <class Surfaces>
 struct bin_fields {
   bins_view bins;
@@ -225,7 +174,6 @@ struct bin_fields {
     const auto size = static_cast<int>(resolution);
     const field_cells cells(origin(bin), resolution);
     const cell_words words{sink.words(block, bin)};
-    float* const scratch = block.template scratch<float>(std::size_t(resolution) * resolution);
     block.for_each(size * size, [&](int i) {
       const auto cell = static_cast<std::uint32_t>(i);
       const ray cone = cells.cone(cell);
@@ -234,7 +182,7 @@ struct bin_fields {
     });
     block.sync();
     const bool hemisphere = cells.origin.hemisphere;
-    const grid_distribution grid = finish_field(block, words, scratch, size, hemisphere, options);
+    const grid_distribution grid = finish_field(block, words, size, hemisphere, options);
     sink.finish(block, bin,
                 hemisphere ? directional_field(grid, cells.origin.normal) : directional_field(grid));
   }
@@ -284,9 +232,9 @@ struct write_cones {
   }
 };
 
-/// Scratch that make_fields needs beside what its sink takes.
-inline std::size_t field_scratch_bytes(std::uint32_t resolution) {
-  return sizeof(float) * resolution * resolution + 16;
+/// Scratch that finish_field needs, of blocks of so many warps.
+inline std::size_t field_scratch_bytes(std::uint32_t resolution, int warps) {
+  return sizeof(float) * field_filter::scratch_floats(resolution, warps) + 16;
 }
 
 /// Makes the field of every bin and hands it to the sink. An inline caster is called in place; a batch caster
@@ -294,8 +242,9 @@ inline std::size_t field_scratch_bytes(std::uint32_t resolution) {
 /// number of bins.
 template <class Exec, class Surfaces, class Caster, class Sink>
 void for_each_field(const Exec& exec, const bin_fields<Surfaces>& fields, const Caster& caster,
-                    const Sink& sink, std::size_t sink_scratch, std::size_t buffer_bytes) {
-  const std::size_t scratch = field_scratch_bytes(fields.resolution) + sink_scratch;
+                    const Sink& sink, std::size_t buffer_bytes) {
+  const std::size_t scratch =
+      sink.scratch_bytes(field_scratch_bytes(fields.resolution, Exec::warps_per_block));
   if constexpr (is_inline_caster_v<Caster>) {
     const exec::device_count bins{fields.bins.count, fields.bins.permutation.size()};
     exec.for_each_block(bins, scratch,

@@ -15,10 +15,9 @@
 #include <wfpg/voxelizer.hpp>
 
 #include <thrust/fill.h>
-#include <thrust/iterator/zip_iterator.h>
-#include <thrust/scan.h>
-#include <thrust/sort.h>
-#include <thrust/tuple.h>
+#include <thrust/functional.h>
+#include <thrust/iterator/counting_iterator.h>
+#include <thrust/transform_scan.h>
 
 #include <cmath>
 #include <vector>
@@ -173,87 +172,117 @@ class sparse_voxel_octree_view {
 
 namespace detail {
 
-struct starts_group {
+/// 1 for the first of the fragments of a voxel, 0 for the others.
+struct starts_voxel {
   array_view<const morton_code> codes;
-  array_view<std::uint32_t> heads;
-  int shift;  // codes that agree above this bit are one group
-  WFPG_HD void operator()(std::size_t i) const {
-    heads[i] = i == 0 || codes[i] >> shift != codes[i - 1] >> shift ? 1u : 0u;
+  WFPG_HD std::uint32_t operator()(std::size_t i) const {
+    return i == 0 || codes[i] != codes[i - 1] ? 1u : 0u;
   }
 };
 
-/// Gathers the code of each group, given the 1-based group of each element.
-struct gather_groups {
+/// The voxels of sorted fragments, given for each fragment how many voxels have begun.
+struct gather_voxels {
   array_view<const morton_code> codes;
-  array_view<const std::uint32_t> group_through;
-  int shift;
-  array_view<morton_code> group_codes;
-  array_view<std::uint32_t> group_begin;
+  array_view<const std::uint32_t> voxels_through;
+  array_view<morton_code> voxel_codes;
+  array_view<std::uint32_t> fragment_begin;
   WFPG_HD void operator()(std::size_t i) const {
-    const std::uint32_t group = group_through[i] - 1;
-    if (i > 0 && group_through[i - 1] == group_through[i]) return;
-    group_codes[group] = codes[i] >> shift;
-    group_begin[group] = static_cast<std::uint32_t>(i);
+    const std::uint32_t voxel = voxels_through[i] - 1;
+    if (i > 0 && voxels_through[i - 1] == voxels_through[i]) return;
+    voxel_codes[voxel] = codes[i];
+    fragment_begin[voxel] = static_cast<std::uint32_t>(i);
   }
 };
 
+/// Every level of the octree over its leaves, one level after the other: element l · leaves + i is the node
+/// of level l that holds leaf i. The first element of each node stands for it, and counting those numbers the
+/// nodes.
+struct level_elements {
+  array_view<const morton_code> leaf_codes;
+  std::uint32_t depth;
+
+  WFPG_HD std::uint32_t leaves() const { return static_cast<std::uint32_t>(leaf_codes.size()); }
+  WFPG_HD std::uint32_t operator()(std::uint32_t element) const {
+    return starts(element / leaves(), element % leaves()) ? 1u : 0u;
+  }
+  WFPG_HD bool starts(std::uint32_t level, std::uint32_t leaf) const {
+    return leaf == 0 || (leaf_codes[leaf] ^ leaf_codes[leaf - 1]) >> 3 * (depth - level) != 0;
+  }
+};
+
+struct gather_level_ends {
+  array_view<const std::uint32_t> nodes_through;  // an element of the levels
+  std::uint32_t leaves;
+  node_id* ends;
+  WFPG_HD void operator()(std::size_t level) const { ends[level] = nodes_through[(level + 1) * leaves - 1]; }
+};
+
+/// Links each node with its parent, and remembers its first leaf.
 struct link_nodes {
-  array_view<const morton_code> codes;
-  array_view<const std::uint32_t> parent_through;
-  node_id level_begin, parent_level_begin;
+  level_elements levels;
+  array_view<const std::uint32_t> nodes_through;
   node_id* parents;
   node_id* first_children;
-  std::uint8_t* child_masks;
+  std::uint32_t* first_leaf_of;  // a node: counted from the first leaf
+
   WFPG_HD void operator()(std::size_t i) const {
-    const node_id up = parent_level_begin + parent_through[i] - 1;
-    parents[level_begin + i] = up;
-    if (i > 0 && parent_through[i - 1] == parent_through[i]) return;
+    const auto element = static_cast<std::uint32_t>(i);
+    const std::uint32_t level = element / levels.leaves(), leaf = element % levels.leaves();
+    if (!levels.starts(level, leaf)) return;
+    const node_id node = nodes_through[element] - 1;
+    first_leaf_of[node] = leaf;
+    parents[node] = invalid_node;
+    if (level == 0) return;
+    const node_id up = nodes_through[element - levels.leaves()] - 1;
+    parents[node] = up;
+    if (levels.starts(level - 1, leaf)) first_children[up] = node;
+  }
+};
+
+/// Which octants the children of an inner node are in. They end where those of the next node begin.
+struct find_child_masks {
+  array_view<const morton_code> leaf_codes;
+  const std::uint32_t* first_leaf_of;
+  array_view<const node_id> first_children;
+  node_id node_count;
+  sparse_voxel_octree_view tree;  // its levels
+  std::uint8_t* child_masks;
+
+  WFPG_HD void operator()(std::size_t node) const {
+    const std::uint32_t shift =
+        3 * (tree.depth() - 1 - tree.level_of(static_cast<node_id>(node)));  // below the children's octants
+    const node_id end = node + 1 < first_children.size() ? first_children[node + 1] : node_count;
     std::uint32_t mask = 0;
-    for (std::size_t j = i; j < codes.size() && parent_through[j] == parent_through[i]; ++j)
-      mask |= 1u << (codes[j] & 7u);
-    first_children[up] = static_cast<node_id>(level_begin + i);
-    child_masks[up] = static_cast<std::uint8_t>(mask);
+    for (node_id child = first_children[node]; child < end; ++child)
+      mask |= 1u << (leaf_codes[first_leaf_of[child]] >> shift & 7u);
+    child_masks[node] = static_cast<std::uint8_t>(mask);
   }
 };
 
 /// A level's nodes by their coordinates.
 struct fill_top {
-  array_view<const morton_code> codes;
+  array_view<const morton_code> leaf_codes;
+  const std::uint32_t* first_leaf_of;
   node_id level_begin;
-  std::uint32_t level;
+  std::uint32_t level, depth;
   node_id* top;
   WFPG_HD void operator()(std::size_t i) const {
-    const uvec3 p = morton_decode(codes[i]);
-    top[p.x | p.y << level | p.z << 2 * level] = level_begin + static_cast<node_id>(i);
-  }
-};
-
-/// Sorted codes to their distinct prefixes: what each element's group is, what the groups' codes and
-/// beginnings are.
-template <class Exec>
-struct code_groups {
-  buffer<std::uint32_t, Exec> through;  ///< an element: its group, counted from 1
-  buffer<morton_code, Exec> codes;      ///< a group
-  buffer<std::uint32_t, Exec> begin;    ///< a group: its first element
-
-  code_groups() = default;
-  code_groups(const Exec& exec, array_view<const morton_code> sorted, int shift)
-      : through(exec, sorted.size()) {
-    exec.for_each(sorted.size(), starts_group{sorted, through.view(), shift});
-    ::thrust::inclusive_scan(exec.thrust(), through.data(), through.data() + sorted.size(), through.data());
-    const std::size_t n = sorted.empty() ? 0 : read_element(exec, through.data() + sorted.size() - 1);
-    codes = buffer<morton_code, Exec>(exec, n);
-    begin = buffer<std::uint32_t, Exec>(exec, n);
-    exec.for_each(sorted.size(), gather_groups{sorted, through.view(), shift, codes.view(), begin.view()});
+    const node_id node = level_begin + static_cast<node_id>(i);
+    const uvec3 p = morton_decode(leaf_codes[first_leaf_of[node]] >> 3 * (depth - level));
+    top[p.x | p.y << level | p.z << 2 * level] = node;
   }
 };
 
 /// Fragments in the order of their codes; those of one voxel keep their order.
 template <class Exec>
 void sort_fragments(const Exec& exec, voxel_fragments<Exec>& fragments) {
-  ::thrust::stable_sort_by_key(
-      exec.thrust(), fragments.codes.data(), fragments.codes.data() + fragments.size(),
-      ::thrust::make_zip_iterator(::thrust::make_tuple(fragments.normals.data(), fragments.areas.data())));
+  const std::size_t n = fragments.size();
+  buffer<morton_code, Exec> codes(exec, n);
+  buffer<fragment_surface, Exec> surfaces(exec, n);
+  const int bits = max(3 * (bits_of(fragments.grid.resolution) - 1), 1);
+  exec.sort_pairs(n, bits, fragments.codes.data(), fragments.surfaces.data(), codes.data(), surfaces.data());
+  fragments.codes.swap(codes);
+  fragments.surfaces.swap(surfaces);
 }
 
 }  // namespace detail
@@ -271,8 +300,7 @@ class sparse_voxel_octree {
     view_.grid_ = fragments.grid;
     while (1u << view_.depth_ < fragments.grid.resolution) ++view_.depth_;
     detail::sort_fragments(exec, fragments);
-    leaf_fragments_ = detail::code_groups<Exec>(exec, fragments.codes.view(), 0);
-    build_levels(exec);
+    build_levels(exec, find_leaves(exec, fragments));
   }
 
   sparse_voxel_octree_view view() const { return view_; }
@@ -285,39 +313,60 @@ class sparse_voxel_octree {
 
   /// Where each leaf's fragments begin in the sorted order, until release_build_data(); a leaf's index counts
   /// from the first leaf.
-  array_view<const std::uint32_t> leaf_fragment_begin() const { return leaf_fragments_.begin.view(); }
+  array_view<const std::uint32_t> leaf_fragment_begin() const { return leaf_fragment_begin_.view(); }
   /// Frees what only building the cache needs.
-  void release_build_data() { leaf_fragments_ = {}; }
+  void release_build_data() { leaf_fragment_begin_ = {}; }
 
  private:
-  void build_levels(const Exec& exec) {
-    const std::uint32_t depth = view_.depth_;
-    std::vector<detail::code_groups<Exec>> up(depth);  // up[l]: level l + 1 grouped into the nodes of level l
-    array_view<const morton_code> codes = leaf_fragments_.codes.view();
-    std::vector<array_view<const morton_code>> level_codes(depth + 1);
-    level_codes[depth] = codes;
-    for (std::uint32_t level = depth; level-- > 0;) {
-      up[level] = detail::code_groups<Exec>(exec, level_codes[level + 1], 3);
-      level_codes[level] = up[level].codes.view();
-    }
-    std::uint64_t total = 0;
-    for (std::uint32_t level = 0; level <= depth; ++level) {
-      view_.level_begin_[level] = static_cast<node_id>(total);
-      total += level_codes[level].size();
-    }
-    detail::require(total < invalid_node, "number of octree nodes", total, "less than 2^32 - 1");
-    for (std::uint32_t level = depth + 1; level < sparse_voxel_octree_view::max_depth + 2; ++level)
-      view_.level_begin_[level] = static_cast<node_id>(total);
+  /// The codes of the fragments' voxels.
+  buffer<morton_code, Exec> find_leaves(const Exec& exec, const voxel_fragments<Exec>& fragments) {
+    const std::size_t n = fragments.size();
+    const array_view<const morton_code> codes = fragments.codes.view();
+    const buffer<std::uint32_t, Exec> through(exec, n);
+    const ::thrust::counting_iterator<std::size_t> first(0);
+    ::thrust::transform_inclusive_scan(exec.thrust(), first, first + static_cast<std::ptrdiff_t>(n),
+                                       through.data(), detail::starts_voxel{codes},
+                                       ::thrust::plus<std::uint32_t>());
+    const std::size_t leaves = n > 0 ? read_element(exec, through.data() + n - 1) : 0;
+    buffer<morton_code, Exec> leaf_codes(exec, leaves);
+    leaf_fragment_begin_ = buffer<std::uint32_t, Exec>(exec, leaves);
+    exec.for_each(
+        n, detail::gather_voxels{codes, through.view(), leaf_codes.view(), leaf_fragment_begin_.view()});
+    return leaf_codes;
+  }
+
+  void build_levels(const Exec& exec, const buffer<morton_code, Exec>& leaf_codes) {
+    const std::uint64_t element_count = std::uint64_t(view_.depth_ + 1) * leaf_codes.size();
+    detail::require(element_count < invalid_node, "number of leaves times levels", element_count,
+                    "less than 2^32 - 1");
+    const auto elements = static_cast<std::uint32_t>(element_count);
+    const detail::level_elements levels{leaf_codes.view(), view_.depth_};
+    const buffer<std::uint32_t, Exec> through(exec, elements);
+    const ::thrust::counting_iterator<std::uint32_t> first(0);
+    ::thrust::transform_inclusive_scan(exec.thrust(), first, first + elements, through.data(), levels,
+                                       ::thrust::plus<std::uint32_t>());
+    find_level_ends(exec, through, levels.leaves());
     allocate(exec);
-    for (std::uint32_t level = 1; level <= depth; ++level)
-      exec.for_each(level_codes[level].size(),
-                    detail::link_nodes{level_codes[level], up[level - 1].through.view(),
-                                       view_.level_begin_[level], view_.level_begin_[level - 1],
-                                       parents_.data(), first_children_.data(), child_masks_.data()});
+    const buffer<std::uint32_t, Exec> first_leaf_of(exec, view_.node_count());
+    exec.for_each(elements, detail::link_nodes{levels, through.view(), parents_.data(),
+                                               first_children_.data(), first_leaf_of.data()});
+    exec.for_each(first_children_.size(),
+                  detail::find_child_masks{leaf_codes.view(), first_leaf_of.data(), first_children_.view(),
+                                           view_.node_count(), view_, child_masks_.data()});
     const std::uint32_t top = view_.top_level_;
     ::thrust::fill_n(exec.thrust(), top_.data(), top_.size(), invalid_node);
-    exec.for_each(level_codes[top].size(),
-                  detail::fill_top{level_codes[top], view_.level_begin_[top], top, top_.data()});
+    exec.for_each(view_.level_begin_[top + 1] - view_.level_begin_[top],
+                  detail::fill_top{leaf_codes.view(), first_leaf_of.data(), view_.level_begin_[top], top,
+                                   view_.depth_, top_.data()});
+  }
+
+  void find_level_ends(const Exec& exec, const buffer<std::uint32_t, Exec>& through, std::uint32_t leaves) {
+    if (leaves == 0) return;
+    const buffer<node_id, Exec> ends(exec, view_.depth_ + 1);
+    exec.for_each(ends.size(), detail::gather_level_ends{through.view(), leaves, ends.data()});
+    const std::vector<node_id> host = ends.to_host(exec);
+    for (std::uint32_t level = 1; level < sparse_voxel_octree_view::max_depth + 2; ++level)
+      view_.level_begin_[level] = host[detail::min(level - 1, view_.depth_)];
   }
 
   void allocate(const Exec& exec) {
@@ -333,15 +382,13 @@ class sparse_voxel_octree {
     while (view_.top_level_ > 0 && (4ull << 3 * view_.top_level_) > view_.node_count()) --view_.top_level_;
     top_ = buffer<node_id, Exec>(exec, std::size_t(1) << 3 * view_.top_level_);
     view_.top_ = top_.data();
-    const node_id none = invalid_node;
-    exec.copy_from_host(parents_.data(), &none, sizeof none);
   }
 
   buffer<node_id, Exec> parents_;
   buffer<node_id, Exec> first_children_;
   buffer<std::uint8_t, Exec> child_masks_;
   buffer<node_id, Exec> top_;
-  detail::code_groups<Exec> leaf_fragments_;
+  buffer<std::uint32_t, Exec> leaf_fragment_begin_;
   sparse_voxel_octree_view view_;
 };
 

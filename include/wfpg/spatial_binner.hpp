@@ -148,7 +148,7 @@ class spatial_binner {
       exec.for_each(tree_.level_begin(level + 1) - tree_.level_begin(level),
                     detail::sum_children{tree_, tree_.level_begin(level), node_counts_.data()});
     exec.for_each(n, detail::ascend_to_marked{tree_, node_counts_.data(), options_, keys});
-    return {partitioner_.partition(exec, keys), keys};
+    return {partitioner_.partition(exec, keys, detail::bits_of(tree_.node_count() * orientations)), keys};
   }
 
   /// Active rays of the last call that lie outside every voxel, in the policy's memory.

@@ -66,20 +66,25 @@ struct build_report {
   std::uint32_t skipped() const { return non_finite + out_of_range + degenerate; }
 };
 
+/// The surface of a voxel fragment.
+struct fragment_surface {
+  std::uint32_t normal;  ///< pack_direction
+  float area;            ///< inside the voxel, square scene units
+};
+
 /// Voxel fragments in the policy's memory, one for each pair of a voxel and a piece of surface that touches
 /// it.
 template <class Exec>
 struct voxel_fragments {
   buffer<morton_code, Exec> codes;
-  buffer<std::uint32_t, Exec> normals;  ///< pack_direction
-  buffer<float, Exec> areas;            ///< inside the voxel, square scene units
+  buffer<fragment_surface, Exec> surfaces;
   voxel_grid grid;
   build_report report;
 
   voxel_fragments() = default;
-  voxel_fragments(const Exec& exec, std::size_t n) : codes(exec, n), normals(exec, n), areas(exec, n) {}
+  voxel_fragments(const Exec& exec, std::size_t n) : codes(exec, n), surfaces(exec, n) {}
   std::size_t size() const { return codes.size(); }
-  std::size_t bytes() const { return codes.bytes() + normals.bytes() + areas.bytes(); }
+  std::size_t bytes() const { return codes.bytes() + surfaces.bytes(); }
 };
 
 namespace detail {
@@ -224,16 +229,14 @@ struct emit_fragments {
   item_voxels voxels;
   array_view<const std::uint64_t> fragments_through;
   array_view<morton_code> codes;
-  array_view<std::uint32_t> normals;
-  array_view<float> areas;
+  array_view<fragment_surface> surfaces;
 
   WFPG_HD void operator()(std::size_t item) const {
     std::uint64_t at = item ? fragments_through[item - 1] : 0;
     const float voxel = voxels.reader.grid.voxel_size();
     voxels.for_each(item, [&](vec3 normal, uvec3 coordinates, const grid_triangle& local) {
       codes[at] = morton_encode(coordinates);
-      normals[at] = pack_direction(normal);
-      areas[at] = area_inside(local) * voxel * voxel;
+      surfaces[at] = {pack_direction(normal), area_inside(local) * voxel * voxel};
       ++at;
     });
   }
@@ -286,8 +289,8 @@ voxel_fragments<Exec> voxelize(const Exec& exec, triangle_mesh_view mesh, std::u
   detail::require_fragment_count(fragment_count);
 
   voxel_fragments<Exec> result(exec, fragment_count);
-  exec.for_each(item_count, detail::emit_fragments{voxels, counts.view(), result.codes.view(),
-                                                   result.normals.view(), result.areas.view()});
+  exec.for_each(item_count,
+                detail::emit_fragments{voxels, counts.view(), result.codes.view(), result.surfaces.view()});
   result.grid = reader.grid;
   result.report = detail::read_report(exec, counters);
   return result;
@@ -331,8 +334,7 @@ struct emit_samples {
   voxel_grid grid;
   array_view<const std::uint64_t> used_through;
   array_view<morton_code> codes;
-  array_view<std::uint32_t> normals;
-  array_view<float> areas;
+  array_view<fragment_surface> surfaces;
 
   WFPG_HD void operator()(std::size_t i) const {
     const std::uint64_t at = i ? used_through[i - 1] : 0;
@@ -340,8 +342,7 @@ struct emit_samples {
     uvec3 voxel(0u);
     grid.voxel_of(samples[i].position, voxel);
     codes[at] = morton_encode(voxel);
-    normals[at] = pack_direction(glm::normalize(samples[i].normal));
-    areas[at] = samples[i].area;
+    surfaces[at] = {pack_direction(glm::normalize(samples[i].normal)), samples[i].area};
   }
 };
 
@@ -368,8 +369,8 @@ voxel_fragments<Exec> fragments_from_samples(const Exec& exec, array_view<const 
   buffer<std::uint64_t, Exec> used(exec, n);
   exec.for_each(n, detail::check_samples{samples, grid, used.view(), counters.data()});
   voxel_fragments<Exec> result(exec, detail::sum_through(exec, used));
-  exec.for_each(n, detail::emit_samples{samples, grid, used.view(), result.codes.view(),
-                                        result.normals.view(), result.areas.view()});
+  exec.for_each(
+      n, detail::emit_samples{samples, grid, used.view(), result.codes.view(), result.surfaces.view()});
   result.grid = grid;
   result.report = detail::read_report(exec, counters);
   return result;

@@ -14,6 +14,7 @@ template <int W>
 class cpu_block {
  public:
   using warp = emulated_warp<W>;
+  static constexpr int warps = 1;
 
   WFPG_HD cpu_block(std::byte* scratch, std::size_t bytes) : scratch_(scratch), bytes_(bytes) {}
 
@@ -23,7 +24,7 @@ class cpu_block {
     for (int i = 0; i < n; ++i) f(i);
   }
 
-  /// f(warp, i) for i in [0, n): each i is one warp's. warp.index() is below the policy's warps_per_block.
+  /// f(warp, i) for i in [0, n): each i is one warp's. warp.index() is below `warps`.
   template <class F>
   WFPG_HD void for_each_warp(int n, F f) const {
     const warp all;
@@ -42,6 +43,10 @@ class cpu_block {
     assert(used_ <= bytes_);
     return reinterpret_cast<T*>(result);
   }
+
+  /// Scratch memory taken, and giving back what was taken since: the team is done with it.
+  WFPG_HD std::size_t scratch_used() const { return used_; }
+  WFPG_HD void release_scratch(std::size_t used) { used_ = used; }
 
   /// Sum of f(i) for i in [0, n), given to all; W partial sums, so that floats add up alike on any team.
   template <class F>

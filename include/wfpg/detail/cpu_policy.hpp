@@ -3,7 +3,11 @@
 
 #include <wfpg/buffer.hpp>
 #include <wfpg/detail/cpu_block.hpp>
+#include <wfpg/detail/thrust.hpp>
 #include <wfpg/exec/policy.hpp>
+
+#include <thrust/copy.h>
+#include <thrust/sort.h>
 
 #include <cstddef>
 #include <cstring>
@@ -37,6 +41,15 @@ class cpu_policy {
   }
   void copy_from_host(void* to, const void* from, std::size_t bytes) const {
     if (bytes) std::memcpy(to, from, bytes);
+  }
+
+  /// Sorts n pairs stably by their keys, whose number of bits Thrust's sorts here have no use for.
+  template <class Key, class Value>
+  void sort_pairs(std::size_t n, int, const Key* keys, const Value* values, Key* sorted_keys,
+                  Value* sorted_values) const {
+    ::thrust::copy_n(self().thrust(), keys, n, sorted_keys);
+    ::thrust::copy_n(self().thrust(), values, n, sorted_values);
+    ::thrust::stable_sort_by_key(self().thrust(), sorted_keys, sorted_keys + n, sorted_values);
   }
 
   /// f(i) for each i in [0, n), in no order.

@@ -90,6 +90,7 @@ template <int Warps>
 class cuda_block {
  public:
   using warp = cuda_warp;
+  static constexpr int warps = Warps;
   static constexpr int threads = Warps * warp::width;
 
   __device__ cuda_block(std::byte* scratch, std::size_t) : scratch_(scratch) {}
@@ -111,6 +112,9 @@ class cuda_block {
     used_ += (n * sizeof(T) + 15) / 16 * 16;
     return reinterpret_cast<T*>(result);
   }
+
+  __device__ std::size_t scratch_used() const { return used_; }
+  __device__ void release_scratch(std::size_t used) { used_ = used; }
 
   /// By threads, warps and the warps' sums in order: the same on every run.
   template <class F>

@@ -201,7 +201,7 @@ void field_store<Exec>::build(const Exec& exec, const Builder& builder, const Ca
     using build_type = detail::build_kept_fields<Builder, detail::inline_hits<Caster>>;
     for (const bool whole : {true, false})
       exec.for_each_block(exec::device_count{counts[whole], capacity_},
-                          detail::field_scratch_bytes(options_.resolution),
+                          detail::field_scratch_bytes(options_.resolution, Exec::warps_per_block),
                           build_type{builder, {caster}, listed(whole), whole});
   } else {
     const std::uint32_t cells = builder.cone_count(true);
@@ -229,7 +229,7 @@ void field_store<Exec>::build_batches(const Exec& exec, const Builder& builder, 
     caster.cast(exec, array_view<const ray>(cones.data(), n * cones_a_field),
                 array_view<ray_hit>(hits.data(), n * cones_a_field));
     const detail::stored_hits found{hits, 0, cones_a_field};
-    exec.for_each_block(n, detail::field_scratch_bytes(options_.resolution),
+    exec.for_each_block(n, detail::field_scratch_bytes(options_.resolution, Exec::warps_per_block),
                         detail::build_kept_fields<Builder, detail::stored_hits>{builder, found, list, whole});
   }
 }

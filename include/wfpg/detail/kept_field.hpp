@@ -67,14 +67,13 @@ struct kept_field_builder {
     const auto size = static_cast<int>(kept.resolution);
     const cone_hit* const hits = kept.hits + std::size_t(slot) * kept.resolution * kept.resolution;
     const cell_words words{kept.words + std::size_t(slot) * kept.resolution * kept.resolution};
-    float* const scratch = block.template scratch<float>(std::size_t(size) * std::size_t(size));
     block.for_each(size * size, [&](int cell) {
       const float radiance = hits[cell].radiance(wave.cache);
       words.set(cell, radiance * cells.central_cosine(static_cast<std::uint32_t>(cell)));
     });
     block.sync();
     const bool hemisphere = cells.origin.hemisphere;
-    finish_field(block, words, scratch, size, hemisphere, wave.options);
+    finish_field(block, words, size, hemisphere, wave.options);
     block.for_each(1, [&](int) {
       kept.fields[slot] = {cells.origin.normal, wave.fraction, hemisphere};
       field_slot& state = kept.slots[slot];

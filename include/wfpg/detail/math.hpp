@@ -37,6 +37,13 @@ WFPG_HD constexpr std::uint32_t popcount8(std::uint32_t bits) {
   return (bits + (bits >> 4)) & 0x0fu;
 }
 
+/// How many bits a number has: the least b with x < 2^b.
+WFPG_HD constexpr int bits_of(std::uint32_t x) {
+  int bits = 0;
+  for (; x > 0; x >>= 1) ++bits;
+  return bits;
+}
+
 template <class T>
 WFPG_HD constexpr T min(T a, T b) {
   return b < a ? b : a;

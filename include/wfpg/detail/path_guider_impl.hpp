@@ -179,9 +179,8 @@ void path_guider<Exec>::sample_directions(const wave<Surfaces, Random>& w, const
   if (view.product_resolution() == 0) {
     exec_.for_each(w.ray_count, detail::serve_view<decltype(serve)>{serve, view});
   } else {
-    const detail::serve_products<decltype(serve)> products{
-        serve, view, w.ray_count, {view.product_resolution(), Exec::warps_per_block}};
-    exec_.for_each_block(products.blocks(), products.scratch.bytes(), products);
+    const detail::serve_products<decltype(serve)> products{serve, view, w.ray_count};
+    exec_.for_each_block(products.blocks(), detail::product_scratch::bytes(Exec::warps_per_block), products);
   }
 }
 
@@ -225,10 +224,9 @@ void path_guider<Exec>::serve_transient(const wave<Surfaces, Random>& w, const C
     rest.ray_keys = fields.bins.ray_keys;
     const auto timed = clock_.time(detail::stage::fields);
     const product_points points = points_at(w.depth);
-    const detail::transient_sink<Serve> sink{fields.bins, serve,
-                                             fraction(),  fields.resolution,
-                                             points,      {points.resolution, Exec::warps_per_block}};
-    detail::for_each_field(exec_, fields, caster, sink, sink.scratch_bytes(), options_.caster_buffer_bytes);
+    const detail::transient_sink<Serve> sink{fields.bins,       serve,  fraction(),
+                                             fields.resolution, points, Exec::warps_per_block};
+    detail::for_each_field(exec_, fields, caster, sink, options_.caster_buffer_bytes);
   }
   const auto timed = clock_.time(detail::stage::serve);
   exec_.for_each(w.ray_count, rest);
@@ -251,7 +249,7 @@ guide_view path_guider<Exec>::make_resident(const wave<Surfaces, Random>& w, con
   detail::for_each_field(exec_, fields, caster,
                          detail::resident_sink{fields.bins, resident_words_.data(), resident_fields_.data(),
                                                field_of_ray_.data(), fraction(), fields.resolution},
-                         0, options_.caster_buffer_bytes);
+                         options_.caster_buffer_bytes);
   return {{field_of_ray_.data(), w.ray_count},
           {resident_fields_.data(), resident_words_.data(), fields.resolution, points_at(w.depth)}};
 }

@@ -65,21 +65,20 @@ WFPG_HD vec3 dominant_normal(const Members& members, std::uint32_t n) {
 
 struct leaf_normals {
   array_view<const std::uint32_t> fragment_begin;  // a leaf
-  array_view<const std::uint32_t> fragment_normals;
-  array_view<const float> fragment_areas;
+  array_view<const fragment_surface> fragments;
   node_id first_leaf;
   array_view<std::uint16_t> normals;
   array_view<float> areas;
 
   WFPG_HD void operator()(std::size_t leaf) const {
     const std::size_t begin = fragment_begin[leaf];
-    const std::size_t end =
-        leaf + 1 < fragment_begin.size() ? fragment_begin[leaf + 1] : fragment_areas.size();
+    const std::size_t end = leaf + 1 < fragment_begin.size() ? fragment_begin[leaf + 1] : fragments.size();
     const auto member = [&](std::uint32_t i) {
-      return weighted_normal{unpack_direction(fragment_normals[begin + i]), fragment_areas[begin + i]};
+      const fragment_surface f = fragments[begin + i];
+      return weighted_normal{unpack_direction(f.normal), f.area};
     };
     float area = 0.0f;
-    for (std::size_t i = begin; i < end; ++i) area += fragment_areas[i];
+    for (std::size_t i = begin; i < end; ++i) area += fragments[i].area;
     normals[first_leaf + leaf] =
         pack_voxel_normal(dominant_normal(member, static_cast<std::uint32_t>(end - begin)));
     areas[first_leaf + leaf] = area;
@@ -127,9 +126,8 @@ void build_voxel_normals(const Exec& exec, const sparse_voxel_octree<Exec>& tree
                          const voxel_fragments<Exec>& fragments, array_view<std::uint16_t> normals) {
   const sparse_voxel_octree_view view = tree.view();
   const buffer<float, Exec> areas(exec, view.node_count());
-  exec.for_each(view.leaf_count(),
-                leaf_normals{tree.leaf_fragment_begin(), fragments.normals.view(), fragments.areas.view(),
-                             view.first_leaf(), normals, areas.view()});
+  exec.for_each(view.leaf_count(), leaf_normals{tree.leaf_fragment_begin(), fragments.surfaces.view(),
+                                                view.first_leaf(), normals, areas.view()});
   for (std::uint32_t level = view.depth(); level-- > 0;)
     exec.for_each(view.level_begin(level + 1) - view.level_begin(level),
                   inner_normals{view, view.level_begin(level), normals, areas.view()});

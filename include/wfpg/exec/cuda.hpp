@@ -5,11 +5,13 @@
 #error "wfpg/exec/cuda.hpp needs a CUDA compiler: include it in .cu files"
 #endif
 
+#include <wfpg/buffer.hpp>
 #include <wfpg/detail/cuda_block.hpp>
 #include <wfpg/detail/thrust.hpp>
 #include <wfpg/error.hpp>
 #include <wfpg/exec/policy.hpp>
 
+#include <cub/device/device_radix_sort.cuh>
 #include <cuda_runtime_api.h>
 #include <thrust/system/cuda/execution_policy.h>
 
@@ -44,12 +46,22 @@ inline void check_cuda(cudaError_t code, const char* call) {
   throw cuda_error(call, code);
 }
 
-/// Device memory from the stream-ordered pool of the current device.
+/// Device memory from a pool of its own, ordered on a stream. The pool keeps what is given back: the driver
+/// takes milliseconds for memory that is new.
 class stream_resource : public memory_resource {
  public:
-  explicit stream_resource(cudaStream_t stream) : stream_(stream) {}
+  explicit stream_resource(cudaStream_t stream) : stream_(stream) {
+    cudaMemPoolProps properties{};
+    properties.allocType = cudaMemAllocationTypePinned;
+    properties.location.type = cudaMemLocationTypeDevice;
+    check_cuda(cudaGetDevice(&properties.location.id), "cudaGetDevice");
+    check_cuda(cudaMemPoolCreate(&pool_, &properties), "cudaMemPoolCreate");
+    std::uint64_t kept = ~std::uint64_t(0);
+    check_cuda(cudaMemPoolSetAttribute(pool_, cudaMemPoolAttrReleaseThreshold, &kept),
+               "cudaMemPoolSetAttribute");
+  }
 
-  /// The one of a stream, for as long as the process lives.
+  /// The one of a stream, for as long as the process lives: made on the device that is current then.
   static memory_resource* of(cudaStream_t stream) {
     static std::mutex guard;
     static std::map<cudaStream_t, std::unique_ptr<stream_resource>> made;
@@ -62,18 +74,19 @@ class stream_resource : public memory_resource {
  private:
   void* do_allocate(std::size_t bytes, std::size_t) override {
     void* block = nullptr;
-    const cudaError_t code = cudaMallocAsync(&block, bytes, stream_);
+    const cudaError_t code = cudaMallocFromPoolAsync(&block, bytes, pool_, stream_);
     if (code == cudaErrorMemoryAllocation) {
       cudaGetLastError();
       throw std::bad_alloc();
     }
-    check_cuda(code, "cudaMallocAsync");
+    check_cuda(code, "cudaMallocFromPoolAsync");
     return block;
   }
   void do_deallocate(void* block, std::size_t, std::size_t) override { cudaFreeAsync(block, stream_); }
   bool do_is_equal(const memory_resource& other) const noexcept override { return this == &other; }
 
   cudaStream_t stream_;
+  cudaMemPool_t pool_ = nullptr;
 };
 
 inline __device__ std::size_t count_of(std::size_t n) {
@@ -90,7 +103,7 @@ __global__ void for_each_kernel(Count n, F f) {
 }
 
 template <class Block, class Count, class F>
-__global__ void __launch_bounds__(Block::threads)
+__global__ void __launch_bounds__(Block::threads, 2)
     for_each_block_kernel(Count n, std::size_t scratch_bytes, F f) {
   extern __shared__ __align__(16) unsigned char block_scratch[];
   const std::size_t count = count_of(n);
@@ -110,11 +123,11 @@ class cuda {
  public:
   static constexpr const char* name = "cuda";
   static constexpr int warp_width = 32;
-  static constexpr int warps_per_block = 8;
+  static constexpr int warps_per_block = 16;
   using block = wfpg::detail::cuda_block<warps_per_block>;
 
   /// `resource` hands out device memory, ordered on the stream, and outlives what is allocated; null stands
-  /// for cudaMallocAsync on that stream.
+  /// for a pool of the stream's own. Throws cuda_error, where there is no device to begin with.
   explicit cuda(cudaStream_t stream = nullptr, memory_resource* resource = nullptr)
       : stream_(stream), resource_(resource ? resource : wfpg::detail::stream_resource::of(stream)) {}
 
@@ -134,6 +147,22 @@ class cuda {
   /// Pinned memory on the host has to outlive the copy.
   void copy_from_host(void* to, const void* from, std::size_t bytes) const {
     copy(to, from, bytes, cudaMemcpyHostToDevice);
+  }
+
+  /// Sorts n pairs stably by the low bits of their keys.
+  template <class Key, class Value>
+  void sort_pairs(std::size_t n, int bits, const Key* keys, const Value* values, Key* sorted_keys,
+                  Value* sorted_values) const {
+    std::size_t bytes = 0;
+    const auto sort = [&](void* storage) {
+      wfpg::detail::check_cuda(cub::DeviceRadixSort::SortPairs(storage, bytes, keys, sorted_keys, values,
+                                                               sorted_values, n, 0, bits, stream_),
+                               "cub::DeviceRadixSort::SortPairs");
+    };
+    if (n == 0) return;
+    sort(nullptr);
+    const buffer<std::byte, cuda> storage(*this, bytes);
+    sort(storage.data());
   }
 
   template <class F>

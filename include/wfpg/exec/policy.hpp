@@ -8,6 +8,9 @@
 //                                void copy_to_host(void* to, const void* from, std::size_t bytes) const;
 //                                void copy_from_host(void* to, const void* from, std::size_t bytes) const;
 //   2. who sorts and scans:      auto thrust() const;  a Thrust policy whose temporaries come from resource()
+//                                void sort_pairs(n, bits, const K* keys, const V* values, K* sorted_keys,
+//                                                V* sorted_values) const;
+//                                stable; the low `bits` bits of the unsigned keys are in their order
 //   3. a loop over indices:      void for_each(n, f) const;  f(i), in no order; f is a functor with a const
 //                                operator() that the device can call
 //   4. a loop over blocks:       void for_each_block(n, scratch_bytes, f) const;  f(block, i), where `block`

@@ -1,0 +1,51 @@
+// What the paths of a sample found, into the cache: Eq. 5's back-propagation, the leaves' means, the averages
+// bottom-up.
+#include "guide.hpp"
+
+#include <wfpg/path_recorder.hpp>
+
+namespace bench {
+namespace {
+
+constexpr std::uint32_t path_length = 4;
+
+struct record_vertex {
+  wfpg::path_recorder_view recorder;
+  wfpg::array_view<const room_point> points;
+  std::uint32_t depth;
+  WFPG_HD void operator()(std::size_t path) const {
+    const room_point& p = points[path];
+    recorder.vertex(path, depth, p.position, p.outgoing, vec3(1.0f / static_cast<float>(depth + 1)));
+    recorder.radiance(
+        path, depth,
+        vec3(wfpg::detail::unit_float(static_cast<std::uint32_t>(wfpg::detail::hash(depth, path)))));
+  }
+};
+
+/// 1920 x 1080 paths of four vertices; the floor reads the vertices.
+void depositing(benchmark::State& state) {
+  const exec_policy exec;
+  guide_of_room guide(exec, static_cast<std::uint32_t>(state.range(0)), std::size_t(pixels) * path_length);
+  wfpg::path_recorder<exec_policy> recorder(exec, pixels, path_length, true);
+  std::vector<wfpg::buffer<room_point, exec_policy>> points;
+  for (int bounces = 0; bounces < static_cast<int>(path_length); ++bounces)
+    points.push_back(points_after(exec, bounces));
+  const auto record = [&] {
+    for (std::uint32_t depth = 0; depth < path_length; ++depth)
+      exec.for_each(pixels, record_vertex{recorder.view(),
+                                          wfpg::array_view<const room_point>(points[depth].view()), depth});
+  };
+  compare(
+      state, exec,
+      [&] {
+        recorder.deposit(exec, guide.cache.view());
+        guide.cache.update(exec);
+      },
+      copy_of(exec, recorder.bytes()), record);
+  state.counters["leaves"] = guide.octree.leaf_count();
+}
+
+BENCHMARK(depositing)->ArgName("resolution")->Arg(128)->Arg(256)->Apply(as_stage);
+
+}  // namespace
+}  // namespace bench

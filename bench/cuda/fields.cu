@@ -1,0 +1,165 @@
+// Transient fields of a wave's bins: making them from what their cones hit, and drawing directions from them.
+#include "guide.hpp"
+
+#include <wfpg/detail/serve_rays.hpp>
+#include <wfpg/product_sampler.hpp>
+#include <wfpg/radiance_field.hpp>
+#include <wfpg/spatial_binner.hpp>
+
+#include <type_traits>
+
+namespace bench {
+namespace {
+
+constexpr std::uint32_t field_count = 2048, field_size = 128, cells = field_size * field_size;
+
+using fields_type = wfpg::detail::bin_fields<stored_surfaces>;
+using serve_type = wfpg::detail::serve_ray<stored_surfaces, hashed_numbers, wfpg::no_queries>;
+
+/// Rays in runs of equal length, a run a bin of the wave: the rays of one bin lie together.
+struct equal_bins {
+  wfpg::array_view<std::uint32_t> permutation, offsets, keys;
+  std::uint32_t* count;
+  WFPG_HD void operator()(std::size_t i) const {
+    permutation[i] = static_cast<std::uint32_t>(i);
+    keys[i] = static_cast<std::uint32_t>(i * field_count / pixels) * wfpg::orientations;
+    if (i <= field_count) offsets[i] = static_cast<std::uint32_t>(i * pixels / field_count);
+    if (i == 0) *count = field_count;
+  }
+};
+
+/// The hits of all cones of all fields.
+struct cast_cones {
+  fields_type fields;
+  wfpg::array_view<wfpg::ray_hit> hits;
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t bin) const {
+    const wfpg::detail::field_cells cone_of(fields.origin(bin), field_size);
+    block.for_each(static_cast<int>(cells), [&](int cell) {
+      hits[bin * cells + static_cast<std::size_t>(cell)] =
+          room_caster()(cone_of.cone(static_cast<std::uint32_t>(cell)));
+    });
+  }
+};
+
+/// Leaves finished fields in scratch memory, and says that they are there.
+struct keep_nothing {
+  std::uint32_t* totals;
+  template <class Block>
+  WFPG_HD std::uint32_t* words(Block& block, std::size_t) const {
+    return block.template scratch<std::uint32_t>(cells);
+  }
+  template <class Block>
+  WFPG_HD void finish(Block& block, std::size_t bin, const wfpg::directional_field& field) const {
+    block.for_each(1, [&](int) { totals[bin] = field.grid().total(); });
+  }
+  static std::size_t scratch_bytes(std::size_t making) { return sizeof(std::uint32_t) * cells + 16 + making; }
+};
+
+/// 2,048 fields of 128² over a wave, their cones already cast.
+class workload {
+ public:
+  workload(const exec_policy& exec, render::material_kind kind, std::uint32_t product_resolution)
+      : exec(exec),
+        guide(exec, 256),
+        points(points_after(exec, 1)),
+        permutation(exec, pixels),
+        offsets(exec, field_count + 1),
+        keys(exec, pixels),
+        count(exec, 1),
+        hits(exec, std::size_t(field_count) * cells),
+        totals(exec, field_count),
+        directions(exec, pixels),
+        product_points(exec, std::size_t(2) * product_resolution * product_resolution) {
+    exec.for_each(pixels, equal_bins{permutation.view(), offsets.view(), keys.view(), count.data()});
+    wfpg::bins_view bins;
+    bins.permutation = permutation.view();
+    bins.offsets = offsets.view();
+    bins.sorted_keys = keys.view();
+    bins.ray_keys = keys.view();
+    bins.count = count.data();
+    const stored_surfaces surfaces{wfpg::array_view<const room_point>(points.view()), kind};
+    fields =
+        fields_type{bins, surfaces, guide.cache.view(), {}, wfpg::guiding_mode::oriented, field_size, 17};
+    exec.for_each_block(field_count, 0, cast_cones{fields, hits.view()});
+    const std::uint32_t p = product_resolution;
+    wfpg::product_point* const hemisphere = product_points.data();
+    exec.for_each(std::size_t(p) * p,
+                  wfpg::detail::measure_product_blocks{hemisphere, hemisphere + p * p, p});
+    exec.for_each(std::size_t(p) * p,
+                  wfpg::detail::draw_product_points{hemisphere, hemisphere + p * p, p, 1});
+    serve = serve_type{surfaces, hashed_numbers{}, {}, directions.view()};
+    sink = {bins,
+            serve,
+            {0.7f, 0.5f, 64},
+            field_size,
+            {hemisphere, hemisphere + p * p, p},
+            exec_policy::warps_per_block};
+  }
+
+  /// Every field through a sink.
+  template <class Sink>
+  void make(const Sink& into) const {
+    const std::size_t making = wfpg::detail::field_scratch_bytes(field_size, exec_policy::warps_per_block);
+    exec.for_each_block(field_count, into.scratch_bytes(making),
+                        wfpg::detail::make_fields<stored_surfaces, wfpg::detail::stored_hits, Sink>{
+                            fields, {hits.view(), 0, cells}, into, 0});
+  }
+
+  exec_policy exec;
+  guide_of_room guide;
+  wfpg::buffer<room_point, exec_policy> points;
+  wfpg::buffer<std::uint32_t, exec_policy> permutation, offsets, keys, count;
+  wfpg::buffer<wfpg::ray_hit, exec_policy> hits;
+  wfpg::buffer<std::uint32_t, exec_policy> totals;
+  wfpg::buffer<wfpg::sampled_direction, exec_policy> directions;
+  wfpg::buffer<wfpg::product_point, exec_policy> product_points;
+  fields_type fields;
+  serve_type serve;
+  wfpg::detail::transient_sink<serve_type> sink;
+};
+
+/// From hits to distributions in scratch memory; the floor reads the hits.
+void making_fields(benchmark::State& state) {
+  const exec_policy exec;
+  const workload w(exec, render::material_kind::lambert, 0);
+  compare(
+      state, exec, [&] { w.make(keep_nothing{w.totals.data()}); }, copy_of(exec, w.hits.bytes()));
+}
+
+/// What serving every ray of the wave adds to making the fields; the floor reads the surfaces and writes the
+/// directions.
+void serving_rays(benchmark::State& state) {
+  const exec_policy exec;
+  const auto kind = static_cast<render::material_kind>(state.range(1));
+  const workload w(exec, kind, static_cast<std::uint32_t>(state.range(0)));
+  const copy_of floor(exec, w.points.bytes() + w.directions.bytes());
+  std::vector<double> served, made, floors;
+  const auto measure = [&] {
+    made.push_back(seconds_of(exec, [&] { w.make(keep_nothing{w.totals.data()}); }));
+    served.push_back(seconds_of(exec, [&] { w.make(w.sink); }));
+    floors.push_back(seconds_of(exec, floor));
+  };
+  for (int i = 0; i < 3; ++i) measure();
+  served.clear();
+  made.clear();
+  floors.clear();
+  for (auto _ : state) {
+    measure();
+    state.SetIterationTime(served.back());
+  }
+  const double difference = median(served) - median(made);
+  state.counters["median_ms"] = 1.0e3 * difference;
+  state.counters["floor_ms"] = 1.0e3 * median(floors);
+  state.counters["ratio"] = difference / median(floors);
+}
+
+BENCHMARK(making_fields)->Apply(as_stage);
+BENCHMARK(serving_rays)
+    ->ArgNames({"P", "material"})
+    ->Args({0, static_cast<int>(render::material_kind::plastic)})
+    ->Args({8, static_cast<int>(render::material_kind::plastic)})
+    ->Apply(as_stage);
+
+}  // namespace
+}  // namespace bench
