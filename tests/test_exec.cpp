@@ -202,7 +202,8 @@ WFPG_TEST_CASE("lanes: map, ballot and find_first", "[exec]") {
     const std::uint32_t mask = static_cast<std::uint32_t>((1ull << width) - 1);
     REQUIRE(balloted[round] == (rounds[round] & mask));
     REQUIRE(found[round] == first);
-    for (int lane = 0; lane < width; ++lane) REQUIRE(mapped[round * width + std::size_t(lane)] == lane * lane);
+    for (int lane = 0; lane < width; ++lane)
+      REQUIRE(mapped[round * width + std::size_t(lane)] == lane * lane);
   }
 }
 

@@ -245,7 +245,8 @@ WFPG_TEST_CASE("field sampler: cells without weight are never drawn, at borders 
       empty += in_square(p) && values[cell_of(p, resolution)] == 0.0f;
     }
     for (const directional_field& field : {directional_field(grid), directional_field(grid, tilted)})
-      for (const float density : evaluate(exec, numbers, pdf_of_sample{field})) no_density += !(density > 0.0f);
+      for (const float density : evaluate(exec, numbers, pdf_of_sample{field}))
+        no_density += !(density > 0.0f);
     INFO("resolution " << resolution);
     CHECK(outside == 0);
     CHECK(empty == 0);
@@ -298,7 +299,8 @@ WFPG_TEST_CASE("field sampler: densities integrate to one", "[field_sampler]") {
       INFO(name_of(kind, resolution, 21));
       const std::uint32_t n = resolution > 100 ? 1 : 2;
       CHECK(integral_over_square(exec, directional_field(built.grid()), n) == Approx(1.0).margin(1e-5));
-      CHECK(integral_over_square(exec, directional_field(built.grid(), tilted), n) == Approx(1.0).margin(1e-5));
+      CHECK(integral_over_square(exec, directional_field(built.grid(), tilted), n) ==
+            Approx(1.0).margin(1e-5));
     }
 }
 

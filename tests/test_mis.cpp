@@ -150,8 +150,8 @@ WFPG_TEST_CASE("MIS: the density is the weighted sum of the two", "[mis]") {
   for (float fraction : fractions) {
     const auto mixed = evaluate(exec, directions, mixture_pdf{{field, fraction}, surface});
     for (std::size_t i = 0; i < directions.size(); ++i)
-      CHECK(mixed[i] == Approx(fraction * of_field[i] +
-                               (1.0f - fraction) * surface.bsdf.pdf(toward_eye, directions[i])));
+      CHECK(mixed[i] ==
+            Approx(fraction * of_field[i] + (1.0f - fraction) * surface.bsdf.pdf(toward_eye, directions[i])));
   }
 }
 

@@ -261,9 +261,8 @@ WFPG_TEST_CASE("packed directions are within 0.01 degrees", "[octahedral_map]") 
   std::vector<vec3> all = directions();
   const wfpg::buffer<vec3, Exec> from(exec, all), back(exec, all.size());
   const auto f = from.view(), b = back.view();
-  exec.for_each(all.size(), [=] WFPG_HD(std::size_t i) {
-    b[i] = wfpg::unpack_direction(wfpg::pack_direction(f[i]));
-  });
+  exec.for_each(all.size(),
+                [=] WFPG_HD(std::size_t i) { b[i] = wfpg::unpack_direction(wfpg::pack_direction(f[i])); });
   const std::vector<vec3> returned = back.to_host(exec);
   double worst = 0.0, worst_length = 0.0;
   for (std::size_t i = 0; i < all.size(); ++i) {

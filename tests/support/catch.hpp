@@ -20,8 +20,7 @@ using Catch::Approx;
     return true;                                             \
   }();                                                       \
   static void function()
-#define TEST_CASE(...)                                                       \
-  WFPG_REGISTERED_TEST_CASE(WFPG_TEST_JOINED(registered_test_, __LINE__),    \
-                            WFPG_TEST_JOINED(is_registered_test_, __LINE__), \
-                            __VA_ARGS__)
+#define TEST_CASE(...)                                                    \
+  WFPG_REGISTERED_TEST_CASE(WFPG_TEST_JOINED(registered_test_, __LINE__), \
+                            WFPG_TEST_JOINED(is_registered_test_, __LINE__), __VA_ARGS__)
 #endif

@@ -1,6 +1,7 @@
 // A guider in the unit box with a bright patch in its ceiling, and a path tracer of two bounces around it.
 #pragma once
 
+#include "support/evaluate.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
@@ -91,6 +92,33 @@ class wave_of_surfaces {
   std::uint32_t depth_;
   std::uint64_t seed_;
 };
+
+/// Whether a ray has a field, and how many of the first `rays` have one.
+template <class Exec>
+bool guides(const Exec& exec, const wfpg::guide_view& view, std::uint32_t ray) {
+  return evaluate(exec, [=] WFPG_HD() { return view.guides(ray); });
+}
+template <class Exec>
+std::size_t count_guided(const Exec& exec, const wfpg::guide_view& view, std::size_t rays) {
+  return count_where(exec, rays,
+                     [=] WFPG_HD(std::size_t ray) { return view.guides(static_cast<std::uint32_t>(ray)); });
+}
+
+/// What the BSDFs of rays say of the density of directions.
+struct density_of_bsdf {
+  wfpg::array_view<const test_surface> surfaces;
+  wfpg::array_view<const wfpg::sampled_direction> drawn;
+  WFPG_HD float operator()(std::size_t i) const {
+    return surfaces[i].bsdf.pdf(surfaces[i].outgoing, drawn[i].direction);
+  }
+};
+template <class Exec>
+std::vector<float> bsdf_densities(const Exec& exec, const std::vector<test_surface>& surfaces,
+                                  const std::vector<wfpg::sampled_direction>& drawn) {
+  const wfpg::buffer<test_surface, Exec> s(exec, surfaces);
+  const wfpg::buffer<wfpg::sampled_direction, Exec> d(exec, drawn);
+  return evaluate(exec, drawn.size(), density_of_bsdf{s.view(), d.view()});
+}
 
 /// A guider of the box that knows the patch.
 template <class Exec>

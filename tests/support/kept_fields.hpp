@@ -101,9 +101,7 @@ struct kept_box {
                                                       {}};
     return store.prepare(exec(), kept, caster, buffer_bytes);
   }
-  wfpg::guide_view prepare(const std::vector<test_surface>& wave) {
-    return prepare(wave, log.caster());
-  }
+  wfpg::guide_view prepare(const std::vector<test_surface>& wave) { return prepare(wave, log.caster()); }
   /// Cones that a wave casts.
   std::size_t cones(const std::vector<test_surface>& wave) {
     log.take();
@@ -129,9 +127,6 @@ struct kept_box {
 
   wfpg::kept_field_statistics counts() const { return store.statistics(exec()); }
   wfpg::detail::field_store_state state() const { return wfpg::read_element(exec(), store.state()); }
-  bool guides(const wfpg::guide_view& view, std::uint32_t ray) const {
-    return evaluate(exec(), [=] WFPG_HD() { return view.guides(ray); });
-  }
   /// A ray's field; its cells lie in the policy's memory.
   wfpg::directional_field field_of(const wfpg::guide_view& view, std::uint32_t ray) const {
     return evaluate(exec(), [=] WFPG_HD() { return view.mixture(ray).field; });
@@ -141,12 +136,6 @@ struct kept_box {
 /// Rays of one place, `n` times.
 inline std::vector<test_surface> rays_at(vec3 position, vec3 normal, std::size_t n = 1) {
   return std::vector<test_surface>(n, make_surface(position, normal, normal));
-}
-
-template <class Exec>
-std::size_t count_guided(const Exec& exec, const wfpg::guide_view& view, std::size_t rays) {
-  return count_where(exec, rays,
-                     [=] WFPG_HD(std::size_t ray) { return view.guides(static_cast<std::uint32_t>(ray)); });
 }
 
 /// A ray's field in one number: frame, share and every weight.

@@ -10,6 +10,7 @@
 
 #if defined(__CUDACC__)
 #include <wfpg/exec/cuda.hpp>
+#include <wfpg/exec/seq.hpp>
 #else
 #if !defined(WFPG_TEST_ONLY_TBB)
 #define WFPG_TEST_SEVERAL_POLICIES
@@ -67,10 +68,14 @@ namespace wfpg_test {
 #if defined(__CUDACC__)
 /// The policy of tests that need no more than one.
 using one_policy = wfpg::exec::cuda;
-/// Whether loops run in the host's threads: only then they may throw, and have scratch memory of the resource.
+/// One whose memory the host reads.
+using host_policy = wfpg::exec::seq;
+/// Whether loops run in the host's threads: only then they may throw, and have scratch memory of the
+/// resource.
 constexpr bool loops_on_host = false;
 #else
 using one_policy = wfpg::exec::tbb;
+using host_policy = wfpg::exec::tbb;
 constexpr bool loops_on_host = true;
 #endif
 

@@ -205,22 +205,26 @@ void deposit_on_walls(const Exec& exec, const wfpg::exitance_cache_view& cache, 
   deposit_all(exec, cache, light);
 }
 
-/// Counts what is asked of the policies' resource.
+/// Counts what is asked of a resource.
 class counting_resource : public wfpg::memory_resource {
  public:
+  explicit counting_resource(wfpg::memory_resource* upstream = default_resource()) : upstream_(upstream) {}
+
   std::size_t allocations = 0, bytes_in_use = 0;
 
  private:
   void* do_allocate(std::size_t bytes, std::size_t alignment) override {
     ++allocations;
     bytes_in_use += bytes;
-    return default_resource()->allocate(bytes, alignment);
+    return upstream_->allocate(bytes, alignment);
   }
   void do_deallocate(void* block, std::size_t bytes, std::size_t alignment) override {
     bytes_in_use -= bytes;
-    default_resource()->deallocate(block, bytes, alignment);
+    upstream_->deallocate(block, bytes, alignment);
   }
   bool do_is_equal(const wfpg::memory_resource& other) const noexcept override { return this == &other; }
+
+  wfpg::memory_resource* upstream_;
 };
 
 }  // namespace wfpg_test
