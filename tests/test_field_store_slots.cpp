@@ -54,8 +54,8 @@ struct is_guided_otherwise {
     const test_surface& s = wave[i];
     const auto drawn = view.sample(ray, s, 0.1f, {0.3f, 0.6f});
     return drawn.technique != wfpg::sampling_technique::bsdf ||
-           drawn.pdf != s.bsdf.pdf(s.outgoing, drawn.direction) ||
-           view.pdf(ray, s, s.normal) != s.bsdf.pdf(s.outgoing, s.normal);
+           !alike(drawn.pdf, s.bsdf.pdf(s.outgoing, drawn.direction)) ||
+           !alike(view.pdf(ray, s, s.normal), s.bsdf.pdf(s.outgoing, s.normal));
   }
 };
 

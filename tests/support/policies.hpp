@@ -21,6 +21,7 @@
 #endif
 #include <wfpg/buffer.hpp>
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
@@ -78,6 +79,15 @@ using one_policy = wfpg::exec::tbb;
 using host_policy = wfpg::exec::tbb;
 constexpr bool loops_on_host = true;
 #endif
+
+/// Whether two kernels gave the same number by the same floating-point operations: to the bit on a host, and
+/// nearly where the compiler fuses multiplications and additions by what surrounds them.
+WFPG_HD inline bool alike(float a, float b) {
+  return loops_on_host ? a == b : std::fabs(a - b) <= 2.0e-6f * std::fabs(b);
+}
+WFPG_HD inline bool alike(wfpg::vec3 a, wfpg::vec3 b) {
+  return loops_on_host ? a == b : glm::distance(a, b) <= 2.0e-6f * glm::length(b);
+}
 
 /// Where a policy's memory comes from that was not told otherwise.
 inline wfpg::memory_resource* default_resource() {
