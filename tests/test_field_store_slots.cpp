@@ -362,7 +362,7 @@ WFPG_TEST_CASE("field store: a limit on cones is shared evenly, however large th
   for (int sample = 0; sample < 14; ++sample) {  // every field is due in each of them
     box.begin();
     CHECK(box.cones(wave) == 16);
-    for (const wfpg::ray& cone : box.log.cones())
+    for (const wfpg::ray& cone : box.log.cones(16))
       for (std::uint32_t i = 0; i < 16; ++i) cones[i] += glm::distance(cone.origin, floor_place(i)) < 0.1f;
   }
   const auto [least, most] = std::minmax_element(cones.begin(), cones.end());

@@ -19,13 +19,13 @@ using wfpg::svo_ray_caster;
 namespace {
 
 struct answers_nothing {
-  void operator()(const ray&) const {}
+  [[maybe_unused]] void operator()(const ray&) const {}
 };
 struct not_const {
-  ray_hit operator()(const ray&) { return {}; }
+  [[maybe_unused]] ray_hit operator()(const ray&) { return {}; }
 };
 struct takes_wrong_views {
-  void cast(const one_policy&, wfpg::array_view<const ray>, std::vector<ray_hit>&) const {}
+  [[maybe_unused]] void cast(const one_policy&, wfpg::array_view<const ray>, std::vector<ray_hit>&) const {}
 };
 
 static_assert(wfpg::is_inline_caster_v<svo_ray_caster>);

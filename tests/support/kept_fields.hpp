@@ -44,7 +44,9 @@ class cone_log {
     count_ = wfpg::buffer<std::uint32_t, Exec>(exec_, std::vector<std::uint32_t>{0});
     return counted;
   }
-  std::vector<wfpg::ray> cones() const { return cones_.to_host(exec_, std::min(count(), cones_.size())); }
+  std::vector<wfpg::ray> cones() const { return cones(std::min(count(), cones_.size())); }
+  /// The first n, also after take().
+  std::vector<wfpg::ray> cones(std::size_t n) const { return cones_.to_host(exec_, n); }
 
  private:
   Exec exec_;
