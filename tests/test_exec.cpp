@@ -1,7 +1,8 @@
-// The execution policies: loops, blocks, scratch memory and the emulated warp, against plain loops.
+// The execution policies: loops, blocks, scratch memory and warps, against plain loops.
 #include "support/catch.hpp"
 #include "support/policies.hpp"
 
+#include <wfpg/detail/atomic.hpp>
 #include <wfpg/exec/policy.hpp>
 
 #include <thrust/scan.h>
@@ -24,7 +25,19 @@ using warp_of = typename Exec::block::warp;
 
 struct count_visits {
   std::uint32_t* visits;
-  void operator()(std::size_t i) const { __atomic_fetch_add(visits + i, 1u, __ATOMIC_RELAXED); }
+  WFPG_HD void operator()(std::size_t i) const { wfpg::detail::atomic_add(visits + i, 1u); }
+};
+/// One visit of each block.
+struct count_blocks {
+  count_visits visit;
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t i) const {
+    block.for_each(1, [&](int) { visit(i); });
+  }
+};
+struct no_work {
+  template <class Block>
+  WFPG_HD void operator()(Block&, std::size_t) const {}
 };
 
 WFPG_TEST_CASE("a policy is one", "[exec]") {
@@ -32,11 +45,11 @@ WFPG_TEST_CASE("a policy is one", "[exec]") {
   CHECK(wfpg::exec::is_execution_policy_v<Exec>);
   CHECK_FALSE(wfpg::exec::is_execution_policy_v<int>);
   CHECK(Exec::warp_width == warp_of<Exec>::width);
-  CHECK(exec.resource() == std::pmr::get_default_resource());
-  CHECK(exec.concurrency() >= 1);
+  CHECK(exec.resource() == default_resource());
+  if constexpr (loops_on_host) CHECK(exec.concurrency() >= 1);
   wfpg::retaining_resource arena(nullptr);
   CHECK(exec.with_resource(&arena).resource() == &arena);
-  CHECK(exec.with_resource(nullptr).resource() == std::pmr::get_default_resource());
+  CHECK(exec.with_resource(nullptr).resource() == default_resource());
 }
 
 WFPG_TEST_CASE("for_each visits each index once", "[exec]") {
@@ -58,7 +71,7 @@ WFPG_TEST_CASE("loops take a count from the device", "[exec]") {
     const wfpg::exec::device_count n{count.data(), capacity};
     const count_visits visit{visits.data()};
     if (blocks)
-      exec.for_each_block(n, 16, [=](typename Exec::block&, std::size_t i) { visit(i); });
+      exec.for_each_block(n, 16, count_blocks{visit});
     else
       exec.for_each(n, visit);
     const words seen = visits.to_host(exec);
@@ -75,21 +88,22 @@ WFPG_TEST_CASE("loops take a count from the device", "[exec]") {
 }
 
 /// A block's work: each has to see its own scratch memory only, aligned, and as much as it asked for.
-template <class Block>
 struct use_scratch {
   std::uint32_t* results;
-  void operator()(Block& block, std::size_t i) const {
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t i) const {
     constexpr int n = 37;
     char* const odd = block.template scratch<char>(3);
     std::uint64_t* const data = block.template scratch<std::uint64_t>(n);
     double* const other = block.template scratch<double>(1);
-    for (int k = 0; k < 3; ++k) odd[k] = 'x';
-    *other = -1.0;
+    block.for_each(3, [&](int k) { odd[k] = 'x'; });
+    block.for_each(1, [&](int) { *other = -1.0; });
     block.for_each(n, [&](int k) { data[k] = i * 1000 + static_cast<std::uint64_t>(k); });
     block.sync();
     const std::uint64_t sum = block.sum(n, [&](int k) { return data[k]; });
     const bool aligned = reinterpret_cast<std::uintptr_t>(data) % alignof(std::uint64_t) == 0;
-    results[i] = aligned && *other == -1.0 && sum == n * i * 1000 + n * (n - 1) / 2 ? 1u : 0u;
+    const bool right = aligned && *other == -1.0 && sum == n * i * 1000 + n * (n - 1) / 2;
+    block.for_each(1, [&](int) { results[i] = right ? 1u : 0u; });
   }
 };
 
@@ -97,93 +111,186 @@ WFPG_TEST_CASE("blocks have scratch memory of their own", "[exec]") {
   const Exec exec;
   const std::size_t n = 500;
   const wfpg::buffer<std::uint32_t, Exec> results(exec, words(n, 0));
-  exec.for_each_block(n, 16 + 37 * 8 + 8 + 16, use_scratch<typename Exec::block>{results.data()});
+  exec.for_each_block(n, 16 + 37 * 8 + 8 + 16, use_scratch{results.data()});
   CHECK((results.to_host(exec) == words(n, 1)));
-  exec.for_each_block(0, 16, use_scratch<typename Exec::block>{nullptr});
-  exec.for_each_block(3, 0, [](typename Exec::block&, std::size_t) {});
+  exec.for_each_block(0, 16, use_scratch{nullptr});
+  exec.for_each_block(3, 0, no_work{});
 }
 
-/// Runs f(block) in one block and returns what it gives.
-template <class Exec, class F>
-auto in_block(const Exec& exec, F f) {
-  std::decay_t<decltype(f(std::declval<typename Exec::block&>()))> result{};
-  exec.for_each_block(1, 4096, [&](typename Exec::block& block, std::size_t) { result = f(block); });
-  return result;
-}
+/// Sums that a block makes of n numbers; each of its threads adds the one that it is given.
+struct block_sums {
+  int n;
+  int* integers;
+  float* halves;
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t) const {
+    const int of_squares = block.sum(n, [](int i) { return i * i; });
+    const float of_halves = block.sum(n, [](int) { return 0.5f; });
+    block.for_each(1000, [&](int i) {
+      integers[i] = of_squares;
+      halves[i] = of_halves;
+    });
+  }
+};
 
 WFPG_TEST_CASE("sums of a block", "[exec]") {
   const Exec exec;
-  for (const int n : {0, 1, 7, 8, 9, 31, 32, 33, 100}) {
-    const auto integers = in_block(exec, [&](auto& b) { return b.sum(n, [](int i) { return i * i; }); });
-    CHECK(integers == (n - 1) * n * (2 * n - 1) / 6);
-    const auto halves = in_block(exec, [&](auto& b) { return b.sum(n, [](int) { return 0.5f; }); });
-    CHECK(halves == 0.5f * static_cast<float>(n));
+  for (const int n : {0, 1, 7, 8, 9, 31, 32, 33, 100, 255, 256, 257, 1000}) {
+    const wfpg::buffer<int, Exec> integers(exec, 1000);
+    const wfpg::buffer<float, Exec> halves(exec, 1000);
+    exec.for_each_block(1, 0, block_sums{n, integers.data(), halves.data()});
+    CHECK((integers.to_host(exec) == std::vector<int>(1000, (n - 1) * n * (2 * n - 1) / 6)));
+    CHECK((halves.to_host(exec) == std::vector<float>(1000, 0.5f * static_cast<float>(n))));
   }
 }
+
+struct visit_by_lanes {
+  count_visits visit;
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t) const {
+    block.for_each_warp(10, [&](const auto& warp, int i) {
+      warp.for_each_lane([&](int) { visit(static_cast<std::size_t>(i)); });
+    });
+  }
+};
 
 WFPG_TEST_CASE("for_each_warp gives every index a whole warp", "[exec]") {
   const Exec exec;
-  const words visits = in_block(exec, [](auto& block) {
-    words seen(11, 0);
-    block.for_each_warp(10, [&](const auto& warp, int i) {
-      warp.for_each_lane([&](int) { ++seen[static_cast<std::size_t>(i)]; });
-    });
-    return seen;
-  });
+  const wfpg::buffer<std::uint32_t, Exec> visits(exec, words(11, 0));
+  exec.for_each_block(1, 0, visit_by_lanes{{visits.data()}});
   words expected(11, Exec::warp_width);
   expected[10] = 0;
-  CHECK((visits == expected));
+  CHECK((visits.to_host(exec) == expected));
 }
+
+/// What a warp makes of the bits of one number: a bit a lane.
+struct lane_flags {
+  wfpg::array_view<const std::uint32_t> bits;
+  wfpg::array_view<std::uint32_t> ballots;
+  wfpg::array_view<int> firsts, squares;
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t) const {
+    block.for_each_warp(static_cast<int>(bits.size()), [&](const auto& warp, int round) {
+      const auto flags = warp.map([&](int lane) { return (bits[round] >> lane & 1u) != 0; });
+      const std::uint32_t ballot = warp.ballot(flags);
+      const int first = warp.find_first(flags);
+      const auto of_lanes = warp.map([](int lane) { return lane * lane; });
+      warp.for_each_lane([&](int lane) { squares[round * warp.width + lane] = of_lanes[lane]; });
+      warp.for_each(1, [&](int) {
+        ballots[round] = ballot;
+        firsts[round] = first;
+      });
+    });
+  }
+};
 
 WFPG_TEST_CASE("lanes: map, ballot and find_first", "[exec]") {
   constexpr int width = Exec::warp_width;
-  const warp_of<Exec> warp;
-  const auto squares = warp.map([](int lane) { return lane * lane; });
-  for (int lane = 0; lane < width; ++lane) CHECK(squares[lane] == lane * lane);
-
+  const Exec exec;
   random_numbers random(1);
-  for (int round = 0; round < 200; ++round) {
-    std::uint32_t bits =
-        static_cast<std::uint32_t>(random.bits()) & static_cast<std::uint32_t>(random.bits());
-    if (round == 0) bits = 0;
-    if (round == 1) bits = 0xffffffffu;
-    if (round == 2) bits = 1u << (width - 1);
-    const auto flags = warp.map([&](int lane) { return (bits >> lane & 1u) != 0; });
+  words rounds{0u, 0xffffffffu, 1u << (width - 1)};
+  while (rounds.size() < 200)
+    rounds.push_back(static_cast<std::uint32_t>(random.bits()) & static_cast<std::uint32_t>(random.bits()));
+  const wfpg::buffer<std::uint32_t, Exec> bits(exec, rounds), ballots(exec, rounds.size());
+  const wfpg::buffer<int, Exec> firsts(exec, rounds.size()), squares(exec, width * rounds.size());
+  exec.for_each_block(1, 0, lane_flags{bits.view(), ballots.view(), firsts.view(), squares.view()});
+  const words balloted = ballots.to_host(exec);
+  const std::vector<int> found = firsts.to_host(exec), mapped = squares.to_host(exec);
+  for (std::size_t round = 0; round < rounds.size(); ++round) {
     int first = 0;
-    while (first < width && !(bits >> first & 1u)) ++first;
+    while (first < width && !(rounds[round] >> first & 1u)) ++first;
     const std::uint32_t mask = static_cast<std::uint32_t>((1ull << width) - 1);
-    REQUIRE(warp.ballot(flags) == (bits & mask));
-    REQUIRE(warp.find_first(flags) == first);
+    REQUIRE(balloted[round] == (rounds[round] & mask));
+    REQUIRE(found[round] == first);
+    for (int lane = 0; lane < width; ++lane)
+      REQUIRE(mapped[round * width + std::size_t(lane)] == lane * lane);
   }
 }
+
+/// A number and the name of another lane, of each lane; and what a warp makes of them.
+struct lane_exchange {
+  std::int64_t value = 0;
+  int source = 0;
+  std::int64_t shuffled = 0, broadcast = 0, sum = 0, largest = 0;
+};
+
+struct exchange_lanes {
+  wfpg::array_view<lane_exchange> lanes;
+  int rounds;
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t) const {
+    block.for_each_warp(rounds, [&](const auto& warp, int round) {
+      lane_exchange* const own = lanes.data() + round * warp.width;
+      const auto value = warp.map([&](int lane) { return own[lane].value; });
+      const auto source = warp.map([&](int lane) { return own[lane].source; });
+      const auto shuffled = warp.shuffle(value, source);
+      const std::int64_t sum = warp.reduce(value, [](std::int64_t a, std::int64_t b) { return a + b; });
+      const std::int64_t largest =
+          warp.reduce(value, [](std::int64_t a, std::int64_t b) { return a > b ? a : b; });
+      for (int from = 0; from < warp.width; ++from) {
+        const std::int64_t broadcast = warp.shuffle(value, from);
+        warp.for_each_lane([&](int lane) {
+          if (lane == (from + round) % warp.width) own[lane].broadcast = broadcast;
+        });
+      }
+      warp.for_each_lane([&](int lane) {
+        own[lane].shuffled = shuffled[lane];
+        own[lane].sum = sum;
+        own[lane].largest = largest;
+      });
+    });
+  }
+};
 
 WFPG_TEST_CASE("lanes: shuffle and reduce", "[exec]") {
-  constexpr int width = Exec::warp_width;
-  const warp_of<Exec> warp;
+  constexpr int width = Exec::warp_width, rounds = 50;
+  const Exec exec;
   random_numbers random(2);
-  for (int round = 0; round < 50; ++round) {
-    const auto value = warp.map([&](int) { return static_cast<std::int64_t>(random.below(1000)) - 500; });
-    const auto source = warp.map([&](int) { return static_cast<int>(random.below(width)); });
-    const auto shuffled = warp.shuffle(value, source);
+  std::vector<lane_exchange> before(rounds * width);
+  for (lane_exchange& lane : before) {
+    lane.value = static_cast<std::int64_t>(random.below(1000)) - 500;
+    lane.source = static_cast<int>(random.below(width));
+  }
+  const wfpg::buffer<lane_exchange, Exec> device(exec, before);
+  exec.for_each_block(1, 0, exchange_lanes{device.view(), rounds});
+  const std::vector<lane_exchange> after = device.to_host(exec);
+  for (int round = 0; round < rounds; ++round) {
+    const lane_exchange* const own = after.data() + round * width;
     std::int64_t sum = 0, largest = -1000;
     for (int lane = 0; lane < width; ++lane) {
-      sum += value[lane];
-      largest = std::max(largest, value[lane]);
-      REQUIRE(shuffled[lane] == value[source[lane]]);
-      REQUIRE(warp.shuffle(value, lane) == value[lane]);
+      sum += own[lane].value;
+      largest = std::max(largest, own[lane].value);
     }
-    REQUIRE(warp.reduce(value, [](std::int64_t a, std::int64_t b) { return a + b; }) == sum);
-    REQUIRE(warp.reduce(value, [](std::int64_t a, std::int64_t b) { return std::max(a, b); }) == largest);
+    for (int lane = 0; lane < width; ++lane) {
+      REQUIRE(own[lane].shuffled == own[own[lane].source].value);
+      REQUIRE(own[lane].broadcast == own[(lane - round % width + width) % width].value);
+      REQUIRE(own[lane].sum == sum);
+      REQUIRE(own[lane].largest == largest);
+    }
   }
 }
 
+struct visit_and_scan {
+  int n;
+  std::uint32_t *visits, *sums;
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t) const {
+    block.for_each_warp(1, [&](const auto& warp, int) {
+      warp.for_each(n, [&](int i) { ++visits[i]; });
+      warp.inclusive_scan(n, sums, [&](int i) { return sums[i]; });
+    });
+  }
+};
+
 WFPG_TEST_CASE("a warp visits and scans any number of elements", "[exec]") {
-  const warp_of<Exec> warp;
+  const Exec exec;
   for (const int n : {0, 1, 7, 8, 9, 31, 32, 33, 100}) {
-    words visits(static_cast<std::size_t>(n) + 1, 0), sums(visits.size(), 3);
-    warp.for_each(n, [&](int i) { ++visits[static_cast<std::size_t>(i)]; });
-    warp.inclusive_scan(n, sums.data(), [&](int i) { return sums[static_cast<std::size_t>(i)]; });
-    for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) {
+    const std::size_t size = static_cast<std::size_t>(n) + 1;
+    const wfpg::buffer<std::uint32_t, Exec> device_visits(exec, words(size, 0)),
+        device_sums(exec, words(size, 3));
+    exec.for_each_block(1, 0, visit_and_scan{n, device_visits.data(), device_sums.data()});
+    const words visits = device_visits.to_host(exec), sums = device_sums.to_host(exec);
+    for (std::size_t i = 0; i + 1 < size; ++i) {
       REQUIRE(visits[i] == 1);
       REQUIRE(sums[i] == 3 * (i + 1));
     }
@@ -192,6 +299,8 @@ WFPG_TEST_CASE("a warp visits and scans any number of elements", "[exec]") {
   }
 }
 
+// A kernel throws nothing.
+#if !defined(__CUDACC__)
 WFPG_TEST_CASE("what a loop throws arrives at the caller", "[exec]") {
   const Exec exec;
   const auto failing = [](std::size_t i) {
@@ -205,9 +314,10 @@ WFPG_TEST_CASE("what a loop throws arrives at the caller", "[exec]") {
   exec.for_each(1000, count_visits{visits.data()});
   CHECK((visits.to_host(exec) == words(1000, 1)));
 }
+#endif
 
 WFPG_TEST_CASE("Thrust runs on the policy", "[exec]") {
-  wfpg::retaining_resource arena(nullptr);
+  wfpg::retaining_resource arena(default_resource());
   const Exec exec = Exec().with_resource(&arena);
   const std::size_t n = 300000;  // more than Thrust sorts in one task
   random_numbers random(3);
@@ -228,7 +338,7 @@ WFPG_TEST_CASE("Thrust runs on the policy", "[exec]") {
   CHECK((device_values.to_host(exec) == values));
 }
 
-#if !defined(WFPG_TEST_ONLY_TBB)
+#if defined(WFPG_TEST_SEVERAL_POLICIES)
 template <class Exec>
 std::vector<std::uint32_t> squares_sorted_down(const Exec& exec) {
   const wfpg::buffer<std::uint32_t, Exec> data(exec, 3000);

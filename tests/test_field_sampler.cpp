@@ -1,5 +1,6 @@
 // The field sampler: frequencies against probabilities worked out from the cells, densities that integrate to
 // one and are the sampler's own, and cells without weight that are never drawn.
+#include "support/evaluate.hpp"
 #include "support/fields.hpp"
 #include "support/policies.hpp"
 #include "support/statistics.hpp"
@@ -25,15 +26,15 @@ std::string name_of(field_kind kind, std::uint32_t resolution, std::uint64_t see
          std::to_string(seed);
 }
 
-vec2 random_point(std::uint64_t seed, std::size_t i) {
+WFPG_HD vec2 random_point(std::uint64_t seed, std::size_t i) {
   return wfpg::detail::unit_vec2(wfpg::detail::hash(seed, i));
 }
 
-bool in_square(vec2 p) {
+WFPG_HD bool in_square(vec2 p) {
   return p.x >= 0.0f && p.x < 1.0f && p.y >= 0.0f && p.y < 1.0f;
 }
 
-std::size_t cell_of(vec2 uv, std::uint32_t resolution) {
+WFPG_HD std::size_t cell_of(vec2 uv, std::uint32_t resolution) {
   return std::size_t(uv.y * float(resolution)) * resolution + std::size_t(uv.x * float(resolution));
 }
 
@@ -41,15 +42,40 @@ struct draw_points {
   grid_distribution grid;
   std::uint64_t seed;
   wfpg::array_view<vec2> points;
-  void operator()(std::size_t i) const { points[i] = grid.sample(random_point(seed, i)); }
+  WFPG_HD void operator()(std::size_t i) const { points[i] = grid.sample(random_point(seed, i)); }
 };
 
 struct draw_directions {
   directional_field field;
   std::uint64_t seed;
   wfpg::array_view<drawn_direction> drawn;
-  void operator()(std::size_t i) const {
+  WFPG_HD void operator()(std::size_t i) const {
     drawn[i].direction = field.sample(random_point(seed, i), drawn[i].pdf);
+  }
+};
+
+struct field_pdf {
+  directional_field field;
+  WFPG_HD float operator()(vec3 direction) const { return field.pdf(direction); }
+};
+
+struct pdf_of_sample {
+  directional_field field;
+  WFPG_HD float operator()(vec2 u) const { return field.pdf(field.sample(u)); }
+};
+
+/// Whether a field's samples have their cells' density.
+struct density_of_sample {
+  directional_field field;
+  WFPG_HD bool operator()(std::size_t i) const {
+    const grid_distribution& grid = field.grid();
+    const std::uint32_t resolution = grid.resolution();
+    const vec2 u = random_point(9, i), uv = grid.sample(u);
+    const auto cell = static_cast<std::uint32_t>(cell_of(uv, resolution));
+    const auto weight = float(grid.weight(cell % resolution, cell / resolution));
+    const float domain = (field.hemisphere() ? 2.0f : 4.0f) * wfpg::detail::pi;
+    const float density = weight / float(grid.total()) * float(resolution * resolution) / domain;
+    return field.pdf(field.sample(u)) == density && density > 0.0f;
   }
 };
 
@@ -62,13 +88,14 @@ std::vector<T> draw(const Exec& exec, std::size_t n, Draw kernel, wfpg::array_vi
 }
 
 /// Numbers that land on both sides of every cell's border, and at both ends of [0,1).
-std::vector<float> difficult_numbers(const grid_distribution& grid, std::uint32_t row) {
+std::vector<float> difficult_numbers(const std::vector<std::uint32_t>& weights, std::uint32_t resolution,
+                                     std::uint32_t row) {
   std::vector<float> numbers = {0.0f, 0x1p-24f, 0.5f, below_one};
   double sum = 0.0, total = 0.0;
-  for (std::uint32_t x = 0; x < grid.resolution(); ++x) total += grid.weight(x, row);
+  for (std::uint32_t x = 0; x < resolution; ++x) total += weights[row * resolution + x];
   if (total == 0.0) return numbers;
-  for (std::uint32_t x = 0; x < grid.resolution(); ++x) {
-    sum += grid.weight(x, row);
+  for (std::uint32_t x = 0; x < resolution; ++x) {
+    sum += weights[row * resolution + x];
     const float edge = float(std::floor(sum / total * 0x1p24) * 0x1p-24);
     for (int step = -2; step <= 2; ++step)
       numbers.push_back(std::clamp(edge + float(step) * 0x1p-24f, 0.0f, below_one));
@@ -77,14 +104,15 @@ std::vector<float> difficult_numbers(const grid_distribution& grid, std::uint32_
 }
 
 /// Midpoint rule over the square, whose map preserves area: n² points a cell.
-double integral_over_square(const directional_field& field, std::uint32_t n) {
+template <class Exec>
+double integral_over_square(const Exec& exec, const directional_field& field, std::uint32_t n) {
   const std::uint32_t side = field.grid().resolution() * n;
   double sum = 0.0;
-  for (std::uint32_t y = 0; y < side; ++y)
-    for (std::uint32_t x = 0; x < side; ++x) {
-      const vec2 uv{(float(x) + 0.5f) / float(side), (float(y) + 0.5f) / float(side)};
-      sum += double(field.pdf(field.direction(uv)));
-    }
+  for (const float density : evaluate(exec, std::size_t(side) * side, [=] WFPG_HD(std::size_t i) {
+         const vec2 uv{(float(i % side) + 0.5f) / float(side), (float(i / side) + 0.5f) / float(side)};
+         return field.pdf(field.direction(uv));
+       }))
+    sum += double(density);
   return sum * double(field.cell_solid_angle()) / (double(n) * n);
 }
 
@@ -173,7 +201,7 @@ WFPG_TEST_CASE("field sampler: directions have the reported density", "[field_sa
       below += field.hemisphere() && glm::dot(d.direction, field.normal()) < -1e-6f;
     sampler_check_options options;
     options.moments = seed < 2;
-    const auto report = check_sampler(drawn, [&](vec3 d) { return field.pdf(d); }, options);
+    const auto report = check_sampler(drawn, densities_by{exec, field_pdf{field}}, options);
     INFO(name_of(kind, resolution, seed) << ": " << report.message);
     CHECK(report);
     family.add(report.frequencies, name_of(kind, resolution, seed));
@@ -192,14 +220,7 @@ WFPG_TEST_CASE("field sampler: a sampled direction's density is its cell's, bit 
       const grid_distribution grid = built.grid();
       std::size_t differing = 0;
       for (const directional_field& field : {directional_field(grid), directional_field(grid, tilted)})
-        for (std::size_t i = 0; i < 500; ++i) {
-          const vec2 u = random_point(9, i), uv = grid.sample(u);
-          const std::size_t cell = cell_of(uv, resolution);
-          const auto weight = float(grid.weight(cell % resolution, cell / resolution));
-          const float domain = (field.hemisphere() ? 2.0f : 4.0f) * wfpg::detail::pi;
-          const float density = weight / float(grid.total()) * float(resolution * resolution) / domain;
-          differing += field.pdf(field.sample(u)) != density || !(density > 0.0f);
-        }
+        differing += 500 - count_where(exec, 500, density_of_sample{field});
       INFO(name_of(kind, resolution, 17));
       CHECK(differing == 0);
     }
@@ -216,15 +237,16 @@ WFPG_TEST_CASE("field sampler: cells without weight are never drawn, at borders 
     const built_field<Exec> built(exec, values, resolution);
     const grid_distribution grid = built.grid();
     std::size_t outside = 0, empty = 0, no_density = 0;
-    const auto numbers = difficult_numbers(grid, 0);
-    for (float x : numbers)
-      for (float y : {0.0f, 0x1p-24f, 0.3f, 0.5f, 0.5f + 0x1p-24f, below_one}) {
-        const vec2 p = grid.sample({x, y});
-        outside += !in_square(p);
-        empty += in_square(p) && values[cell_of(p, resolution)] == 0.0f;
-        for (const directional_field& field : {directional_field(grid), directional_field(grid, tilted)})
-          no_density += !(field.pdf(field.sample({x, y})) > 0.0f);
-      }
+    std::vector<vec2> numbers;
+    for (float x : difficult_numbers(cell_weights(exec, grid), resolution, 0))
+      for (float y : {0.0f, 0x1p-24f, 0.3f, 0.5f, 0.5f + 0x1p-24f, below_one}) numbers.push_back({x, y});
+    for (const vec2 p : evaluate(exec, numbers, [=] WFPG_HD(vec2 u) { return grid.sample(u); })) {
+      outside += !in_square(p);
+      empty += in_square(p) && values[cell_of(p, resolution)] == 0.0f;
+    }
+    for (const directional_field& field : {directional_field(grid), directional_field(grid, tilted)})
+      for (const float density : evaluate(exec, numbers, pdf_of_sample{field}))
+        no_density += !(density > 0.0f);
     INFO("resolution " << resolution);
     CHECK(outside == 0);
     CHECK(empty == 0);
@@ -242,8 +264,11 @@ WFPG_TEST_CASE("field sampler: u = 0 draws the first cell with weight, u just be
     values[resolution + 1] = 1.0f;
     values[values.size() - 1] = 2.0f;
     const built_field<Exec> built(exec, values, resolution);
-    CHECK(cell_of(built.grid().sample({0.0f, 0.0f}), resolution) == resolution + 1);
-    CHECK(cell_of(built.grid().sample({below_one, below_one}), resolution) == values.size() - 1);
+    const grid_distribution grid = built.grid();
+    const auto ends = evaluate(exec, std::vector<vec2>{{0.0f, 0.0f}, {below_one, below_one}},
+                               [=] WFPG_HD(vec2 u) { return grid.sample(u); });
+    CHECK(cell_of(ends[0], resolution) == resolution + 1);
+    CHECK(cell_of(ends[1], resolution) == values.size() - 1);
   }
 }
 
@@ -253,8 +278,10 @@ WFPG_TEST_CASE("field sampler: stratified numbers stay in order inside a row", "
   for (float y : {0.1f, 0.7f}) {
     float last_x = 0.0f;
     int disorder = 0;
-    for (int i = 0; i < 5000; ++i) {
-      const vec2 p = built.grid().sample({float(i) / 5000.0f, y});
+    const grid_distribution grid = built.grid();
+    for (const vec2 p : evaluate(exec, 5000, [=] WFPG_HD(std::size_t i) {
+           return grid.sample({float(i) / 5000.0f, y});
+         })) {
       disorder += p.x < last_x;
       last_x = p.x;
     }
@@ -271,8 +298,9 @@ WFPG_TEST_CASE("field sampler: densities integrate to one", "[field_sampler]") {
                                     k % 2 ? 0.0f : 0.01f);
       INFO(name_of(kind, resolution, 21));
       const std::uint32_t n = resolution > 100 ? 1 : 2;
-      CHECK(integral_over_square(directional_field(built.grid()), n) == Approx(1.0).margin(1e-5));
-      CHECK(integral_over_square(directional_field(built.grid(), tilted), n) == Approx(1.0).margin(1e-5));
+      CHECK(integral_over_square(exec, directional_field(built.grid()), n) == Approx(1.0).margin(1e-5));
+      CHECK(integral_over_square(exec, directional_field(built.grid(), tilted), n) ==
+            Approx(1.0).margin(1e-5));
     }
 }
 
@@ -304,8 +332,9 @@ WFPG_TEST_CASE("field sampler: floors, all-zero fields, and values near the ends
                "[field_sampler]") {
   const Exec exec;
   const built_field<Exec> floored(exec, {0.0f, 1.0f, 0.0f, 2.0f}, 2, 1.0f);
-  const auto probability = [](const grid_distribution& grid, std::uint32_t cell) {
-    return double(grid.weight(cell % 2, cell / 2)) / double(grid.total());
+  const auto probability = [&](const grid_distribution& grid, std::uint32_t cell) {
+    const std::vector<std::uint32_t> weights = cell_weights(exec, grid);
+    return double(weights[cell]) / double(weights[0] + weights[1] + weights[2] + weights[3]);
   };
   for (std::uint32_t cell = 0; cell < 4; ++cell)
     CHECK(probability(floored.grid(), cell) ==
@@ -320,20 +349,31 @@ WFPG_TEST_CASE("field sampler: floors, all-zero fields, and values near the ends
   const built_field<Exec> bright(exec, {1e30f, 3e30f, 1e-30f, 0.0f}, 2);
   CHECK(probability(bright.grid(), 0) == Approx(0.25).epsilon(1e-6));
   CHECK(probability(bright.grid(), 1) == Approx(0.75).epsilon(1e-6));
-  CHECK(bright.grid().weight(0, 1) == 1);
-  CHECK(bright.grid().weight(1, 1) == 0);
+  CHECK(cell_weights(exec, bright.grid())[2] == 1);
+  CHECK(cell_weights(exec, bright.grid())[3] == 0);
 }
+
+struct direction_about {
+  vec3 normal, direction;
+};
 
 WFPG_TEST_CASE("field sampler: hemispheres have no density below the horizon", "[field_sampler]") {
   const Exec exec;
   const built_field<Exec> built(exec, std::vector<float>(16 * 16, 1.0f), 16);
   random_numbers random(8);
+  std::vector<direction_about> pairs;
   for (int i = 0; i < 200; ++i) {
-    const vec3 normal = random.direction(), d = random.direction();
-    const directional_field field(built.grid(), normal);
-    const float density = field.pdf(d);
-    if (glm::dot(d, normal) > 1e-4f) CHECK(density == Approx(1.0 / (2.0 * 3.14159265)).epsilon(1e-5));
-    if (glm::dot(d, normal) < -1e-4f) CHECK(density == 0.0f);
+    const vec3 normal = random.direction();
+    pairs.push_back({normal, random.direction()});
+  }
+  const grid_distribution grid = built.grid();
+  const auto densities = evaluate(exec, pairs, [=] WFPG_HD(const direction_about& pair) {
+    return directional_field(grid, pair.normal).pdf(pair.direction);
+  });
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const float along = glm::dot(pairs[i].direction, pairs[i].normal);
+    if (along > 1e-4f) CHECK(densities[i] == Approx(1.0 / (2.0 * 3.14159265)).epsilon(1e-5));
+    if (along < -1e-4f) CHECK(densities[i] == 0.0f);
   }
 }
 

@@ -1,17 +1,16 @@
 // Kept fields: what a cell remembers and which are cast again; distributions against their own densities and
 // against brute force; the same bits on any number of threads and from casters of both forms. Who gets a slot
 // and when it is built is test_field_store_slots.cpp's.
+#include "support/evaluate.hpp"
 #include "support/fields.hpp"
 #include "support/kept_fields.hpp"
 #include "support/lit_box.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 #include "support/statistics.hpp"
+#include "support/threads.hpp"
 
 #include <wfpg/field_store.hpp>
-
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -41,12 +40,10 @@ template <class Exec>
 std::pair<std::vector<float>, std::vector<float>> read_both(const lit_box<Exec>& box,
                                                             const std::vector<cone_hit>& hits) {
   const wfpg::exitance_cache_view cache = box.cache.view();
-  std::vector<float> remembered, read;
-  for (std::uint32_t i = 0; i < hits.size(); ++i) {
-    remembered.push_back(hits[i].radiance(cache));
-    read.push_back(cache.read(i / 2, i % 2));
-  }
-  return {remembered, read};
+  return {evaluate(box.exec, hits, [=] WFPG_HD(const cone_hit& hit) { return hit.radiance(cache); }),
+          evaluate(box.exec, hits.size(), [=] WFPG_HD(std::size_t i) {
+            return cache.read(static_cast<std::uint32_t>(i / 2), static_cast<std::uint32_t>(i % 2));
+          })};
 }
 
 WFPG_TEST_CASE("field store: a hit remembers a node's side, and follows the cache", "[field_store]") {
@@ -61,19 +58,26 @@ WFPG_TEST_CASE("field store: a hit remembers a node's side, and follows the cach
   CHECK(after.first == after.second);
   CHECK(after.first != before.first);
   box.cache.clear(box.exec);
-  for (const cone_hit& hit : hits) CHECK(hit.radiance(box.cache.view()) == 0.0f);
+  CHECK(read_both(box, hits).first == std::vector<float>(hits.size(), 0.0f));
 }
+
+struct remember_environment {
+  wfpg::exitance_cache_view cache;
+  WFPG_HD float operator()(float radiance) const { return cone_hit::environment(radiance).radiance(cache); }
+};
 
 WFPG_TEST_CASE("field store: a hit remembers the environment, and nonsense as darkness", "[field_store]") {
   const lit_box<Exec> box(graded_light, 4);
-  const auto remembered = [&](float radiance) {
-    return cone_hit::environment(radiance).radiance(box.cache.view());
+  const wfpg::exitance_cache_view cache = box.cache.view();
+  const auto remembered = [&](const std::vector<float>& radiance) {
+    return evaluate(box.exec, radiance, remember_environment{cache});
   };
-  for (float radiance : {0.0f, 1e-44f, 1e-30f, 0.3f, 7.0f, 1e30f}) CHECK(remembered(radiance) == radiance);
-  CHECK(remembered(3e38f) == 1e30f);
-  for (float radiance : {-0.0f, -1.0f, std::nanf(""), -std::nanf(""), INFINITY, -INFINITY})
-    CHECK(remembered(radiance) == 0.0f);
-  CHECK(cone_hit().radiance(box.cache.view()) == 0.0f);
+  const std::vector<float> light{0.0f, 1e-44f, 1e-30f, 0.3f, 7.0f, 1e30f};
+  CHECK(remembered(light) == light);
+  CHECK(remembered({3e38f}) == std::vector<float>{1e30f});
+  CHECK(remembered({-0.0f, -1.0f, std::nanf(""), -std::nanf(""), INFINITY, -INFINITY}) ==
+        std::vector<float>(6, 0.0f));
+  CHECK(evaluate(box.exec, [=] WFPG_HD() { return cone_hit().radiance(cache); }) == 0.0f);
 }
 
 /// How often each cell is cast by so many refreshes in turn.
@@ -114,9 +118,14 @@ namespace {
 struct draw_field {
   directional_field field;
   wfpg::array_view<drawn_direction> drawn;
-  void operator()(std::size_t i) const {
+  WFPG_HD void operator()(std::size_t i) const {
     drawn[i].direction = field.sample(hashed_numbers{99}(static_cast<std::uint32_t>(i), 0), drawn[i].pdf);
   }
+};
+
+struct field_pdf {
+  directional_field field;
+  WFPG_HD float operator()(vec3 direction) const { return field.pdf(direction); }
 };
 
 WFPG_TEST_CASE("field store: directions have the density that fields report, which sums to one",
@@ -131,8 +140,8 @@ WFPG_TEST_CASE("field store: directions have the density that fields report, whi
     guide_view view;
     for (int sample = 0; sample < 3; ++sample) view = box.whole_sample(wave);
     for (std::uint32_t ray : {0u, 1u, 7u, 10u}) {
-      REQUIRE(view.guides(ray));
-      const directional_field field = view.mixture(ray).field;
+      REQUIRE(guides(box.exec(), view, ray));
+      const directional_field field = box.field_of(view, ray);
       CHECK(field.hemisphere() == (mode == guiding_mode::oriented && ray % 5 != 0));
       const wfpg::buffer<drawn_direction, Exec> drawn(box.exec(), samples);
       box.exec().for_each(samples, draw_field{field, drawn.view()});
@@ -141,8 +150,7 @@ WFPG_TEST_CASE("field store: directions have the density that fields report, whi
         below += field.hemisphere() && glm::dot(d.direction, wave[ray].normal) < -1e-6f;
       sampler_check_options options;
       options.moments = ray == 0;
-      const auto report = check_sampler(
-          directions, [&](vec3 d) { return field.pdf(d); }, options);
+      const auto report = check_sampler(directions, densities_by{box.exec(), field_pdf{field}}, options);
       INFO("ray " << ray << ": " << report.message);
       CHECK(report);
       family.add(report.frequencies, "ray " + std::to_string(ray));
@@ -163,18 +171,27 @@ std::size_t cell_of(const directional_field& field, vec3 d) {
   return std::size_t(cell.y) * n + std::size_t(cell.x);
 }
 
-/// What each cell of a field sees in the cache, from noted cones; -1 where no cone looked.
-std::vector<double> seen_through(const cone_log& log, const directional_field& field,
-                                 wfpg::exitance_cache_view cache) {
-  const std::uint32_t n = field.grid().resolution();
-  std::vector<double> seen(std::size_t(n) * n, -1.0);
-  for (std::size_t i = 0; i < log.count(); ++i) {
-    const wfpg::ray& cone = log[i];
+/// What a cone sees of the box.
+struct look_through {
+  wfpg::exitance_cache_view cache;
+  float solid_angle;
+  WFPG_HD float operator()(const wfpg::ray& cone) const {
     const float distance = box_caster()(cone).distance;
     const wfpg::node_id leaf = cache.octree().nearest_leaf(cone.origin + distance * cone.direction);
-    const wfpg::node_id node = cache.octree().node_for_cone(leaf, distance, field.cell_solid_angle());
-    seen[cell_of(field, cone.direction)] = double(cache.read(node, -cone.direction));
+    return cache.read(cache.octree().node_for_cone(leaf, distance, solid_angle), -cone.direction);
   }
+};
+
+/// What each cell of a field sees in the cache, from noted cones; -1 where no cone looked.
+template <class Exec>
+std::vector<double> seen_through(const kept_box<Exec>& box, const directional_field& field) {
+  const std::uint32_t n = field.grid().resolution();
+  const std::vector<wfpg::ray> cones = box.log.cones();
+  const auto radiance =
+      evaluate(box.exec(), cones, look_through{box.box.cache.view(), field.cell_solid_angle()});
+  std::vector<double> seen(std::size_t(n) * n, -1.0);
+  for (std::size_t i = 0; i < cones.size(); ++i)
+    seen[cell_of(field, cones[i].direction)] = double(radiance[i]);
   return seen;
 }
 
@@ -184,16 +201,17 @@ double central_cosine(std::size_t cell, std::uint32_t n) {
   return double(wfpg::square_to_hemisphere((corner + 0.5f) / float(n)).z);
 }
 
-double largest_error(const directional_field& field, std::vector<double> seen) {
+template <class Exec>
+double largest_error(const Exec& exec, const directional_field& field, std::vector<double> seen) {
   const std::uint32_t n = field.grid().resolution();
   if (field.hemisphere())
     for (std::size_t i = 0; i < seen.size(); ++i) seen[i] *= central_cosine(i, n);
   const double sum = std::accumulate(seen.begin(), seen.end(), 0.0);
+  const std::vector<std::uint32_t> weights = cell_weights(exec, field.grid());
+  const std::uint32_t total = std::accumulate(weights.begin(), weights.end(), 0u);
   double largest = 0.0;
-  for (std::uint32_t i = 0; i < n * n; ++i) {
-    const double p = double(field.grid().weight(i % n, i / n)) / double(field.grid().total());
-    largest = std::max(largest, std::abs(p - seen[i] / sum));
-  }
+  for (std::uint32_t i = 0; i < n * n; ++i)
+    largest = std::max(largest, std::abs(double(weights[i]) / double(total) - seen[i] / sum));
   return largest;
 }
 
@@ -204,19 +222,19 @@ WFPG_TEST_CASE("field store: fields are what brute force makes of the same cones
     box.field = {0.0f, 0.0f, false};
     const auto wave = rays_at({0.3f, 0.0f, 0.6f}, {0, 1, 0}, 40);
     box.begin();
-    directional_field field = box.prepare(wave).mixture(0).field;
+    directional_field field = box.field_of(box.prepare(wave), 0);
     CHECK(box.log.count() == 144);
-    std::vector<double> seen = seen_through(box.log, field, box.box.cache.view());
+    std::vector<double> seen = seen_through(box, field);
     CHECK(std::count(seen.begin(), seen.end(), -1.0) == 0);
-    CHECK(largest_error(field, seen) < 1e-5);
+    CHECK(largest_error(box.exec(), field, seen) < 1e-5);
 
     box.box.cache.clear(box.exec());
     box.box.shine(graded_light);
     box.begin();
-    field = box.prepare(wave).mixture(0).field;
+    field = box.field_of(box.prepare(wave), 0);
     CHECK(box.log.count() == 144 + 36);
-    seen = seen_through(box.log, field, box.box.cache.view());  // later cones replace earlier ones
-    CHECK(largest_error(field, seen) < 1e-5);
+    seen = seen_through(box, field);  // later cones replace earlier ones
+    CHECK(largest_error(box.exec(), field, seen) < 1e-5);
   }
 }
 
@@ -225,20 +243,18 @@ WFPG_TEST_CASE("field store: a field keeps the frame of its first ray", "[field_
   box.field = {0.0f, 0.0f, false};
   const vec3 place(0.3f, 0.0f, 0.6f), first = glm::normalize(vec3(0.2f, 1.0f, 0.3f));
   box.begin();
-  CHECK(box.prepare(rays_at(place, first)).mixture(0).field.normal() == first);
+  CHECK(box.field_of(box.prepare(rays_at(place, first)), 0).normal() == first);
   for (const vec3 next : {vec3(0, 1, 0), glm::normalize(vec3(-0.6f, 1.0f, 0.1f))}) {
     box.begin();
-    const directional_field field = box.prepare(rays_at(place, next)).mixture(0).field;
+    const directional_field field = box.field_of(box.prepare(rays_at(place, next)), 0);
     CHECK(field.normal() == first);
     int below = 0;
-    for (std::size_t i = 0; i < box.log.count() && i < 180; ++i)
-      below += glm::dot(box.log[i].direction, first) < -1e-6f;
+    for (const wfpg::ray& cone : box.log.cones()) below += glm::dot(cone.direction, first) < -1e-6f;
     CHECK(below == 0);
-    if (next.x == 0.0f)
-      CHECK(largest_error(field, seen_through(box.log, field, box.box.cache.view())) < 1e-5);
+    if (next.x == 0.0f) CHECK(largest_error(box.exec(), field, seen_through(box, field)) < 1e-5);
   }
   box.store.invalidate_all(box.exec());
-  CHECK(box.prepare(rays_at(place, {0, 1, 0})).mixture(0).field.normal() == vec3(0, 1, 0));
+  CHECK(box.field_of(box.prepare(rays_at(place, {0, 1, 0})), 0).normal() == vec3(0, 1, 0));
 }
 
 WFPG_TEST_CASE("field store: refreshes in turn cast each cell of a field once", "[field_store]") {
@@ -250,10 +266,10 @@ WFPG_TEST_CASE("field store: refreshes in turn cast each cell of a field once", 
   directional_field field;
   for (int refresh = 0; refresh < 4; ++refresh) {
     box.begin();
-    field = box.prepare(wave).mixture(0).field;
+    field = box.field_of(box.prepare(wave), 0);
   }
   REQUIRE(box.log.count() == 64);
-  const std::vector<double> seen = seen_through(box.log, field, box.box.cache.view());
+  const std::vector<double> seen = seen_through(box, field);
   CHECK(std::count(seen.begin(), seen.end(), -1.0) == 0);
 }
 
@@ -267,14 +283,17 @@ WFPG_TEST_CASE("field store: refreshes follow light that moves without casting a
   kept_box<Exec> box(slots_of(16, 4, 16));
   const auto wave = rays_at({0.5f, 0.0f, 0.5f}, {0, 1, 0}, 10);
   box.begin();
-  const directional_field before = box.prepare(wave).mixture(0).field;
-  CHECK(before.pdf(to_old) > 20.0f * before.pdf(to_new));
+  const auto pdfs = [&](const guide_view& view) {
+    return evaluate(box.exec(), std::vector<vec3>{to_old, to_new}, field_pdf{box.field_of(view, 0)});
+  };
+  const std::vector<float> before = pdfs(box.prepare(wave));
+  CHECK(before[0] > 20.0f * before[1]);
   box.box.cache.clear(box.exec());
   box.box.shine(moved);
   box.begin();
   CHECK(box.cones(wave) == 16);
-  const directional_field after = box.prepare(wave).mixture(0).field;
-  CHECK(after.pdf(to_new) > 20.0f * after.pdf(to_old));
+  const std::vector<float> after = pdfs(box.prepare(wave));
+  CHECK(after[1] > 20.0f * after[0]);
 }
 
 /// What a store tells after samples of births, refreshes, refusals and evictions.
@@ -306,7 +325,7 @@ store_history history(std::size_t buffer_bytes = inline_cones, batch_box_caster:
       const guide_view view = buffer_bytes == inline_cones
                                   ? box.prepare(wave)
                                   : box.prepare(wave, batch_box_caster{{}, log}, buffer_bytes);
-      const auto bits = field_bits(view, wave.size());
+      const auto bits = field_bits(box.exec(), view, wave.size());
       result.fields.insert(result.fields.end(), bits.begin(), bits.end());
     }
     box.end();
@@ -324,21 +343,10 @@ WFPG_TEST_CASE("field store: the same bits on any number of threads", "[field_st
   CHECK(first.freed > 0);
   CHECK(first.refreshed > 50);
   CHECK(first.refused > 0);
-  for (std::size_t threads : {1, 2, 5}) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    tbb::task_arena arena(static_cast<int>(threads));
-    INFO(threads << " TBB threads");
-    CHECK(arena.execute([] { return history<Exec>(); }) == first);
-  }
-#if !defined(WFPG_TEST_ONLY_TBB)
-  const int before = omp_get_max_threads();
-  for (int threads : {1, 2, 5}) {
-    omp_set_num_threads(threads);
-    INFO(threads << " OpenMP threads");
+  with_threads([&](const std::string& threads) {
+    INFO(threads);
     CHECK(history<Exec>() == first);
-  }
-  omp_set_num_threads(before);
-#endif
+  });
 }
 
 WFPG_TEST_CASE("field store: casters of both forms, and buffers of any size, give the same bits",
@@ -358,7 +366,7 @@ WFPG_TEST_CASE("field store: casters of both forms, and buffers of any size, giv
 
 }  // namespace
 
-#if !defined(WFPG_TEST_ONLY_TBB)
+#if defined(WFPG_TEST_SEVERAL_POLICIES)
 TEST_CASE("field store: policies of one warp width give the same bits", "[field_store]") {
   const store_history serial = history<wfpg::exec::seq>();
   CHECK(history<wfpg::exec::omp>() == serial);

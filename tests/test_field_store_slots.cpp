@@ -1,7 +1,9 @@
 // Kept fields' slots: who gets one under a budget, when fields are built and with how many cones, at which
 // level of the octree they are, when they are freed or cast anew, and what is refused. What fields hold is
 // test_field_store.cpp's.
+#include "support/evaluate.hpp"
 #include "support/kept_fields.hpp"
+#include "support/octree_nodes.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
@@ -43,18 +45,26 @@ bool consistent(const kept_box<Exec>& box) {
          counts.live + state.free - state.taken == counts.capacity;
 }
 
-/// Rays without a field are their BSDF's alone.
-int guided_otherwise(const guide_view& view, const std::vector<test_surface>& wave) {
-  int wrong = 0;
-  for (std::uint32_t ray = 0; ray < wave.size(); ++ray) {
-    if (view.guides(ray)) continue;
-    const test_surface& s = wave[ray];
+struct is_guided_otherwise {
+  guide_view view;
+  wfpg::array_view<const test_surface> wave;
+  WFPG_HD bool operator()(std::size_t i) const {
+    const auto ray = static_cast<std::uint32_t>(i);
+    if (view.guides(ray)) return false;
+    const test_surface& s = wave[i];
     const auto drawn = view.sample(ray, s, 0.1f, {0.3f, 0.6f});
-    wrong += drawn.technique != wfpg::sampling_technique::bsdf;
-    wrong += drawn.pdf != s.bsdf.pdf(s.outgoing, drawn.direction);
-    wrong += view.pdf(ray, s, s.normal) != s.bsdf.pdf(s.outgoing, s.normal);
+    return drawn.technique != wfpg::sampling_technique::bsdf ||
+           !alike(drawn.pdf, s.bsdf.pdf(s.outgoing, drawn.direction)) ||
+           !alike(view.pdf(ray, s, s.normal), s.bsdf.pdf(s.outgoing, s.normal));
   }
-  return wrong;
+};
+
+/// Rays without a field are their BSDF's alone.
+template <class Exec>
+std::size_t guided_otherwise(const kept_box<Exec>& box, const guide_view& view,
+                             const std::vector<test_surface>& wave) {
+  const wfpg::buffer<test_surface, Exec> device(box.exec(), wave);
+  return count_where(box.exec(), wave.size(), is_guided_otherwise{view, const_view<test_surface>(device)});
 }
 
 WFPG_TEST_CASE("field store: budgets of nothing, less than a slot, one slot, and 1 MiB", "[field_store]") {
@@ -70,9 +80,9 @@ WFPG_TEST_CASE("field store: budgets of nothing, less than a slot, one slot, and
     for (int sample = 0; sample < 3; ++sample) {
       const guide_view view = box.whole_sample(wave);
       CHECK(consistent(box));
-      CHECK(guided_otherwise(view, wave) == 0);
+      CHECK(guided_otherwise(box, view, wave) == 0);
       const auto state = box.state();
-      CHECK(state.served == count_guided(view, wave.size()));
+      CHECK(state.served == count_guided(box.exec(), view, wave.size()));
       CHECK(state.served + state.unserved == wave.size());
       CHECK(state.unbinned == 0);
       const bool everyone = budget > 1000000;
@@ -152,7 +162,7 @@ WFPG_TEST_CASE("field store: slots unused for some samples are freed and used ag
     CHECK(consistent(box));
     box.log.take();
     const auto wave = floor_rays(12);
-    CHECK(count_guided(box.settle(wave), 12) == 12);
+    CHECK(count_guided(box.exec(), box.settle(wave), 12) == 12);
     CHECK(box.log.take() == 8 * 16 + 4 * 4);
     CHECK(box.counts().born == 20);
     CHECK(box.counts().live == 12);
@@ -168,13 +178,13 @@ WFPG_TEST_CASE("field store: with refusals slots are freed after one idle sample
   const std::vector<test_surface> other = rays_at({0.5f, 1.0f, 0.5f}, down, 9);
   box.begin();
   const guide_view view = box.prepare(other);
-  CHECK(count_guided(view, 9) == 0);
-  CHECK(guided_otherwise(view, other) == 0);
+  CHECK(count_guided(box.exec(), view, 9) == 0);
+  CHECK(guided_otherwise(box, view, other) == 0);
   CHECK(box.counts().refused == 1);
   box.begin();
   CHECK(box.counts().refused == 0);
   CHECK(box.counts().freed == 5);
-  CHECK(count_guided(box.prepare(other), 9) == 9);
+  CHECK(count_guided(box.exec(), box.prepare(other), 9) == 9);
   CHECK(box.counts().live == 1);
   CHECK(consistent(box));
 }
@@ -192,7 +202,7 @@ WFPG_TEST_CASE(
   box.begin();
   box.log.take();
   const guide_view coarse = box.prepare(crowd);
-  CHECK(count_guided(coarse, crowd.size()) == crowd.size());
+  CHECK(count_guided(box.exec(), coarse, crowd.size()) == crowd.size());
   CHECK(box.log.take() == 4);  // the ancestor's refresh
   CHECK(box.counts().refused == 1);
   CHECK(box.counts().live == 8);
@@ -220,20 +230,28 @@ WFPG_TEST_CASE("field store: levels are chosen anew after samples 1, 2, 4, 8, ..
 struct count_at {
   wfpg::detail::bin_marks_view marks;
   wfpg::array_view<const wfpg::node_id> leaves;
-  void operator()(std::size_t i) const { marks.count(leaves[i]); }
+  WFPG_HD void operator()(std::size_t i) const { marks.count(leaves[i]); }
 };
 
 /// The deepest ancestor of enough rays, or that of the least level. Half of c_ray a sample is enough.
-wfpg::node_id bin_by_hand(const wfpg::sparse_voxel_octree_view& tree, const std::vector<wfpg::node_id>& rays,
+wfpg::node_id bin_by_hand(const std::vector<node_record>& nodes, const std::vector<wfpg::node_id>& rays,
                           wfpg::node_id leaf, std::uint32_t min_level, std::size_t enough) {
-  for (std::uint32_t level = tree.depth(); level > min_level; --level) {
-    const wfpg::node_id node = tree.ancestor(leaf, level);
+  for (std::uint32_t level = nodes[leaf].level; level > min_level; --level) {
+    const wfpg::node_id node = nodes[leaf].ancestor[level];
     const auto inside = std::count_if(rays.begin(), rays.end(),
-                                      [&](wfpg::node_id ray) { return tree.ancestor(ray, level) == node; });
+                                      [&](wfpg::node_id ray) { return nodes[ray].ancestor[level] == node; });
     if (std::size_t(inside) >= enough) return node;
   }
-  return tree.ancestor(leaf, min_level);
+  return nodes[leaf].ancestor[min_level];
 }
+
+struct bin_of_leaf {
+  wfpg::detail::bin_marks_view marks;
+  wfpg::node_id first_leaf;
+  WFPG_HD wfpg::node_id operator()(std::size_t i) const {
+    return marks.bin(first_leaf + static_cast<wfpg::node_id>(i));
+  }
+};
 
 WFPG_TEST_CASE(
     "field store: bins are the deepest nodes with enough rays a sample, or as many as there is room",
@@ -246,15 +264,17 @@ WFPG_TEST_CASE(
     rays.push_back(tree.first_leaf() + random.below(1 + random.below(tree.leaf_count())));
   const wfpg::buffer<wfpg::node_id, Exec> leaves(box.exec, rays);
   const wfpg::buffer<std::uint32_t, Exec> pressure(box.exec, std::vector<std::uint32_t>{2});
+  const std::vector<node_record> nodes = nodes_of(box.exec, tree);
   for (std::uint32_t min_level : {0u, 2u, 9u}) {
     const std::uint32_t least = std::min(min_level, tree.depth());
     wfpg::detail::bin_marks<Exec> marks(box.exec, tree, {min_level, 6});
     const auto agree = [&](std::size_t enough) {
       int wrong = 0;
+      const auto bins = evaluate(box.exec, tree.leaf_count(), bin_of_leaf{marks.view(), tree.first_leaf()});
       for (std::uint32_t i = 0; i < tree.leaf_count(); i += 3) {
-        const wfpg::node_id leaf = tree.first_leaf() + i, bin = marks.view().bin(leaf);
-        wrong += bin != bin_by_hand(tree, rays, leaf, least, enough);
-        wrong += tree.level_of(bin) < least || tree.ancestor(leaf, tree.level_of(bin)) != bin;
+        const wfpg::node_id leaf = tree.first_leaf() + i, bin = bins[i];
+        wrong += bin != bin_by_hand(nodes, rays, leaf, least, enough);
+        wrong += nodes[bin].level < least || nodes[leaf].ancestor[nodes[bin].level] != bin;
       }
       return wrong == 0;
     };
@@ -282,12 +302,12 @@ WFPG_TEST_CASE("field store: a wave casts no more cones than it may, and nobody 
       box.begin();
       CHECK(box.cones(wave) <= most);
       const guide_view view = box.prepare(wave);
-      CHECK(guided_otherwise(view, wave) == 0);
+      CHECK(guided_otherwise(box, view, wave) == 0);
       CHECK(consistent(box));
       if (sample == 0) CHECK(box.counts().refused > 0);
     }
     CHECK(box.counts().born == (most < 16 ? 0 : 16));
-    CHECK(count_guided(box.prepare(wave), 16) == (most < 16 ? 0 : 16));
+    CHECK(count_guided(box.exec(), box.prepare(wave), 16) == (most < 16 ? 0 : 16));
     box.store.invalidate_all(box.exec());
     std::size_t recast = 0;
     for (std::uint32_t sample = 0; sample < 40; ++sample) {
@@ -320,11 +340,11 @@ WFPG_TEST_CASE("field store: a slot used again guides nobody until its own field
     box.begin();
     box.log.take();
     const guide_view view = box.prepare(second);  // both are to be cast whole, and one has to wait
-    const bool built = box.log[0].origin.y > 0.5f;
+    const bool built = box.log.cones().at(0).origin.y > 0.5f;
     CHECK(box.log.count() == 16);
-    CHECK(view.guides(0));
-    CHECK(view.guides(1) == built);
-    CHECK(guided_otherwise(view, second) == 0);
+    CHECK(guides(box.exec(), view, 0));
+    CHECK(guides(box.exec(), view, 1) == built);
+    CHECK(guided_otherwise(box, view, second) == 0);
     waited += !built;
   }
   CHECK(waited > 0);
@@ -336,15 +356,14 @@ WFPG_TEST_CASE("field store: a limit on cones is shared evenly, however large th
   options.max_wave_cones = 16;  // a birth, or 4 refreshes
   kept_box<Exec> box(options, wfpg::guiding_mode::oriented, 16);
   box.begin();
-  while (count_guided(box.prepare(wave), 16) < 16) {
+  while (count_guided(box.exec(), box.prepare(wave), 16) < 16) {
   }
   std::vector<int> cones(16, 0);
   for (int sample = 0; sample < 14; ++sample) {  // every field is due in each of them
     box.begin();
     CHECK(box.cones(wave) == 16);
-    for (std::size_t cone = 0; cone < 16; ++cone)
-      for (std::uint32_t i = 0; i < 16; ++i)
-        cones[i] += glm::distance(box.log[cone].origin, floor_place(i)) < 0.1f;
+    for (const wfpg::ray& cone : box.log.cones(16))
+      for (std::uint32_t i = 0; i < 16; ++i) cones[i] += glm::distance(cone.origin, floor_place(i)) < 0.1f;
   }
   const auto [least, most] = std::minmax_element(cones.begin(), cones.end());
   INFO("least " << *least << ", most " << *most);
@@ -399,14 +418,14 @@ WFPG_TEST_CASE("field store: invalid fields serve as they are until they are use
   kept_box<Exec> box(slots_of(8, 10));
   const auto wave = floor_rays(3);
   box.begin();
-  const auto before = field_bits(box.settle(wave), 3);
+  const auto before = field_bits(box.exec(), box.settle(wave), 3);
   box.store.invalidate_all(box.exec());
   CHECK(box.cones({wave[0]}) == 64);
   box.begin();
   CHECK(box.cones({wave[1]}) == 64);
   CHECK(box.cones({wave[1], wave[0]}) == 16);
   CHECK(box.counts().born == 3);
-  CHECK(field_bits(box.prepare({wave[2]}), 1)[0] != before[2]);
+  CHECK(field_bits(box.exec(), box.prepare({wave[2]}), 1)[0] != before[2]);
 }
 
 WFPG_TEST_CASE("field store: unusual rays are counted and have no field", "[field_store]") {
@@ -422,8 +441,8 @@ WFPG_TEST_CASE("field store: unusual rays are counted and have no field", "[fiel
   CHECK(box.state().unbinned == 3);
   CHECK(box.state().unserved == 0);
   CHECK(box.state().served == 7);
-  CHECK(count_guided(view, wave.size()) == 7);
-  CHECK(count_guided(box.prepare({}), 12) == 0);
+  CHECK(count_guided(box.exec(), view, wave.size()) == 7);
+  CHECK(count_guided(box.exec(), box.prepare({}), 12) == 0);
 }
 
 WFPG_TEST_CASE("field store: options out of range are named, and too many rays refused", "[field_store]") {
@@ -445,7 +464,8 @@ WFPG_TEST_CASE("field store: options out of range are named, and too many rays r
   box.begin();
   const std::string message = refusal([&] { box.prepare(rays_at({}, up, box.max_rays + 1)); });
   CHECK(message.find("ray_count") != std::string::npos);
-  CHECK(count_guided(box.prepare(rays_at(floor_place(0), up, box.max_rays)), 2000) == box.max_rays);
+  CHECK(count_guided(box.exec(), box.prepare(rays_at(floor_place(0), up, box.max_rays)), 2000) ==
+        box.max_rays);
 }
 
 WFPG_TEST_CASE("field store: a caster that throws leaves it usable, and fields are built in the next wave",
@@ -455,13 +475,13 @@ WFPG_TEST_CASE("field store: a caster that throws leaves it usable, and fields a
   for (std::size_t call : {0, 1, 3}) {
     box.begin();
     other.begin();
-    const auto expected = field_bits(other.settle(wave), wave.size());
+    const auto expected = field_bits(other.exec(), other.settle(wave), wave.size());
     batch_box_caster::log log;
     log.throw_at = call;
     CHECK_THROWS_AS(box.prepare(wave, batch_box_caster{{}, &log}, 1), std::runtime_error);
     CHECK(consistent(box));
-    CHECK(field_bits(box.settle(wave), wave.size()) == expected);
-    CHECK(count_guided(box.prepare(wave), wave.size()) == wave.size());
+    CHECK(field_bits(box.exec(), box.settle(wave), wave.size()) == expected);
+    CHECK(count_guided(box.exec(), box.prepare(wave), wave.size()) == wave.size());
     CHECK(box.counts().live == 16);
     box.end();
     other.end();

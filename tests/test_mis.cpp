@@ -1,5 +1,6 @@
 // Multiple importance sampling: the heuristics, and the mixture of a field and a BSDF, whose density has to
 // be how often it draws a direction.
+#include "support/evaluate.hpp"
 #include "support/fields.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
@@ -24,7 +25,7 @@ struct draw_mixture {
   test_surface surface;
   std::uint64_t seed;
   wfpg::array_view<sampled_direction> drawn;
-  void operator()(std::size_t i) const {
+  WFPG_HD void operator()(std::size_t i) const {
     const hashed_numbers random{seed};
     const auto ray = static_cast<std::uint32_t>(i);
     drawn[i] = mixture.sample(surface, random(ray, 0).x, random(ray, 1));
@@ -37,6 +38,25 @@ std::vector<sampled_direction> draw(const Exec& exec, const guide_mixture& mixtu
   const wfpg::buffer<sampled_direction, Exec> drawn(exec, n);
   exec.for_each(n, draw_mixture{mixture, surface, seed, drawn.view()});
   return drawn.to_host(exec);
+}
+
+/// What a mixture says of the density of directions.
+struct mixture_pdf {
+  guide_mixture mixture;
+  test_surface surface;
+  WFPG_HD float operator()(vec3 direction) const { return mixture.pdf(surface, direction); }
+};
+struct field_pdf {
+  directional_field field;
+  WFPG_HD float operator()(vec3 direction) const { return field.pdf(direction); }
+};
+
+/// The same of what was drawn, by the policy that drew it.
+template <class Exec, class Pdf>
+std::vector<float> densities(const Exec& exec, const Pdf& pdf, const std::vector<sampled_direction>& drawn) {
+  std::vector<vec3> directions;
+  for (const sampled_direction& d : drawn) directions.push_back(d.direction);
+  return evaluate(exec, directions, pdf);
 }
 
 std::size_t count(const std::vector<sampled_direction>& drawn, sampling_technique technique) {
@@ -82,8 +102,8 @@ WFPG_TEST_CASE("MIS: the mixture's density is its sampling frequency", "[mis]") 
         for (const sampled_direction& d : drawn) directions.push_back({d.direction, d.pdf});
         sampler_check_options options;
         options.moments = fraction == 0.3f;
-        const auto report = check_sampler(
-            directions, [&](vec3 d) { return mixture.pdf(surface, d); }, options);
+        const auto report =
+            check_sampler(directions, densities_by{exec, mixture_pdf{mixture, surface}}, options);
         INFO("fraction " << fraction << ": " << report.message);
         CHECK(report);
         family.add(report.frequencies, "fraction " + std::to_string(fraction));
@@ -106,10 +126,12 @@ WFPG_TEST_CASE("MIS: a query's density is the sample's, bit for bit", "[mis]") {
       for (float fraction : fractions) {
         const test_surface surface = make_surface({}, up, toward_eye, kind);
         const guide_mixture mixture{field, fraction};
+        const auto drawn = draw(exec, mixture, surface, 500, 11);
+        const auto asked = densities(exec, mixture_pdf{mixture, surface}, drawn);
         std::size_t differing = 0;
-        for (const sampled_direction& d : draw(exec, mixture, surface, 500, 11)) {
-          if (d.technique == sampling_technique::none) continue;
-          differing += d.pdf != mixture.pdf(surface, d.direction) || !(d.pdf > 0.0f);
+        for (std::size_t i = 0; i < drawn.size(); ++i) {
+          if (drawn[i].technique == sampling_technique::none) continue;
+          differing += drawn[i].pdf != asked[i] || !(drawn[i].pdf > 0.0f);
         }
         INFO("kind " << int(kind) << ", fraction " << fraction);
         CHECK(differing == 0);
@@ -122,11 +144,14 @@ WFPG_TEST_CASE("MIS: the density is the weighted sum of the two", "[mis]") {
   const directional_field field(built.grid());
   const test_surface surface = make_surface({}, up, toward_eye);
   random_numbers random(2);
-  for (int i = 0; i < 100; ++i) {
-    const vec3 d = random.direction();
-    for (float fraction : fractions)
-      CHECK(guide_mixture{field, fraction}.pdf(surface, d) ==
-            Approx(fraction * field.pdf(d) + (1.0f - fraction) * surface.bsdf.pdf(toward_eye, d)));
+  std::vector<vec3> directions;
+  for (int i = 0; i < 100; ++i) directions.push_back(random.direction());
+  const auto of_field = evaluate(exec, directions, field_pdf{field});
+  for (float fraction : fractions) {
+    const auto mixed = evaluate(exec, directions, mixture_pdf{{field, fraction}, surface});
+    for (std::size_t i = 0; i < directions.size(); ++i)
+      CHECK(mixed[i] ==
+            Approx(fraction * of_field[i] + (1.0f - fraction) * surface.bsdf.pdf(toward_eye, directions[i])));
   }
 }
 
@@ -134,7 +159,9 @@ WFPG_TEST_CASE("MIS: delta BSDFs are sampled alone", "[mis]") {
   const Exec exec;
   const built_field<Exec> built(exec, field_values(field_kind::noise, 16, 3), 16);
   const test_surface surface = make_surface({}, up, toward_eye, bsdf_kind::mirror);
-  const vec3 mirrored = surface.bsdf.sample(toward_eye, {}).direction;
+  const vec3 to_eye = toward_eye;
+  const vec3 mirrored =
+      evaluate(exec, [=] WFPG_HD() { return surface.bsdf.sample(to_eye, vec2(0.0f)).direction; });
   for (float fraction : fractions) {
     const guide_mixture mixture{directional_field(built.grid(), up), fraction};
     for (const sampled_direction& d : draw(exec, mixture, surface, 100, 1)) {
@@ -142,7 +169,8 @@ WFPG_TEST_CASE("MIS: delta BSDFs are sampled alone", "[mis]") {
       CHECK(d.direction == mirrored);
       CHECK(d.pdf == 0.75f);
     }
-    CHECK(mixture.pdf(surface, mirrored) == 0.0f);
+    CHECK(evaluate(exec, std::vector<vec3>{mirrored}, mixture_pdf{mixture, surface}) ==
+          std::vector<float>{0.0f});
   }
 }
 
@@ -151,19 +179,23 @@ WFPG_TEST_CASE("MIS: fraction 0 and an empty field leave the BSDF, fraction 1 th
   const built_field<Exec> built(exec, field_values(field_kind::noise, 16, 3), 16);
   const directional_field field(built.grid(), up);
   const test_surface surface = make_surface({}, up, toward_eye);
+  const vec3 to_eye = toward_eye;
+  const auto alone = evaluate(exec, 200, [=] WFPG_HD(std::size_t i) {
+    return surface.bsdf.sample(to_eye, hashed_numbers{4}(static_cast<std::uint32_t>(i), 1));
+  });
   for (const guide_mixture& mixture :
        {guide_mixture{field, 0.0f}, guide_mixture{{}, 0.7f}, guide_mixture{}}) {
     const auto drawn = draw(exec, mixture, surface, 200, 4);
     CHECK(count(drawn, sampling_technique::bsdf) == drawn.size());
     for (std::uint32_t i = 0; i < drawn.size(); ++i) {
-      const wfpg::bsdf_sample alone = surface.bsdf.sample(toward_eye, hashed_numbers{4}(i, 1));
-      CHECK(drawn[i].direction == alone.direction);
-      CHECK(drawn[i].pdf == alone.pdf);
+      CHECK(alike(drawn[i].direction, alone[i].direction));
+      CHECK(alike(drawn[i].pdf, alone[i].pdf));
     }
   }
   const auto guided = draw(exec, {field, 1.0f}, surface, 200, 4);
   CHECK(count(guided, sampling_technique::guide) == guided.size());
-  for (const sampled_direction& d : guided) CHECK(d.pdf == field.pdf(d.direction));
+  const auto asked = densities(exec, field_pdf{field}, guided);
+  for (std::size_t i = 0; i < guided.size(); ++i) CHECK(guided[i].pdf == asked[i]);
 }
 
 WFPG_TEST_CASE("MIS: a BSDF whose sampling fails ends the path", "[mis]") {
@@ -176,12 +208,13 @@ WFPG_TEST_CASE("MIS: a BSDF whose sampling fails ends the path", "[mis]") {
   CHECK(failed > 400);
   CHECK(failed < 600);
   CHECK(failed + count(drawn, sampling_technique::guide) == drawn.size());
-  for (const sampled_direction& d : drawn)
-    if (d.technique == sampling_technique::none) {
-      CHECK(d.pdf == 0.0f);
-      CHECK(d.direction == vec3(0.0f));
+  const auto asked = densities(exec, mixture_pdf{mixture, surface}, drawn);
+  for (std::size_t i = 0; i < drawn.size(); ++i)
+    if (drawn[i].technique == sampling_technique::none) {
+      CHECK(drawn[i].pdf == 0.0f);
+      CHECK(drawn[i].direction == vec3(0.0f));
     } else {
-      CHECK(d.pdf == mixture.pdf(surface, d.direction));
+      CHECK(drawn[i].pdf == asked[i]);
     }
 }
 

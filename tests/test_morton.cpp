@@ -44,11 +44,12 @@ WFPG_TEST_CASE("Morton codes round trip", "[morton]") {
   const std::vector<uvec3> points = coordinates();
   const wfpg::buffer<uvec3, Exec> device_points(exec, points), decoded(exec, points.size());
   const wfpg::buffer<morton_code, Exec> codes(exec, points.size());
-  exec.for_each(points.size(),
-                [p = device_points.view(), d = decoded.view(), c = codes.view()](std::size_t i) {
-                  c[i] = wfpg::morton_encode(p[i]);
-                  d[i] = wfpg::morton_decode(c[i]);
-                });
+  const auto p = device_points.view(), d = decoded.view();
+  const auto c = codes.view();
+  exec.for_each(points.size(), [=] WFPG_HD(std::size_t i) {
+    c[i] = wfpg::morton_encode(p[i]);
+    d[i] = wfpg::morton_decode(c[i]);
+  });
   CHECK((decoded.to_host(exec) == points));
   std::vector<morton_code> expected;
   for (const uvec3 p : points) expected.push_back(interleaved(p));

@@ -26,16 +26,16 @@ double angle_between(vec3 a, vec3 b) {
 
 /// The two maps under one name.
 struct sphere {
-  static vec3 direction(vec2 uv) { return wfpg::square_to_sphere(uv); }
-  static vec2 square(vec3 d) { return wfpg::sphere_to_square(d); }
+  WFPG_HD static vec3 direction(vec2 uv) { return wfpg::square_to_sphere(uv); }
+  WFPG_HD static vec2 square(vec3 d) { return wfpg::sphere_to_square(d); }
   static constexpr double area = 4.0 * pi;
-  static bool covers(vec3) { return true; }
+  WFPG_HD static bool covers(vec3) { return true; }
 };
 struct hemisphere {
-  static vec3 direction(vec2 uv) { return wfpg::square_to_hemisphere(uv); }
-  static vec2 square(vec3 d) { return wfpg::hemisphere_to_square(d); }
+  WFPG_HD static vec3 direction(vec2 uv) { return wfpg::square_to_hemisphere(uv); }
+  WFPG_HD static vec2 square(vec3 d) { return wfpg::hemisphere_to_square(d); }
   static constexpr double area = 2.0 * pi;
-  static bool covers(vec3 d) { return d.z >= 0.0f; }
+  WFPG_HD static bool covers(vec3 d) { return d.z >= 0.0f; }
 };
 
 /// Points of the square: a grid with its edges, its diagonals, points close to them, and random ones.
@@ -83,7 +83,9 @@ void check_square_round_trip(const Exec& exec) {
   const std::vector<vec2> points = square_points();
   const wfpg::buffer<vec2, Exec> from(exec, points), back(exec, points.size());
   const wfpg::buffer<vec3, Exec> through(exec, points.size());
-  exec.for_each(points.size(), [=, f = from.view(), t = through.view(), b = back.view()](std::size_t i) {
+  const auto f = from.view(), b = back.view();
+  const auto t = through.view();
+  exec.for_each(points.size(), [=] WFPG_HD(std::size_t i) {
     t[i] = Map::direction(f[i]);
     b[i] = Map::square(t[i]);
   });
@@ -107,9 +109,8 @@ void check_direction_round_trip(const Exec& exec) {
   std::vector<vec3> all = directions();
   all.erase(std::remove_if(all.begin(), all.end(), [](vec3 d) { return !Map::covers(d); }), all.end());
   const wfpg::buffer<vec3, Exec> from(exec, all), back(exec, all.size());
-  exec.for_each(all.size(), [=, f = from.view(), b = back.view()](std::size_t i) {
-    b[i] = Map::direction(Map::square(f[i]));
-  });
+  const auto f = from.view(), b = back.view();
+  exec.for_each(all.size(), [=] WFPG_HD(std::size_t i) { b[i] = Map::direction(Map::square(f[i])); });
   const std::vector<vec3> returned = back.to_host(exec);
   double worst = 0.0;
   for (std::size_t i = 0; i < all.size(); ++i) worst = std::max(worst, angle_between(all[i], returned[i]));
@@ -144,14 +145,14 @@ TEST_CASE("poles and edges of the octahedral map", "[octahedral_map]") {
 }
 
 /// Solid angle of a spherical triangle (Van Oosterom & Strackee 1983), signed.
-double solid_angle(glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) {
+WFPG_HD double solid_angle(glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) {
   return 2.0 *
          std::atan2(glm::dot(a, glm::cross(b, c)), 1.0 + glm::dot(a, b) + glm::dot(b, c) + glm::dot(c, a));
 }
 
 /// Solid angle of a cell of the map, from `steps` points along each of its edges.
 template <class Map>
-double cell_area(int x, int y, int size, int steps) {
+WFPG_HD double cell_area(int x, int y, int size, int steps) {
   const auto on_sphere = [&](double cx, double cy) {
     const vec2 uv(static_cast<float>(cx / size), static_cast<float>(cy / size));
     return glm::normalize(glm::dvec3(Map::direction(uv)));
@@ -176,7 +177,8 @@ template <class Map, class Exec>
 void check_areas(const Exec& exec, int size, int steps) {
   const std::size_t cells = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
   const wfpg::buffer<double, Exec> areas(exec, cells);
-  exec.for_each(cells, [=, out = areas.view()](std::size_t i) {
+  const auto out = areas.view();
+  exec.for_each(cells, [=] WFPG_HD(std::size_t i) {
     out[i] = cell_area<Map>(static_cast<int>(i) % size, static_cast<int>(i) / size, size, steps);
   });
   const double expected = Map::area / static_cast<double>(cells);
@@ -258,9 +260,9 @@ WFPG_TEST_CASE("packed directions are within 0.01 degrees", "[octahedral_map]") 
   const Exec exec;
   std::vector<vec3> all = directions();
   const wfpg::buffer<vec3, Exec> from(exec, all), back(exec, all.size());
-  exec.for_each(all.size(), [f = from.view(), b = back.view()](std::size_t i) {
-    b[i] = wfpg::unpack_direction(wfpg::pack_direction(f[i]));
-  });
+  const auto f = from.view(), b = back.view();
+  exec.for_each(all.size(),
+                [=] WFPG_HD(std::size_t i) { b[i] = wfpg::unpack_direction(wfpg::pack_direction(f[i])); });
   const std::vector<vec3> returned = back.to_host(exec);
   double worst = 0.0, worst_length = 0.0;
   for (std::size_t i = 0; i < all.size(); ++i) {

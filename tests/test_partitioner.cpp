@@ -1,5 +1,6 @@
 // The partitioner against std::stable_sort.
 #include "support/catch.hpp"
+#include "support/evaluate.hpp"
 #include "support/policies.hpp"
 
 #include <wfpg/partitioner.hpp>
@@ -40,6 +41,11 @@ expected_partition sorted_stably(const indices& keys) {
   return expected;
 }
 
+/// What a view says of a group.
+struct group_record {
+  std::uint32_t key, begin, size;
+};
+
 template <class Exec>
 void check_partition(const Exec& exec, wfpg::partitioner<Exec>& partitioner, const indices& keys) {
   const wfpg::buffer<std::uint32_t, Exec> device_keys(exec, keys);
@@ -60,10 +66,13 @@ void check_partition(const Exec& exec, wfpg::partitioner<Exec>& partitioner, con
   CHECK((to_host(exec, view.offsets.subview(0, groups + 1)) == expected.offsets));
   const indices through = to_host(exec, view.group_through);
   std::size_t wrong = 0;
+  const auto described = evaluate(exec, groups, [=] WFPG_HD(std::size_t group) {
+    return group_record{view.key(group), view.begin(group), view.size(group)};
+  });
   for (std::uint32_t group = 0; group < groups; ++group) {
-    wrong += view.key(group) != expected.keys[group];
-    wrong += view.begin(group) != expected.offsets[group];
-    wrong += view.size(group) != expected.offsets[group + 1] - expected.offsets[group];
+    wrong += described[group].key != expected.keys[group];
+    wrong += described[group].begin != expected.offsets[group];
+    wrong += described[group].size != expected.offsets[group + 1] - expected.offsets[group];
     for (std::uint32_t i = expected.offsets[group]; i < expected.offsets[group + 1]; ++i)
       wrong += through[i] != group + 1;
   }

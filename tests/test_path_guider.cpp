@@ -92,7 +92,7 @@ WFPG_TEST_CASE("path guider: waves beyond the capacity, and outputs that are too
         large(box.exec, wall_surfaces(1025, 1));
     const wfpg::buffer<sampled_direction, Exec> directions(box.exec, 2000);
     const wfpg::buffer<float, Exec> densities(box.exec, 99);
-    const auto query = [](std::uint32_t) { return vec3(0, 1, 0); };
+    const auto query = [] WFPG_HD(std::uint32_t) { return vec3(0, 1, 0); };
     CHECK_THROWS_AS(box.guider.sample_directions(large.get(), box_caster{}, directions.view()),
                     std::invalid_argument);
     CHECK_THROWS_AS(box.guider.prepare(large.get(), box_caster{}), std::invalid_argument);
@@ -113,7 +113,7 @@ WFPG_TEST_CASE("path guider: no rays, and no capacity for any", "[path_guider]")
     CHECK(box.sample({}).empty());
     CHECK(box.sample({}, batch_box_caster{{}, &log}).empty());
     const wave_of_surfaces<Exec> none(box.exec, {});
-    CHECK(!box.guider.prepare(none.get(), box_caster{}).guides(0));
+    CHECK(!guides(box.exec, box.guider.prepare(none.get(), box_caster{}), 0));
     CHECK(log.rays == 0);
     CHECK(box.guider.statistics().depths[0].bins == 0);
 
@@ -125,6 +125,17 @@ WFPG_TEST_CASE("path guider: no rays, and no capacity for any", "[path_guider]")
     CHECK_THROWS_AS(incapable.sample(wall_surfaces(1, 1)), std::invalid_argument);
   }
 }
+
+/// What a ray's BSDF draws alone, and its density of that.
+struct sample_of_bsdf {
+  stored_surfaces surfaces;
+  WFPG_HD wfpg::bsdf_sample operator()(std::size_t i) const {
+    const auto ray = static_cast<std::uint32_t>(i);
+    const test_surface s = surfaces(ray);
+    const vec3 direction = s.bsdf.sample(s.outgoing, hashed_numbers{1}(ray, 1)).direction;
+    return {direction, s.bsdf.pdf(s.outgoing, direction)};
+  }
+};
 
 WFPG_TEST_CASE("path guider: rays outside every voxel are counted and sampled by their BSDF",
                "[path_guider]") {
@@ -138,16 +149,16 @@ WFPG_TEST_CASE("path guider: rays outside every voxel are counted and sampled by
     const wave_of_surfaces<Exec> wave(box.exec, surfaces);
     const auto before = box.guider.statistics().depths[0];
     const wfpg::guide_view view = box.guider.prepare(wave.get(), box_caster{});
+    const auto alone = evaluate(box.exec, surfaces.size(), sample_of_bsdf{wave.get().surfaces});
     for (std::size_t i = 0; i < 5; ++i) {
-      const test_surface& s = surfaces[40 * i];
       const sampled_direction& d = drawn[40 * i];
       CHECK(d.technique == sampling_technique::bsdf);
-      CHECK(d.direction == s.bsdf.sample(s.outgoing, hashed_numbers{1}(std::uint32_t(40 * i), 1)).direction);
-      CHECK(d.pdf == s.bsdf.pdf(s.outgoing, d.direction));
-      CHECK(!view.guides(std::uint32_t(40 * i)));
-      CHECK(view.guides(std::uint32_t(40 * i + 1)));
+      CHECK(alike(d.direction, alone[40 * i].direction));
+      CHECK(alike(d.pdf, alone[40 * i].pdf));
+      CHECK(!guides(box.exec, view, std::uint32_t(40 * i)));
+      CHECK(guides(box.exec, view, std::uint32_t(40 * i + 1)));
     }
-    CHECK(!view.guides(200));
+    CHECK(!guides(box.exec, view, 200));
     const auto after = box.guider.statistics().depths[0];
     CHECK(after.unbinned - before.unbinned == 5);
     CHECK(after.rays - before.rays == 195);
@@ -197,7 +208,7 @@ WFPG_TEST_CASE("path guider: an empty mesh guides nothing and works", "[path_gui
     const wave_of_surfaces<Exec> wave(exec, wall_surfaces(64, 1));
     guider.begin_sample();
     CHECK(!guider.guided());
-    CHECK(!guider.prepare(wave.get(), box_caster{}).guides(0));
+    CHECK(!guides(exec, guider.prepare(wave.get(), box_caster{}), 0));
     guider.invalidate_all();
     guider.forget_light();
     const auto statistics = guider.statistics();
@@ -222,7 +233,7 @@ int count_toward_patch(field_lifetime lifetime) {
                            wfpg::fragments_from_samples(exec, const_view<wfpg::surface_fragment>(device), 8,
                                                         {vec3(0.0f), vec3(1.0f)}),
                            options);
-  deposit_on_walls(guider.cache(), 40,
+  deposit_on_walls(exec, guider.cache(), 40,
                    [](std::uint32_t f, float u, float v) { return emitted(face_point(f, u, v)); });
   guider.end_sample();
   guider.begin_sample();
@@ -242,6 +253,25 @@ WFPG_TEST_CASE("path guider: an octree from hit points and bounds guides", "[pat
     CHECK(count_toward_patch<Exec>(lifetime) > 200);  // of cosine-distributed ones about 60
 }
 
+/// One path each.
+struct record_nonsense {
+  wfpg::path_recorder_view recorder;
+  stored_surfaces surfaces;
+  WFPG_HD void operator()(std::size_t path) const {
+    const test_surface s = surfaces(static_cast<std::uint32_t>(path));
+    const vec3 up(0, 1, 0), one(1.0f);
+    if (path < 4) {
+      const float bad[] = {nan, infinity, -infinity, -1.0f};
+      recorder.vertex(path, 0, s.position, s.outgoing, one);
+      recorder.radiance(path, 0, vec3(bad[path]));
+    }
+    if (path == 4) recorder.vertex(path, 0, vec3(nan), up, one);
+    if (path == 5) recorder.vertex(path, 0, s.position, up, vec3(nan));
+    if (path == 6) recorder.vertex(path, 0, vec3(9.0f), up, one);
+    if (path == 7) recorder.vertex(path, 0, s.position, vec3(nan), one);
+  }
+};
+
 WFPG_TEST_CASE("path guider: what is not finite is dropped and counted, and guiding goes on",
                "[path_guider]") {
   const Exec exec;
@@ -250,17 +280,8 @@ WFPG_TEST_CASE("path guider: what is not finite is dropped and counted, and guid
     path_guider<Exec> guider(exec, mesh.view(), tracing_options(64, guiding_mode::oriented, lifetime));
     trace_paths(exec, guider, 1, 64, box_caster{});
     guider.begin_sample();
-    const auto recorder = guider.recorder();
-    const auto surfaces = wall_surfaces(64, 9);
-    const float bad[] = {nan, infinity, -infinity, -1.0f};
-    for (std::uint32_t i = 0; i < 4; ++i) {
-      recorder.vertex(i, 0, surfaces[i].position, surfaces[i].outgoing, vec3(1.0f));
-      recorder.radiance(i, 0, vec3(bad[i]));
-    }
-    recorder.vertex(4, 0, vec3(nan), {0, 1, 0}, vec3(1.0f));
-    recorder.vertex(5, 0, surfaces[5].position, vec3(0, 1, 0), vec3(nan));
-    recorder.vertex(6, 0, vec3(9.0f), {0, 1, 0}, vec3(1.0f));
-    recorder.vertex(7, 0, surfaces[7].position, vec3(nan), vec3(1.0f));
+    const wave_of_surfaces<Exec> surfaces(exec, wall_surfaces(64, 9));
+    exec.for_each(8, record_nonsense{guider.recorder(), surfaces.get().surfaces});
     const auto before = guider.statistics();
     guider.end_sample();
     const auto after = guider.statistics();
@@ -278,14 +299,19 @@ WFPG_TEST_CASE("path guider: vertices out of range are dropped and counted", "[p
   path_guider<Exec> guider(exec, mesh.view(), tracing_options(4));
   guider.begin_sample();
   const auto recorder = guider.recorder();
-  recorder.vertex(4, 0, {}, {0, 1, 0}, vec3(1.0f));  // no such path
-  recorder.vertex(0, 3, {}, {0, 1, 0}, vec3(1.0f));  // no such depth
-  recorder.vertex(0, 1, {}, {0, 1, 0}, vec3(1.0f));  // not in order
-  recorder.radiance(0, 0, vec3(1.0f));               // no such vertex
-  recorder.emission(7, 0, vec3(1.0f));
-  recorder.emission(0, 5, vec3(1.0f));
+  exec.for_each(1, [=] WFPG_HD(std::size_t) {
+    const vec3 nowhere(0.0f), up(0, 1, 0), one(1.0f);
+    recorder.vertex(4, 0, nowhere, up, one);  // no such path
+    recorder.vertex(0, 3, nowhere, up, one);  // no such depth
+    recorder.vertex(0, 1, nowhere, up, one);  // not in order
+    recorder.radiance(0, 0, one);             // no such vertex
+    recorder.emission(7, 0, one);
+    recorder.emission(0, 5, one);
+  });
   CHECK(guider.statistics().dropped_vertices == 6);
-  recorder.vertex(0, 0, {0.5f, 0.0f, 0.5f}, {0, 1, 0}, vec3(1.0f));
+  exec.for_each(1, [=] WFPG_HD(std::size_t) {
+    recorder.vertex(0, 0, {0.5f, 0.0f, 0.5f}, {0, 1, 0}, vec3(1.0f));
+  });
   CHECK(guider.statistics().dropped_vertices == 6);
   guider.end_sample();
 }
@@ -358,10 +384,11 @@ WFPG_TEST_CASE("path guider: without room for fields rays are their BSDF's, and 
     box.learn();
     const auto surfaces = wall_surfaces(300, 3);
     const auto drawn = box.sample_again(surfaces);
+    const auto densities = bsdf_densities(box.exec, surfaces, drawn);
     int wrong = 0;
     for (std::size_t i = 0; i < drawn.size(); ++i) {
       wrong += drawn[i].technique != sampling_technique::bsdf;
-      wrong += drawn[i].pdf != surfaces[i].bsdf.pdf(surfaces[i].outgoing, drawn[i].direction);
+      wrong += !alike(drawn[i].pdf, densities[i]);
     }
     CHECK(wrong == 0);
     const auto statistics = box.guider.statistics();
@@ -383,13 +410,21 @@ std::size_t cones_of_sample(guided_box<Exec>& box, const std::vector<test_surfac
   return log.rays;
 }
 
+struct pdf_of_first_ray {
+  wfpg::guide_view view;
+  vec3 direction;
+  WFPG_HD float operator()() const { return view.pdf(0, direction); }
+};
+
 WFPG_TEST_CASE("path guider: what moved is cast anew, light that moved is not", "[path_guider]") {
   guided_box<Exec> box;
   box.learn();
   const std::vector<test_surface> surfaces(300, make_surface({0.5f, 0, 0.5f}, {0, 1, 0}, {0, 1, 0}));
   const vec3 to_patch = glm::normalize(vec3(0.3f, 1.0f, 0.3f));
   const wave_of_surfaces<Exec> wave(box.exec, surfaces);
-  const auto toward_patch = [&] { return box.guider.prepare(wave.get(), box_caster{}).pdf(0, to_patch); };
+  const auto toward_patch = [&] {
+    return evaluate(box.exec, pdf_of_first_ray{box.guider.prepare(wave.get(), box_caster{}), to_patch});
+  };
   CHECK(cones_of_sample(box, surfaces) == 256);
   CHECK(cones_of_sample(box, surfaces) == 256 / 8);
   box.guider.invalidate({{0.4f, -3.0f, 0.4f}, {0.6f, -2.8f, 0.6f}});

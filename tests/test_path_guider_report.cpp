@@ -27,7 +27,7 @@ std::size_t most_persistent(const wfpg::path_guider<Exec>& guider) {
 
 WFPG_TEST_CASE("path guider: memory() is what it holds of its resource, by part", "[path_guider]") {
   counting_resource resource;
-  const Exec exec(&resource);
+  const Exec exec = Exec().with_resource(&resource);
   for (field_lifetime lifetime : lifetimes) {
     const box_mesh<Exec> mesh(exec);
     guider_options options = tracing_options(300, guiding_mode::oriented, lifetime);
@@ -64,26 +64,25 @@ std::vector<test_surface> unlike_wave(std::uint32_t sample, std::uint32_t depth)
 template <class Exec>
 std::size_t late_allocations(const guider_options& options, int form) {
   counting_resource resource;
-  const Exec exec(&resource);
+  const Exec exec = Exec().with_resource(&resource);
   const box_mesh<Exec> mesh(exec);
   batch_box_caster::log log;
   wfpg::path_guider<Exec> guider(exec, mesh.view(), options);
-  std::vector<wfpg::sampled_direction> host(512);
-  const wfpg::array_view<wfpg::sampled_direction> directions(host.data(), host.size());
+  const Exec uncounted;
+  const wfpg::buffer<wfpg::sampled_direction, Exec> directions(uncounted, 512);
   std::size_t after_first = 0;
   for (std::uint32_t sample = 0; sample < 8; ++sample) {
     guider.begin_sample();
     for (std::uint32_t depth = 0; depth < 2; ++depth) {
-      const auto surfaces = unlike_wave(sample, depth);
-      const wfpg::wave rays{depth, surfaces.size(), stored_surfaces{{surfaces.data(), surfaces.size()}},
-                            hashed_numbers{sample}};
+      const wave_of_surfaces<Exec> surfaces(uncounted, unlike_wave(sample, depth), depth, sample);
+      const auto rays = surfaces.get();
       const batch_box_caster batch{{}, &log};
-      if (form == 0) guider.sample_directions(rays, box_caster{}, directions);
-      if (form == 1) guider.sample_directions(rays, batch, directions);
+      if (form == 0) guider.sample_directions(rays, box_caster{}, directions.view());
+      if (form == 1) guider.sample_directions(rays, batch, directions.view());
       if (form == 2) guider.prepare(rays, box_caster{});
       if (form == 3) guider.prepare(rays, batch);
     }
-    deposit_on_walls(guider.cache(), 40, [](std::uint32_t, float, float) { return 1.0f; });
+    deposit_on_walls(uncounted, guider.cache(), 40, [](std::uint32_t, float, float) { return 1.0f; });
     guider.end_sample();
     if (sample == 0) after_first = resource.allocations;
   }

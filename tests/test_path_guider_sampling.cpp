@@ -3,10 +3,9 @@
 #include "support/guiding.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
+#include "support/threads.hpp"
 
 #include <wfpg/path_guider.hpp>
-
-#include <tbb/global_control.h>
 
 #include <cmath>
 #include <string>
@@ -29,7 +28,7 @@ struct sample_view {
   stored_surfaces surfaces;
   hashed_numbers random;
   wfpg::array_view<sampled_direction> directions;
-  void operator()(std::size_t i) const {
+  WFPG_HD void operator()(std::size_t i) const {
     const auto ray = static_cast<std::uint32_t>(i);
     const test_surface s = surfaces(ray);
     directions[i] = {};
@@ -42,7 +41,7 @@ struct query_view {
   stored_surfaces surfaces;
   wfpg::array_view<const vec3> queries;
   wfpg::array_view<float> densities;
-  void operator()(std::size_t i) const {
+  WFPG_HD void operator()(std::size_t i) const {
     const auto ray = static_cast<std::uint32_t>(i);
     const test_surface s = surfaces(ray);
     densities[i] = s.active && queries[i] != vec3(0.0f) ? view.pdf(ray, s, queries[i]) : 0.0f;
@@ -51,7 +50,7 @@ struct query_view {
 
 struct stored_queries {
   wfpg::array_view<const vec3> queries;
-  vec3 operator()(std::uint32_t ray) const { return queries[ray]; }
+  WFPG_HD vec3 operator()(std::uint32_t ray) const { return queries[ray]; }
 };
 
 template <class Exec, class Caster>
@@ -172,6 +171,23 @@ float default_share(const guider_options& options, bool many_rays) {
   return many_rays || options.fields == field_lifetime::kept ? 0.7f : 0.5f;
 }
 
+/// What a ray's field says of a direction, and of one that it draws.
+struct asked_of_field {
+  float pdf;
+  sampled_direction alone;
+  float pdf_of_alone;
+};
+
+struct ask_field {
+  wfpg::guide_view view;
+  std::uint32_t ray;
+  vec3 direction;
+  WFPG_HD asked_of_field operator()() const {
+    const sampled_direction alone = view.sample(ray, {0.3f, 0.8f});
+    return {view.pdf(ray, direction), alone, view.pdf(ray, alone.direction)};
+  }
+};
+
 WFPG_TEST_CASE("path guider: densities are the mixture's of field and BSDF", "[path_guider]") {
   for (guider_options options : kinds_of_guiding())
     for (float fraction : {0.0f, 0.25f, 1.0f}) {
@@ -190,28 +206,34 @@ WFPG_TEST_CASE("path guider: densities are the mixture's of field and BSDF", "[p
         const float share = fraction > 0.0f ? fraction : default_share(options, ray < 450);
         const vec3 d = drawn[ray].direction;
         const float of_bsdf = surfaces[ray].bsdf.pdf(surfaces[ray].outgoing, d);
-        CHECK(drawn[ray].pdf == Approx(share * view.pdf(ray, d) + (1.0f - share) * of_bsdf));
-        const sampled_direction alone = view.sample(ray, {0.3f, 0.8f});
-        CHECK(alone.pdf == view.pdf(ray, alone.direction));
-        CHECK(alone.technique == sampling_technique::guide);
+        const asked_of_field asked = evaluate(box.exec, ask_field{view, ray, d});
+        CHECK(drawn[ray].pdf == Approx(share * asked.pdf + (1.0f - share) * of_bsdf));
+        CHECK(asked.alone.pdf == asked.pdf_of_alone);
+        CHECK(asked.alone.technique == sampling_technique::guide);
       }
       if (fraction == 1.0f) CHECK(count_guided(drawn) == 460);
     }
 }
 
 /// How probable a direction of a ray's field is to meet the patch: a midpoint rule over the patch.
-double patch_probability(const wfpg::guide_view& view, std::uint32_t ray, vec3 from) {
-  constexpr int n = 30;
-  const double step = (double(patch_high) - double(patch_low)) / n;
-  double sum = 0.0;
-  for (int i = 0; i < n * n; ++i) {
-    const double x = double(patch_low) + (i % n + 0.5) * step, z = double(patch_low) + (i / n + 0.5) * step;
-    const vec3 to = vec3(float(x), 1.0f, float(z)) - from;
-    const double square = double(glm::dot(to, to));
-    sum += double(view.pdf(ray, glm::normalize(to))) * std::abs(double(to.y)) / std::pow(square, 1.5);
+struct patch_probability {
+  wfpg::guide_view view;
+  stored_surfaces surfaces;
+  WFPG_HD double operator()(std::size_t i) const {
+    const auto ray = static_cast<std::uint32_t>(i);
+    const vec3 from = surfaces(ray).position;
+    constexpr int n = 30;
+    const double step = (double(patch_high) - double(patch_low)) / n;
+    double sum = 0.0;
+    for (int k = 0; k < n * n; ++k) {
+      const double x = double(patch_low) + (k % n + 0.5) * step, z = double(patch_low) + (k / n + 0.5) * step;
+      const vec3 to = vec3(float(x), 1.0f, float(z)) - from;
+      const double square = double(glm::dot(to, to));
+      sum += double(view.pdf(ray, glm::normalize(to))) * std::abs(double(to.y)) / std::pow(square, 1.5);
+    }
+    return sum * step * step;
   }
-  return sum * step * step;
-}
+};
 
 /// Mean of a ray's probability over samples, after a few to settle, and over seeds: kept cells change slowly.
 template <class Exec>
@@ -224,8 +246,8 @@ std::vector<double> mean_patch_probability(guider_options options, const std::ve
     const wave_of_surfaces<Exec> wave(box.exec, surfaces);
     for (int sample = 0; sample < 16; ++sample) {
       const wfpg::guide_view view = box.guider.prepare(wave.get(), box_caster{});
-      for (std::uint32_t i = 0; sample >= 4 && i < rays; ++i)
-        mean[i] += patch_probability(view, i, surfaces[i].position) / (12.0 * 6.0);
+      const auto found = evaluate(box.exec, rays, patch_probability{view, wave.get().surfaces});
+      for (std::uint32_t i = 0; sample >= 4 && i < rays; ++i) mean[i] += found[i] / (12.0 * 6.0);
       box.guider.end_sample();
       box.guider.begin_sample();
     }
@@ -361,27 +383,16 @@ WFPG_TEST_CASE("path guider: one seed gives the same bits on any number of threa
     CHECK(picture<Exec>(1, lifetime) == first);
     CHECK(picture<Exec>(1, lifetime, true) == first);
     CHECK(picture<Exec>(2, lifetime) != first);
-    for (std::size_t threads : {1, 2, 5}) {
-      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-      tbb::task_arena arena(static_cast<int>(threads));
-      INFO(threads << " TBB threads");
-      CHECK(arena.execute([&] { return picture<Exec>(1, lifetime); }) == first);
-    }
-#if !defined(WFPG_TEST_ONLY_TBB)
-    const int before = omp_get_max_threads();
-    for (int threads : {1, 2, 5}) {
-      omp_set_num_threads(threads);
-      INFO(threads << " OpenMP threads");
+    with_threads([&](const std::string& threads) {
+      INFO(threads);
       CHECK(picture<Exec>(1, lifetime) == first);
-    }
-    omp_set_num_threads(before);
-#endif
+    });
   }
 }
 
 }  // namespace
 
-#if !defined(WFPG_TEST_ONLY_TBB)
+#if defined(WFPG_TEST_SEVERAL_POLICIES)
 TEST_CASE("path guider: policies of one warp width give the same bits", "[path_guider]") {
   for (field_lifetime lifetime : lifetimes) {
     INFO(name_of(lifetime));

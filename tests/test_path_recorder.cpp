@@ -12,7 +12,6 @@
 namespace {
 
 using namespace wfpg_test;
-using wfpg::node_id;
 using wfpg::vec3;
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
@@ -20,11 +19,11 @@ constexpr float infinity = std::numeric_limits<float>::infinity();
 const vec3 up(0.0f, 0.0f, 1.0f);
 
 /// Where vertices lie: the centre of the k-th voxel along x, whose normal is up.
-vec3 place(std::uint32_t k) {
+WFPG_HD vec3 place(std::uint32_t k) {
   return {static_cast<float>(k) + 0.5f, 0.5f, 0.5f};
 }
 
-/// Eight voxels in a row with a recorder; a path is written by calls of the view on the host.
+/// Eight voxels in a row with a recorder; a path is written call by call.
 template <class Exec>
 struct recording {
   cached_scene<Exec> scene;
@@ -39,32 +38,44 @@ struct recording {
     return fragments_in_grid<Exec>(list);
   }
   wfpg::path_recorder_view view() const { return recorder.view(); }
+  void vertex(std::size_t path, std::uint32_t depth, vec3 position, vec3 toward, vec3 throughput) const {
+    const wfpg::path_recorder_view paths = view();
+    scene.exec.for_each(
+        1, [=] WFPG_HD(std::size_t) { paths.vertex(path, depth, position, toward, throughput); });
+  }
+  void radiance(std::size_t path, std::uint32_t depth, vec3 rgb) const {
+    const wfpg::path_recorder_view paths = view();
+    scene.exec.for_each(1, [=] WFPG_HD(std::size_t) { paths.radiance(path, depth, rgb); });
+  }
+  void emission(std::size_t path, std::uint32_t depth, vec3 rgb) const {
+    const wfpg::path_recorder_view paths = view();
+    scene.exec.for_each(1, [=] WFPG_HD(std::size_t) { paths.emission(path, depth, rgb); });
+  }
   void finish() {
     recorder.deposit(scene.exec, scene.view());
     scene.cache.update(scene.exec);
   }
   /// Radiance that leaves voxel k upward; negative where nothing was deposited.
   float leaving(std::uint32_t k, std::uint32_t side = 0) const {
-    const node_id leaf = scene.octree().leaf_at(place(k));
-    return scene.view().radiance(leaf, side);
+    return scene.radiance(scene.leaf_at(place(k)), side);
   }
   std::uint32_t dropped() const { return recorder.dropped(scene.exec); }
 };
 
 /// A path of vertices at places 0, 1, ... with these throughputs.
-void write_vertices(const wfpg::path_recorder_view& paths, std::size_t path,
-                    const std::vector<vec3>& throughputs) {
+template <class Exec>
+void write_vertices(const recording<Exec>& r, std::size_t path, const std::vector<vec3>& throughputs) {
   for (std::uint32_t depth = 0; depth < throughputs.size(); ++depth)
-    paths.vertex(path, depth, place(depth), up, throughputs[depth]);
+    r.vertex(path, depth, place(depth), up, throughputs[depth]);
 }
 
 WFPG_TEST_CASE("radiance at each vertex is what arrives over the throughput", "[path_recorder]") {
   recording<Exec> r(1, 4, true);
-  write_vertices(r.view(), 0, {vec3(1.0f), vec3(0.5f), vec3(0.25f)});
-  r.view().radiance(0, 0, vec3(1.0f));
-  r.view().radiance(0, 1, vec3(2.0f));
-  r.view().radiance(0, 2, vec3(3.0f));
-  r.view().radiance(0, 2, vec3(1.0f));
+  write_vertices(r, 0, {vec3(1.0f), vec3(0.5f), vec3(0.25f)});
+  r.radiance(0, 0, vec3(1.0f));
+  r.radiance(0, 1, vec3(2.0f));
+  r.radiance(0, 2, vec3(3.0f));
+  r.radiance(0, 2, vec3(1.0f));
   r.finish();
   CHECK(r.leaving(2) == Approx(4.0f / 0.25f));
   CHECK(r.leaving(1) == Approx(6.0f / 0.5f));
@@ -76,9 +87,9 @@ WFPG_TEST_CASE("radiance at each vertex is what arrives over the throughput", "[
 
 WFPG_TEST_CASE("colours are divided one by one and reduced to luminance", "[path_recorder]") {
   recording<Exec> r(1, 3, true);
-  write_vertices(r.view(), 0, {vec3(1.0f), {0.5f, 0.25f, 0.125f}, {0.5f, 0.0f, 0.125f}});
-  r.view().radiance(0, 1, {1.0f, 2.0f, 3.0f});
-  r.view().radiance(0, 2, {0.5f, 0.0f, 0.25f});
+  write_vertices(r, 0, {vec3(1.0f), {0.5f, 0.25f, 0.125f}, {0.5f, 0.0f, 0.125f}});
+  r.radiance(0, 1, {1.0f, 2.0f, 3.0f});
+  r.radiance(0, 2, {0.5f, 0.0f, 0.25f});
   r.finish();
   CHECK(r.leaving(2) == Approx(wfpg::luminance({1.0f, 0.0f, 2.0f})));  // a channel that is zero gives none
   CHECK(r.leaving(1) == Approx(wfpg::luminance({1.5f / 0.5f, 2.0f / 0.25f, 3.25f / 0.125f})));
@@ -89,8 +100,8 @@ WFPG_TEST_CASE("colours are divided one by one and reduced to luminance", "[path
 WFPG_TEST_CASE("emission leaves the emitter where it is included", "[path_recorder]") {
   for (const bool included : {true, false}) {
     recording<Exec> r(1, 4, included);
-    write_vertices(r.view(), 0, {vec3(1.0f), vec3(0.5f), vec3(0.25f)});
-    r.view().emission(0, 2, vec3(8.0f));
+    write_vertices(r, 0, {vec3(1.0f), vec3(0.5f), vec3(0.25f)});
+    r.emission(0, 2, vec3(8.0f));
     r.finish();
     INFO("included " << included);
     CHECK(r.leaving(2) == Approx(included ? 32.0f : 0.0f));
@@ -103,8 +114,8 @@ WFPG_TEST_CASE("emission leaves the emitter where it is included", "[path_record
 WFPG_TEST_CASE("an emitter seen by the camera", "[path_recorder]") {
   for (const bool included : {true, false}) {
     recording<Exec> r(1, 4, included);
-    write_vertices(r.view(), 0, {vec3(1.0f)});
-    r.view().emission(0, 0, vec3(5.0f));
+    write_vertices(r, 0, {vec3(1.0f)});
+    r.emission(0, 0, vec3(5.0f));
     r.finish();
     CHECK(r.leaving(0) == Approx(included ? 5.0f : 0.0f));
     CHECK(r.dropped() == 0);
@@ -114,14 +125,14 @@ WFPG_TEST_CASE("an emitter seen by the camera", "[path_recorder]") {
 WFPG_TEST_CASE("the environment counts as scattered by the last vertex", "[path_recorder]") {
   for (const bool included : {true, false}) {
     recording<Exec> r(2, 2, included);
-    write_vertices(r.view(), 0, {vec3(1.0f), vec3(0.5f)});
-    r.view().emission(0, 2, vec3(3.0f));  // the path's length, and the recorder's capacity
-    r.view().emission(1, 0, vec3(7.0f));  // a camera ray into the environment touches nothing
+    write_vertices(r, 0, {vec3(1.0f), vec3(0.5f)});
+    r.emission(0, 2, vec3(3.0f));  // the path's length, and the recorder's capacity
+    r.emission(1, 0, vec3(7.0f));  // a camera ray into the environment touches nothing
     r.finish();
     CHECK(r.leaving(1) == Approx(6.0f));
     CHECK(r.leaving(0) == Approx(3.0f));
-    r.view().vertex(1, 0, place(5), up, vec3(1.0f));
-    r.view().emission(1, 1, vec3(4.0f));  // after one vertex
+    r.vertex(1, 0, place(5), up, vec3(1.0f));
+    r.emission(1, 1, vec3(4.0f));  // after one vertex
     r.finish();
     CHECK(r.leaving(5) == Approx(4.0f));
     CHECK(r.dropped() == 0);
@@ -133,46 +144,46 @@ WFPG_TEST_CASE("what is out of range is dropped and counted", "[path_recorder]")
   const auto view = r.view();
   CHECK(view.paths() == 2);
   CHECK(view.max_depth() == 2);
-  write_vertices(view, 0, {vec3(1.0f), vec3(1.0f)});
-  view.vertex(2, 0, place(4), up, vec3(1.0f));  // no such path
-  view.vertex(~std::size_t(0), 0, place(4), up, vec3(1.0f));
-  view.vertex(0, 2, place(4), up, vec3(1.0f));  // too deep
-  view.vertex(0, 0xffffffffu, place(4), up, vec3(1.0f));
-  view.vertex(1, 1, place(4), up, vec3(1.0f));  // out of order
-  view.vertex(0, 1, place(4), up, vec3(1.0f));  // recorded already
+  write_vertices(r, 0, {vec3(1.0f), vec3(1.0f)});
+  r.vertex(2, 0, place(4), up, vec3(1.0f));  // no such path
+  r.vertex(~std::size_t(0), 0, place(4), up, vec3(1.0f));
+  r.vertex(0, 2, place(4), up, vec3(1.0f));  // too deep
+  r.vertex(0, 0xffffffffu, place(4), up, vec3(1.0f));
+  r.vertex(1, 1, place(4), up, vec3(1.0f));  // out of order
+  r.vertex(0, 1, place(4), up, vec3(1.0f));  // recorded already
   CHECK(r.dropped() == 6);
-  view.radiance(2, 0, vec3(100.0f));
-  view.radiance(0, 2, vec3(100.0f));
-  view.radiance(1, 0, vec3(100.0f));  // a vertex that was not recorded
-  view.emission(0, 3, vec3(100.0f));
-  view.emission(5, 0, vec3(100.0f));
-  view.emission(1, 1, vec3(100.0f));
+  r.radiance(2, 0, vec3(100.0f));
+  r.radiance(0, 2, vec3(100.0f));
+  r.radiance(1, 0, vec3(100.0f));  // a vertex that was not recorded
+  r.emission(0, 3, vec3(100.0f));
+  r.emission(5, 0, vec3(100.0f));
+  r.emission(1, 1, vec3(100.0f));
   CHECK(r.dropped() == 12);
-  view.radiance(0, 1, vec3(2.0f));
+  r.radiance(0, 1, vec3(2.0f));
   r.finish();
   CHECK(r.leaving(0) == 2.0f);
   CHECK(r.leaving(1) == 2.0f);
   CHECK(r.leaving(4) < 0.0f);
 
   recording<Exec> nothing(0, 0, true);
-  nothing.view().vertex(0, 0, place(0), up, vec3(1.0f));
-  nothing.view().emission(0, 0, vec3(1.0f));
+  nothing.vertex(0, 0, place(0), up, vec3(1.0f));
+  nothing.emission(0, 0, vec3(1.0f));
   nothing.finish();
   CHECK(nothing.dropped() == 2);
 }
 
 WFPG_TEST_CASE("a deposit forgets the paths, a clear drops them", "[path_recorder]") {
   recording<Exec> r(1, 3, true);
-  write_vertices(r.view(), 0, {vec3(1.0f), vec3(1.0f)});
-  r.view().radiance(0, 1, vec3(4.0f));
+  write_vertices(r, 0, {vec3(1.0f), vec3(1.0f)});
+  r.radiance(0, 1, vec3(4.0f));
   r.finish();
-  write_vertices(r.view(), 0, {vec3(1.0f)});  // the same vertex again, of the next path
-  r.view().radiance(0, 0, vec3(2.0f));
+  write_vertices(r, 0, {vec3(1.0f)});  // the same vertex again, of the next path
+  r.radiance(0, 0, vec3(2.0f));
   r.finish();
   CHECK(r.leaving(0) == 3.0f);
   CHECK(r.leaving(1) == 4.0f);
-  write_vertices(r.view(), 0, {vec3(1.0f)});
-  r.view().radiance(0, 0, vec3(100.0f));
+  write_vertices(r, 0, {vec3(1.0f)});
+  r.radiance(0, 0, vec3(100.0f));
   r.recorder.clear(r.scene.exec);
   r.finish();
   CHECK(r.leaving(0) == 3.0f);
@@ -181,12 +192,11 @@ WFPG_TEST_CASE("a deposit forgets the paths, a clear drops them", "[path_recorde
 
 WFPG_TEST_CASE("radiance that is no number is dropped by the cache", "[path_recorder]") {
   recording<Exec> r(5, 2, true);
-  const auto view = r.view();
-  for (std::size_t path = 0; path < 5; ++path) write_vertices(view, path, {vec3(1.0f), vec3(0.5f)});
-  view.radiance(0, 1, {nan, 0.0f, 0.0f});
-  view.radiance(1, 1, {0.0f, infinity, 0.0f});
-  view.radiance(2, 1, vec3(-1.0f));
-  view.radiance(3, 1, vec3(1.0f));
+  for (std::size_t path = 0; path < 5; ++path) write_vertices(r, path, {vec3(1.0f), vec3(0.5f)});
+  r.radiance(0, 1, {nan, 0.0f, 0.0f});
+  r.radiance(1, 1, {0.0f, infinity, 0.0f});
+  r.radiance(2, 1, vec3(-1.0f));
+  r.radiance(3, 1, vec3(1.0f));
   r.finish();
   CHECK(r.scene.cache.dropped(r.scene.exec).invalid == 6);
   CHECK(r.leaving(1) == 1.0f);  // of 2 and 0
@@ -197,10 +207,11 @@ WFPG_TEST_CASE("radiance that is no number is dropped by the cache", "[path_reco
 struct write_path {
   wfpg::path_recorder_view paths;
   std::uint32_t length;
-  void operator()(std::size_t path) const {
+  WFPG_HD void operator()(std::size_t path) const {
+    const vec3 upward(0.0f, 0.0f, 1.0f);
     float throughput = 1.0f;
     for (std::uint32_t depth = 0; depth < length; ++depth) {
-      paths.vertex(path, depth, place(depth), path % 2 ? -up : up, vec3(throughput));
+      paths.vertex(path, depth, place(depth), path % 2 ? -upward : upward, vec3(throughput));
       paths.radiance(path, depth, vec3(1.0f));
       throughput *= 0.5f;
     }

@@ -1,11 +1,13 @@
 // What the filter and the floor make of a field's cells: a Gaussian that crosses the square's edges as the
 // sphere does, keeps energy and symmetry; floors relative and absolute.
+#include "support/fields.hpp"
 #include "support/policies.hpp"
 
 #include <wfpg/radiance_field.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 using namespace wfpg_test;
@@ -19,7 +21,7 @@ struct finish_cells {
   bool hemisphere;
   wfpg::field_options options;
   template <class Block>
-  void operator()(Block& block, std::size_t) const {
+  WFPG_HD void operator()(Block& block, std::size_t) const {
     wfpg::detail::finish_field(block, {words}, resolution, hemisphere, options);
   }
 };
@@ -34,10 +36,10 @@ std::vector<double> finished(const std::vector<float>& values, std::uint32_t res
   const wfpg::buffer<std::uint32_t, Exec> words(exec, host);
   exec.for_each_block(1, wfpg::detail::field_scratch_bytes(resolution, Exec::warps_per_block),
                       finish_cells{words.data(), int(resolution), hemisphere, options});
-  const wfpg::grid_distribution grid(words.data(), resolution);
+  const std::vector<std::uint32_t> weights = cell_weights(exec, {words.data(), resolution});
+  const std::uint32_t total = std::accumulate(weights.begin(), weights.end(), 0u);
   std::vector<double> result;
-  for (std::uint32_t i = 0; i < values.size(); ++i)
-    result.push_back(double(grid.weight(i % resolution, i / resolution)) / double(grid.total()));
+  for (const std::uint32_t weight : weights) result.push_back(double(weight) / double(total));
   return result;
 }
 

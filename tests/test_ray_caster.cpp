@@ -1,5 +1,6 @@
 // What a ray caster has to look like, and the one that needs no host: marching through the octree against
 // brute force over its voxels.
+#include "support/octree_nodes.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
@@ -17,16 +18,14 @@ using wfpg::svo_ray_caster;
 
 namespace {
 
-using test_policy = wfpg::exec::basic_tbb<8>;
-
 struct answers_nothing {
-  void operator()(const ray&) const {}
+  [[maybe_unused]] void operator()(const ray&) const {}
 };
 struct not_const {
-  ray_hit operator()(const ray&) { return {}; }
+  [[maybe_unused]] ray_hit operator()(const ray&) { return {}; }
 };
 struct takes_wrong_views {
-  void cast(const test_policy&, wfpg::array_view<const ray>, std::vector<ray_hit>&) const {}
+  [[maybe_unused]] void cast(const one_policy&, wfpg::array_view<const ray>, std::vector<ray_hit>&) const {}
 };
 
 static_assert(wfpg::is_inline_caster_v<svo_ray_caster>);
@@ -35,12 +34,12 @@ static_assert(!wfpg::is_inline_caster_v<batch_box_caster>);
 static_assert(!wfpg::is_inline_caster_v<answers_nothing>);
 static_assert(!wfpg::is_inline_caster_v<not_const>);
 static_assert(!wfpg::is_inline_caster_v<int>);
-static_assert(wfpg::is_batch_caster_v<batch_box_caster, test_policy>);
-static_assert(!wfpg::is_batch_caster_v<box_caster, test_policy>);
-static_assert(!wfpg::is_batch_caster_v<takes_wrong_views, test_policy>);
-static_assert(wfpg::is_ray_caster_v<box_caster, test_policy>);
-static_assert(wfpg::is_ray_caster_v<batch_box_caster, test_policy>);
-static_assert(!wfpg::is_ray_caster_v<answers_nothing, test_policy>);
+static_assert(wfpg::is_batch_caster_v<batch_box_caster, one_policy>);
+static_assert(!wfpg::is_batch_caster_v<box_caster, one_policy>);
+static_assert(!wfpg::is_batch_caster_v<takes_wrong_views, one_policy>);
+static_assert(wfpg::is_ray_caster_v<box_caster, one_policy>);
+static_assert(wfpg::is_ray_caster_v<batch_box_caster, one_policy>);
+static_assert(!wfpg::is_ray_caster_v<answers_nothing, one_policy>);
 static_assert(std::is_trivially_copyable_v<svo_ray_caster>);
 
 /// An octree over scattered samples in the unit cube.
@@ -87,10 +86,11 @@ double first_voxel(const std::vector<wfpg::bounds3>& leaves, const ray& r, doubl
   return nearest;
 }
 
-std::vector<wfpg::bounds3> leaf_boxes(const sparse_voxel_octree_view& tree) {
+template <class Exec>
+std::vector<wfpg::bounds3> leaf_boxes(const Exec& exec, const sparse_voxel_octree_view& tree) {
   std::vector<wfpg::bounds3> boxes;
-  for (wfpg::node_id leaf = tree.first_leaf(); leaf < tree.node_count(); ++leaf)
-    boxes.push_back(tree.bounds(leaf));
+  for (const node_record& node : nodes_of(exec, tree))
+    if (node.is_leaf) boxes.push_back(node.bounds);
   return boxes;
 }
 
@@ -98,7 +98,7 @@ struct cast_all {
   svo_ray_caster caster;
   wfpg::array_view<const ray> rays;
   wfpg::array_view<ray_hit> hits;
-  void operator()(std::size_t i) const { hits[i] = caster(rays[i]); }
+  WFPG_HD void operator()(std::size_t i) const { hits[i] = caster(rays[i]); }
 };
 
 template <class Exec>
@@ -117,8 +117,12 @@ struct comparison {
 template <class Exec>
 comparison compare(const Exec& exec, const sparse_voxel_octree_view& tree, const std::vector<ray>& rays,
                    float clearance) {
-  const auto leaves = leaf_boxes(tree);
+  const auto leaves = leaf_boxes(exec, tree);
   const auto hits = cast(exec, svo_ray_caster(tree, 0.25f, clearance), rays);
+  std::vector<vec3> points;
+  for (std::size_t i = 0; i < rays.size(); ++i)
+    points.push_back(rays[i].origin + hits[i].distance * rays[i].direction);
+  const auto leaf_of_hit = evaluate(exec, points, [=] WFPG_HD(vec3 p) { return tree.nearest_leaf(p); });
   const double voxel = tree.grid().voxel_size();
   comparison result;
   for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -130,8 +134,7 @@ comparison compare(const Exec& exec, const sparse_voxel_octree_view& tree, const
       ++result.hits;
       const double t = hits[i].distance;
       result.wrong += t > at_most + 0.01 * voxel || t < at_least - 0.01 * voxel || t > limit * 1.0001;
-      const vec3 p = rays[i].origin + hits[i].distance * rays[i].direction;
-      result.wrong += tree.nearest_leaf(p) == wfpg::invalid_node;
+      result.wrong += leaf_of_hit[i] == wfpg::invalid_node;
     } else {
       ++result.misses;
       result.wrong += at_most < limit * 0.9999 - 0.01 * voxel || hits[i].radiance != 0.25f;
@@ -168,7 +171,7 @@ WFPG_TEST_CASE("SVO ray caster: random rays from inside against brute force", "[
 WFPG_TEST_CASE("SVO ray caster: rays parallel to axes, through centres and along faces", "[ray_caster]") {
   const Exec exec;
   const auto tree = scattered(exec, 150, 16, 4);
-  const auto boxes = leaf_boxes(tree.view());
+  const auto boxes = leaf_boxes(exec, tree.view());
   std::vector<ray> rays;
   for (std::size_t i = 0; i < boxes.size(); i += 3)
     for (int axis = 0; axis < 3; ++axis)

@@ -94,8 +94,8 @@ TEST_CASE("mixtures of products and BSDFs are what they say, over the sphere", "
     options.total = double(drawn.size()) / double(made.drawn().size());
     options.moments = seed % 4 == 0;
     options.tolerance = 5.0 * std::sqrt((1.0 - options.total) / double(drawn.size())) + 1.0e-3;
-    const sampler_report report = check_sampler(
-        drawn, [&](vec3 d) { return made.mixture().pdf(pair.surface, d); }, options);
+    const sampler_report report =
+        check_sampler(drawn, each([&](vec3 d) { return made.mixture().pdf(pair.surface, d); }), options);
     INFO(pair.name() << ": " << report.message);
     CHECK(report);
   }

@@ -1,5 +1,7 @@
 // The octree against one built naively with std::map: nodes, links, levels, look-ups, cones.
 #include "support/catch.hpp"
+#include "support/evaluate.hpp"
+#include "support/octree_nodes.hpp"
 #include "support/policies.hpp"
 #include "support/random_meshes.hpp"
 
@@ -22,39 +24,6 @@ using wfpg::node_id;
 using wfpg::uvec3;
 using wfpg::vec3;
 using octree_view = wfpg::sparse_voxel_octree_view;
-
-constexpr std::uint32_t max_depth = octree_view::max_depth;
-
-/// Everything that a view says about a node, one by one.
-struct node_record {
-  std::uint32_t level, is_leaf, child_count;
-  node_id parent, first_child;
-  node_id child[8];
-  node_id ancestor[max_depth + 1];
-  uvec3 coordinates;
-  wfpg::bounds3 bounds;
-};
-
-struct describe_nodes {
-  octree_view tree;
-  wfpg::array_view<node_record> out;
-  void operator()(std::size_t i) const {
-    const auto node = static_cast<node_id>(i);
-    node_record r{};
-    r.level = tree.level_of(node);
-    r.is_leaf = tree.is_leaf(node) ? 1 : 0;
-    r.parent = tree.parent(node);
-    r.first_child = r.is_leaf ? invalid_node : tree.first_child(node);
-    r.child_count = r.is_leaf ? 0 : tree.child_count(node);
-    for (std::uint32_t octant = 0; octant < 8; ++octant)
-      r.child[octant] = r.is_leaf ? invalid_node : tree.child(node, octant);
-    for (std::uint32_t level = 0; level <= max_depth; ++level)
-      r.ancestor[level] = level <= r.level ? tree.ancestor(node, level) : invalid_node;
-    r.coordinates = tree.coordinates(node);
-    r.bounds = tree.bounds(node);
-    out[i] = r;
-  }
-};
 
 /// The octree as it is defined: the distinct prefixes of the leaves' codes, numbered by level, then by code.
 struct naive_octree {
@@ -161,9 +130,7 @@ void check_nodes(const Exec& exec, const octree_view& view, const naive_octree& 
   REQUIRE(view.node_count() == naive.count);
   CHECK(view.depth() == naive.depth);
   CHECK(view.leaf_count() == naive.levels.back().size());
-  const wfpg::buffer<node_record, Exec> records(exec, view.node_count());
-  exec.for_each(view.node_count(), describe_nodes{view, records.view()});
-  const std::vector<node_record> host = records.to_host(exec);
+  const std::vector<node_record> host = nodes_of(exec, view);
   int wrong = 0, wrong_boxes = 0;
   node_id begin = 0;
   for (std::uint32_t level = 0; level <= naive.depth; ++level) {
@@ -242,7 +209,7 @@ struct find_leaves {
   octree_view tree;
   wfpg::array_view<const vec3> points;
   wfpg::array_view<node_id> at, nearest;
-  void operator()(std::size_t i) const {
+  WFPG_HD void operator()(std::size_t i) const {
     at[i] = tree.leaf_at(points[i]);
     nearest[i] = tree.nearest_leaf(points[i]);
   }
@@ -275,6 +242,7 @@ WFPG_TEST_CASE("points find their leaf, or the nearest of the 26 around", "[spar
     const wfpg::buffer<node_id, Exec> at(exec, points.size()), nearest(exec, points.size());
     exec.for_each(points.size(), find_leaves{tree.view(), device.view(), at.view(), nearest.view()});
     const auto at_host = at.to_host(exec), nearest_host = nearest.to_host(exec);
+    const std::vector<node_record> nodes = nodes_of(exec, tree.view());
 
     int wrong = 0, found = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -292,7 +260,7 @@ WFPG_TEST_CASE("points find their leaf, or the nearest of the 26 around", "[spar
         continue;
       }
       ++found;
-      const dvec3 d = dvec3(tree.view().coordinates(nearest_host[i])) + 0.5 - g;
+      const dvec3 d = dvec3(nodes[nearest_host[i]].coordinates) + 0.5 - g;
       wrong += !tree.view().is_leaf(nearest_host[i]) || std::abs(glm::dot(d, d) - expected) > 1.0e-2;
     }
     INFO("resolution " << c.resolution);
@@ -308,11 +276,9 @@ WFPG_TEST_CASE("every voxel's look-up agrees with the map", "[sparse_voxel_octre
   auto fragments = make_fragments(exec, codes, resolution);
   const wfpg::sparse_voxel_octree<Exec> tree(exec, fragments);
   const naive_octree naive(codes, resolution);
-  const wfpg::buffer<node_id, Exec> leaves(exec, 4096);
-  exec.for_each(4096, [view = tree.view(), out = leaves.view()](std::size_t code) {
-    out[code] = view.leaf_at(wfpg::morton_decode(code));
-  });
-  const auto host = leaves.to_host(exec);
+  const octree_view view = tree.view();
+  const auto host =
+      evaluate(exec, 4096, [=] WFPG_HD(std::size_t code) { return view.leaf_at(wfpg::morton_decode(code)); });
   int wrong = 0;
   for (morton_code code = 0; code < 4096; ++code) wrong += host[code] != naive.find(4, code);
   CHECK(wrong == 0);
@@ -324,6 +290,18 @@ double mismatch(const octree_view& view, std::uint32_t level, double area) {
   return std::abs(std::log(size * size / area));
 }
 
+struct cone {
+  node_id leaf;
+  float distance, solid_angle;
+};
+
+struct level_of_cone {
+  octree_view tree;
+  WFPG_HD std::uint32_t operator()(const cone& c) const {
+    return tree.level_for_cone(c.distance, c.solid_angle);
+  }
+};
+
 WFPG_TEST_CASE("a cone reads the level whose face is nearest to its base", "[sparse_voxel_octree]") {
   const Exec exec;
   for (const std::uint32_t resolution : {1u, 2u, 128u, 1024u}) {
@@ -332,25 +310,48 @@ WFPG_TEST_CASE("a cone reads the level whose face is nearest to its base", "[spa
     const wfpg::sparse_voxel_octree<Exec> tree(exec, fragments);
     const octree_view view = tree.view();
     random_numbers random(4);
+    std::vector<cone> cones;
     for (int i = 0; i < 2000; ++i) {
       const float distance = std::pow(10.0f, random.between(-5.0f, 3.0f));
       const float solid_angle = std::pow(10.0f, random.between(-5.0f, 1.0f));
-      const std::uint32_t level = view.level_for_cone(distance, solid_angle);
-      REQUIRE(level <= view.depth());
+      cones.push_back({view.first_leaf() + random.below(view.leaf_count()), distance, solid_angle});
+    }
+    const auto levels = evaluate(exec, cones, level_of_cone{view});
+    const auto nodes = evaluate(exec, cones, [=] WFPG_HD(const cone& c) {
+      return view.node_for_cone(c.leaf, c.distance, c.solid_angle);
+    });
+    const std::vector<node_record> records = nodes_of(exec, view);
+    for (std::size_t i = 0; i < cones.size(); ++i) {
+      const auto& [leaf, distance, solid_angle] = cones[i];
+      REQUIRE(levels[i] <= view.depth());
       double best = 1.0e30;
       for (std::uint32_t l = 0; l <= view.depth(); ++l)
         best = std::min(best, mismatch(view, l, double(distance) * distance * solid_angle));
-      REQUIRE(mismatch(view, level, double(distance) * distance * solid_angle) <= best + 1.0e-4);
-      const node_id leaf = view.first_leaf() + random.below(view.leaf_count());
-      REQUIRE(view.node_for_cone(leaf, distance, solid_angle) == view.ancestor(leaf, level));
+      REQUIRE(mismatch(view, levels[i], double(distance) * distance * solid_angle) <= best + 1.0e-4);
+      REQUIRE(nodes[i] == records[leaf].ancestor[levels[i]]);
     }
-    CHECK(view.level_for_cone(0.0f, 1.0f) == view.depth());
-    CHECK(view.level_for_cone(1.0f, 0.0f) == view.depth());
-    CHECK(view.level_for_cone(1.0e30f, 1.0f) == 0);
-    CHECK(view.level_for_cone(3.0e38f, 12.0f) == 0);
-    CHECK(view.level_for_cone(std::numeric_limits<float>::quiet_NaN(), 1.0f) <= view.depth());
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    const auto odd = evaluate(
+        exec,
+        std::vector<cone>{
+            {0, 0.0f, 1.0f}, {0, 1.0f, 0.0f}, {0, 1.0e30f, 1.0f}, {0, 3.0e38f, 12.0f}, {0, nan, 1.0f}},
+        level_of_cone{view});
+    CHECK(odd[0] == view.depth());
+    CHECK(odd[1] == view.depth());
+    CHECK(odd[2] == 0);
+    CHECK(odd[3] == 0);
+    CHECK(odd[4] <= view.depth());
   }
 }
+
+struct finds_nothing {
+  octree_view tree;
+  vec3 point;
+  WFPG_HD bool operator()() const {
+    return tree.leaf_at(point) == invalid_node && tree.nearest_leaf(point) == invalid_node &&
+           tree.leaf_at(uvec3(0u)) == invalid_node;
+  }
+};
 
 WFPG_TEST_CASE("an empty scene is a valid octree", "[sparse_voxel_octree]") {
   const Exec exec;
@@ -360,11 +361,8 @@ WFPG_TEST_CASE("an empty scene is a valid octree", "[sparse_voxel_octree]") {
     CHECK(tree.node_count() == 0);
     CHECK(tree.leaf_count() == 0);
     CHECK(tree.bytes() == 0);
-    for (const vec3 p : {vec3(0.0f), vec3(0.5f), vec3(-7.0f)}) {
-      CHECK(view.leaf_at(p) == invalid_node);
-      CHECK(view.nearest_leaf(p) == invalid_node);
-    }
-    CHECK(view.leaf_at(uvec3(0u)) == invalid_node);
+    for (const vec3 p : {vec3(0.0f), vec3(0.5f), vec3(-7.0f)})
+      CHECK(evaluate(Exec(), finds_nothing{view, p}));
     CHECK(view.level_for_cone(1.0f, 1.0f) <= view.depth());
   };
   check_empty(wfpg::sparse_voxel_octree<Exec>());
@@ -381,14 +379,16 @@ WFPG_TEST_CASE("an octree of a mesh covers its surface", "[sparse_voxel_octree]"
   const wfpg::sparse_voxel_octree<Exec> tree(exec, fragments);
   check_nodes(exec, tree.view(), naive_octree(fragments.codes.to_host(exec), 64));
   random_numbers random(8);
-  int missed = 0;
+  std::vector<vec3> points;
   for (int i = 0; i < 3000; ++i) {
     const std::size_t t = random.below(static_cast<std::uint32_t>(mesh.triangles.size()));
     const float u = random.unit(), v = random.unit() * (1.0f - u);
     const vec3 a = mesh.vertex(t, 0), b = mesh.vertex(t, 1), c = mesh.vertex(t, 2);
-    missed += tree.view().nearest_leaf(a + u * (b - a) + v * (c - a)) == invalid_node ? 1 : 0;
+    points.push_back(a + u * (b - a) + v * (c - a));
   }
-  CHECK(missed == 0);
+  const octree_view view = tree.view();
+  const auto found = evaluate(exec, points, [=] WFPG_HD(vec3 p) { return view.nearest_leaf(p); });
+  CHECK(std::count(found.begin(), found.end(), invalid_node) == 0);
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 // The spatial binner against a literal transcription of Algorithm 2.
 #include "support/catch.hpp"
+#include "support/evaluate.hpp"
+#include "support/octree_nodes.hpp"
 #include "support/policies.hpp"
 #include "support/random_meshes.hpp"
 
@@ -29,7 +31,25 @@ constexpr std::uint32_t none = 0xffffffffu;
 /// A ray as the algorithm sees it, read from an array.
 struct read_rays {
   wfpg::array_view<const ray_to_bin> rays;
-  ray_to_bin operator()(std::size_t i) const { return rays[i]; }
+  WFPG_HD ray_to_bin operator()(std::size_t i) const { return rays[i]; }
+};
+
+/// What a view says of a bin.
+struct bin_record {
+  node_id node;
+  std::uint32_t orientation, begin, size;
+};
+
+template <class Exec>
+std::vector<bin_record> records(const Exec& exec, const wfpg::bins_view& bins) {
+  return evaluate(exec, wfpg::read_element(exec, bins.count), [=] WFPG_HD(std::size_t bin) {
+    return bin_record{bins.node(bin), bins.orientation(bin), bins.begin(bin), bins.size(bin)};
+  });
+}
+
+struct leaf_of_ray {
+  octree_view tree;
+  WFPG_HD node_id operator()(const ray_to_bin& ray) const { return tree.nearest_leaf(ray.position); }
 };
 
 /// Algorithm 2: rays of each bin, bins by node and orientation, in order.
@@ -38,13 +58,18 @@ struct naive_bins {
   std::vector<std::uint32_t> key_of;
   std::uint32_t unbinned = 0;
 
-  naive_bins(const octree_view& tree, const std::vector<ray_to_bin>& rays, binning_options options) {
+  template <class Exec>
+  naive_bins(const Exec& exec, const octree_view& tree, const std::vector<ray_to_bin>& rays,
+             binning_options options) {
+    const std::vector<node_record> nodes = nodes_of(exec, tree);
+    const std::vector<node_id> leaves = evaluate(exec, rays, leaf_of_ray{tree});
     const std::uint32_t l_min = std::min(options.min_level, tree.depth());
     std::map<node_id, std::uint32_t> counts;
     std::set<node_id> marked;
     std::vector<node_id> bins;
-    for (const ray_to_bin& ray : rays) {
-      const node_id leaf = ray.active ? tree.nearest_leaf(ray.position) : invalid_node;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      const ray_to_bin& ray = rays[i];
+      const node_id leaf = ray.active ? leaves[i] : invalid_node;
       bins.push_back(leaf);
       if (leaf != invalid_node) ++counts[leaf];
       unbinned += ray.active && leaf == invalid_node ? 1 : 0;
@@ -53,14 +78,14 @@ struct naive_bins {
       for (node_id node = tree.level_begin(level); node < tree.level_begin(level + 1); ++node) {
         if (level < tree.depth())
           for (std::uint32_t octant = 0; octant < 8; ++octant)
-            if (tree.child(node, octant) != invalid_node) counts[node] += counts[tree.child(node, octant)];
+            if (nodes[node].child[octant] != invalid_node) counts[node] += counts[nodes[node].child[octant]];
         if (counts[node] >= options.rays_per_bin || level == l_min) marked.insert(node);
       }
     for (std::uint32_t i = 0; i < rays.size(); ++i) {
       key_of.push_back(none);
       node_id node = bins[i];
       if (node == invalid_node) continue;
-      while (!marked.count(node)) node = tree.parent(node);
+      while (!marked.count(node)) node = nodes[node].parent;
       key_of[i] = node * wfpg::orientations + rays[i].orientation;
       rays_of[key_of[i]].push_back(i);
     }
@@ -72,18 +97,20 @@ void check_bins(const Exec& exec, wfpg::spatial_binner<Exec>& binner, const octr
                 const std::vector<ray_to_bin>& rays, binning_options options) {
   const wfpg::buffer<ray_to_bin, Exec> device(exec, rays);
   const wfpg::bins_view bins = binner.bin(exec, rays.size(), read_rays{device.view()});
-  const naive_bins naive(tree, rays, options);
+  const naive_bins naive(exec, tree, rays, options);
 
   REQUIRE(wfpg::read_element(exec, bins.count) == naive.rays_of.size());
   CHECK(wfpg::read_element(exec, binner.unbinned()) == naive.unbinned);
   CHECK((to_host(exec, bins.ray_keys) == naive.key_of));
+  const std::vector<bin_record> host = records(exec, bins);
+  const std::vector<std::uint32_t> permutation = to_host(exec, bins.permutation);
   std::size_t wrong = 0, bin = 0;
   for (const auto& [key, members] : naive.rays_of) {
-    wrong += bins.node(bin) != key / wfpg::orientations || bins.orientation(bin) != key % wfpg::orientations;
-    wrong += bins.size(bin) != members.size();
-    for (std::size_t i = 0; i < members.size() && i < bins.size(bin); ++i)
-      wrong += bins.permutation[bins.begin(bin) + i] != members[i] ? 1 : 0;
-    ++bin;
+    const bin_record& b = host[bin++];
+    wrong += b.node != key / wfpg::orientations || b.orientation != key % wfpg::orientations;
+    wrong += b.size != members.size();
+    for (std::size_t i = 0; i < members.size() && i < b.size; ++i)
+      wrong += permutation[b.begin + i] != members[i] ? 1 : 0;
   }
   CHECK(wrong == 0);
 }
@@ -140,24 +167,26 @@ WFPG_TEST_CASE("a least level below the leaves makes a bin of every leaf", "[spa
     check_bins(scene.exec, binner, scene.tree.view(), rays, options);
     const wfpg::buffer<ray_to_bin, Exec> device(scene.exec, rays);
     const wfpg::bins_view bins = binner.bin(scene.exec, rays.size(), read_rays{device.view()});
-    for (std::size_t bin = 0; bin < *bins.count; ++bin) REQUIRE(scene.tree.view().is_leaf(bins.node(bin)));
+    for (const bin_record& bin : records(scene.exec, bins)) REQUIRE(scene.tree.view().is_leaf(bin.node));
   }
 }
 
 WFPG_TEST_CASE("the leaf level takes part in marking", "[spatial_binner]") {
   const sphere_tree<Exec> scene(16);
   const octree_view tree = scene.tree.view();
-  const vec3 crowded = tree.centre(tree.first_leaf()), lonely = tree.centre(tree.node_count() - 1);
+  const std::vector<node_record> nodes = nodes_of(scene.exec, tree);
+  const vec3 crowded = nodes[tree.first_leaf()].bounds.centre(), lonely = nodes.back().bounds.centre();
   std::vector<ray_to_bin> rays(64, ray_to_bin{crowded, wfpg::orientation_any, true});
   rays.push_back({lonely, wfpg::orientation_any, true});
   wfpg::spatial_binner<Exec> binner(scene.exec, tree, {1, 64}, 100);
   const wfpg::buffer<ray_to_bin, Exec> device(scene.exec, rays);
   const wfpg::bins_view bins = binner.bin(scene.exec, rays.size(), read_rays{device.view()});
-  REQUIRE(*bins.count == 2);
-  CHECK(tree.level_of(bins.node(0)) == 1);  // by node, hence by level
-  CHECK(bins.size(0) == 1);
-  CHECK(bins.node(1) == tree.first_leaf());
-  CHECK(bins.size(1) == 64);
+  const std::vector<bin_record> host = records(scene.exec, bins);
+  REQUIRE(host.size() == 2);
+  CHECK(tree.level_of(host[0].node) == 1);  // by node, hence by level
+  CHECK(host[0].size == 1);
+  CHECK(host[1].node == tree.first_leaf());
+  CHECK(host[1].size == 64);
 }
 
 WFPG_TEST_CASE("rays without a bin", "[spatial_binner]") {

@@ -71,7 +71,7 @@ tile_means rendered(double mean, std::uint64_t seed) {
 TEST_CASE("statistics: a correct sampler passes", "[statistics]") {
   const open_sampler sampler;
   const auto pdf = [&](vec3 d) { return sampler.pdf(d); };
-  const sampler_report report = check_sampler(sampler.draw(as_it_is, pdf), pdf);
+  const sampler_report report = check_sampler(sampler.draw(as_it_is, pdf), each(pdf));
   INFO(report.message);
   CHECK(report);
   CHECK(report.frequencies.degrees > 100.0);
@@ -85,8 +85,7 @@ TEST_CASE("statistics: correct samplers are rejected as rarely as they are to be
     for (int i = 0; i < 4000; ++i) drawn.push_back({random.direction(), 0.25f / wfpg::detail::pi});
     sampler_check_options options;
     options.significance = 0.05;
-    rejected += !check_sampler(
-        drawn, [](vec3) { return 0.25f / wfpg::detail::pi; }, options);
+    rejected += !check_sampler(drawn, each([](vec3) { return 0.25f / wfpg::detail::pi; }), options);
   }
   CHECK(rejected <= 12);  // 5 expected, 0.1% of 13 or more
 }
@@ -94,7 +93,7 @@ TEST_CASE("statistics: correct samplers are rejected as rarely as they are to be
 TEST_CASE("statistics: a density wrong by 2% is caught", "[statistics]") {
   const open_sampler sampler;
   const auto larger = [&](vec3 d) { return 1.02f * sampler.pdf(d); };
-  check_names(check_sampler(sampler.draw(as_it_is, larger), larger), {"energy", "integrates to 1.02"});
+  check_names(check_sampler(sampler.draw(as_it_is, larger), each(larger)), {"energy", "integrates to 1.02"});
 
   // Of the right sum: 2% too much above, 2% too little below.
   double above = 0.0;
@@ -107,7 +106,7 @@ TEST_CASE("statistics: a density wrong by 2% is caught", "[statistics]") {
     const double factor = d.z > 0.0f ? 1.02 : (1.0 - 1.02 * above) / (1.0 - above);
     return float(factor) * sampler.pdf(d);
   };
-  check_names(check_sampler(sampler.draw(as_it_is, tilted, 5 * samples), tilted),
+  check_names(check_sampler(sampler.draw(as_it_is, tilted, 5 * samples), each(tilted)),
               {"frequencies", "observed", "expected", "p = "});
 }
 
@@ -115,20 +114,20 @@ TEST_CASE("statistics: a cell shifted by one is caught", "[statistics]") {
   const open_sampler sampler;
   const auto shifted = [](vec2 uv) { return vec2(glm::fract(uv.x + 1.0f / float(cells)), uv.y); };
   const auto pdf = [&](vec3 d) { return sampler.pdf(d); };
-  check_names(check_sampler(sampler.draw(shifted, pdf), pdf),
+  check_names(check_sampler(sampler.draw(shifted, pdf), each(pdf)),
               {"frequencies", "observed", "expected", "z in [", "phi in [", "p = "});
 
   // And where the density reported is that of the cell that was drawn.
   std::vector<drawn_direction> drawn = sampler.draw(as_it_is, pdf);
   const std::vector<drawn_direction> moved = sampler.draw(shifted, pdf);
   for (std::size_t i = 0; i < drawn.size(); ++i) drawn[i].direction = moved[i].direction;
-  check_names(check_sampler(drawn, pdf), {"query", "was drawn with density", "pdf() says"});
+  check_names(check_sampler(drawn, each(pdf)), {"query", "was drawn with density", "pdf() says"});
 }
 
 TEST_CASE("statistics: a missing Jacobian is caught", "[statistics]") {
   const open_sampler sampler;
   const auto of_the_square = [&](vec3 d) { return 4.0f * wfpg::detail::pi * sampler.pdf(d); };
-  check_names(check_sampler(sampler.draw(as_it_is, of_the_square), of_the_square), {"energy", "12.57"});
+  check_names(check_sampler(sampler.draw(as_it_is, of_the_square), each(of_the_square)), {"energy", "12.57"});
 
   // Even in theta and phi, where the density is said to be even over the sphere: its sum is right.
   std::vector<drawn_direction> drawn;
@@ -139,7 +138,7 @@ TEST_CASE("statistics: a missing Jacobian is caught", "[statistics]") {
     drawn.push_back(
         {{std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)}, even({})});
   }
-  check_names(check_sampler(drawn, even), {"frequencies", "observed", "expected"});
+  check_names(check_sampler(drawn, each(even)), {"frequencies", "observed", "expected"});
 }
 
 TEST_CASE("statistics: a row that is never reached is caught", "[statistics]") {
@@ -149,7 +148,8 @@ TEST_CASE("statistics: a row that is never reached is caught", "[statistics]") {
     return missed ? uv + vec2(0.0f, 1.0f / float(cells)) : uv;
   };
   const auto pdf = [&](vec3 d) { return sampler.pdf(d); };
-  check_names(check_sampler(sampler.draw(without_row, pdf), pdf), {"frequencies", "observed", "expected"});
+  check_names(check_sampler(sampler.draw(without_row, pdf), each(pdf)),
+              {"frequencies", "observed", "expected"});
 }
 
 TEST_CASE("statistics: tiles of two renderers", "[statistics]") {

@@ -19,7 +19,8 @@ using wfpg::testing::check_bsdf;
 namespace {
 
 using wfpg::detail::pi;
-const float nan_value = std::numeric_limits<float>::quiet_NaN();
+constexpr float infinity = std::numeric_limits<float>::infinity();
+constexpr float nan_value = std::numeric_limits<float>::quiet_NaN();
 const vec3 tilted = glm::normalize(vec3(0.3f, -0.5f, 0.7f));
 
 bsdf_check_options options_for(bsdf_kind kind, vec3 normal) {
@@ -53,10 +54,10 @@ struct faulty_bsdf {
   bsdf_fault fault = bsdf_fault::none;
   vec3 normal{0.0f, 0.0f, 1.0f};
 
-  bool is_delta() const { return false; }
-  bool transmits() const { return false; }
+  WFPG_HD bool is_delta() const { return false; }
+  WFPG_HD bool transmits() const { return false; }
 
-  float eval(vec3 outgoing, vec3 incident) const {
+  WFPG_HD float eval(vec3 outgoing, vec3 incident) const {
     const float out = glm::dot(outgoing, normal), in = glm::dot(incident, normal);
     if (fault == bsdf_fault::leaks && out > 0.0f) return 0.1f * std::fabs(in);
     if (out <= 0.0f || in <= 0.0f) return 0.0f;
@@ -66,7 +67,7 @@ struct faulty_bsdf {
     if (fault == bsdf_fault::not_reciprocal) return (0.4f + 0.4f * in) * in / pi;
     return 0.8f * in / pi;
   }
-  float pdf(vec3 outgoing, vec3 incident) const {
+  WFPG_HD float pdf(vec3 outgoing, vec3 incident) const {
     const float in = glm::dot(incident, normal);
     if (fault == bsdf_fault::leaks && glm::dot(outgoing, normal) > 0.0f) return std::fabs(in) / (2.0f * pi);
     if (glm::dot(outgoing, normal) <= 0.0f || in <= 0.0f) return 0.0f;
@@ -74,7 +75,7 @@ struct faulty_bsdf {
     if (fault == bsdf_fault::eval_beyond_pdf && in_sector(incident)) return 0.0f;
     return (fault == bsdf_fault::large_pdf ? 1.02f : 1.0f) * in / pi;
   }
-  bsdf_sample sample(vec3 outgoing, vec2 u) const {
+  WFPG_HD bsdf_sample sample(vec3 outgoing, vec2 u) const {
     if (glm::dot(outgoing, normal) <= 0.0f) return {};
     const float turn = 2.0f * pi * u.y * (fault == bsdf_fault::empty_sector ? 0.9f : 1.0f);
     const float z = std::sqrt(1.0f - u.x), r = std::sqrt(u.x);
@@ -84,14 +85,13 @@ struct faulty_bsdf {
     if (fault == bsdf_fault::leaks && std::fmod(u.x * 1024.0f, 1.0f) < 0.5f) d = -d;
     float density = pdf(outgoing, d);
     if (fault == bsdf_fault::no_jacobian) density = z;
-    if (fault == bsdf_fault::infinite_sample && u.x > 0.999f)
-      density = std::numeric_limits<float>::infinity();
+    if (fault == bsdf_fault::infinite_sample && u.x > 0.999f) density = infinity;
     if (fault == bsdf_fault::long_direction) d *= 1.01f;
     return {d, density};
   }
 
  private:
-  bool in_sector(vec3 d) const {
+  WFPG_HD bool in_sector(vec3 d) const {
     const vec3 local = wfpg::detail::frame(normal).to_local(d);
     return local.x > 0.0f && std::fabs(local.y) < 0.5f * local.x;
   }
@@ -100,11 +100,11 @@ struct faulty_bsdf {
 /// A mirror, but for a fault.
 struct faulty_mirror {
   float probability = 1.0f, value = 0.0f;
-  bool is_delta() const { return true; }
-  bool transmits() const { return false; }
-  float eval(vec3, vec3) const { return value; }
-  float pdf(vec3, vec3) const { return 0.0f; }
-  bsdf_sample sample(vec3 outgoing, vec2) const {
+  WFPG_HD bool is_delta() const { return true; }
+  WFPG_HD bool transmits() const { return false; }
+  WFPG_HD float eval(vec3, vec3) const { return value; }
+  WFPG_HD float pdf(vec3, vec3) const { return 0.0f; }
+  WFPG_HD bsdf_sample sample(vec3 outgoing, vec2) const {
     return {vec3(-outgoing.x, -outgoing.y, outgoing.z), outgoing.z > 0.0f ? probability : 0.0f};
   }
 };
@@ -114,37 +114,37 @@ enum class part_fault { none, share, alpha, sum, sample_pdf, sample_shape };
 /// 0.3 of its samples are uniform above, the rest of a cosine.
 struct parted_bsdf {
   part_fault fault = part_fault::none;
-  bool is_delta() const { return false; }
-  bool transmits() const { return false; }
-  float eval(vec3 outgoing, vec3 incident) const {
+  WFPG_HD bool is_delta() const { return false; }
+  WFPG_HD bool transmits() const { return false; }
+  WFPG_HD float eval(vec3 outgoing, vec3 incident) const {
     return outgoing.z > 0.0f && incident.z > 0.0f ? 0.5f * incident.z / pi : 0.0f;
   }
-  float pdf(vec3 outgoing, vec3 incident) const {
+  WFPG_HD float pdf(vec3 outgoing, vec3 incident) const {
     return 0.3f * part(true, outgoing, incident) + 0.7f * part(false, outgoing, incident);
   }
-  bsdf_sample sample(vec3 outgoing, vec2 u) const {
+  WFPG_HD bsdf_sample sample(vec3 outgoing, vec2 u) const {
     const bool glossy = u.x < 0.3f;
     const vec3 d = draw(glossy, {glossy ? u.x / 0.3f : (u.x - 0.3f) / 0.7f, u.y});
     return {d, pdf(outgoing, d)};
   }
-  wfpg::glossy_part glossy(vec3) const {
+  WFPG_HD wfpg::glossy_part glossy(vec3) const {
     return {fault == part_fault::share ? 1.3f : 0.3f, fault == part_fault::alpha ? 0.0f : 0.7f};
   }
-  bsdf_sample sample_part(bool glossy, vec3 outgoing, vec2 u) const {
+  WFPG_HD bsdf_sample sample_part(bool glossy, vec3 outgoing, vec2 u) const {
     const bool drawn = fault == part_fault::sample_shape ? !glossy : glossy;
     const vec3 d = draw(drawn, u);
     return {d, (fault == part_fault::sample_pdf ? 0.3f : 1.0f) * part(glossy, outgoing, d)};
   }
-  float pdf_part(bool glossy, vec3 outgoing, vec3 incident) const {
+  WFPG_HD float pdf_part(bool glossy, vec3 outgoing, vec3 incident) const {
     return (fault == part_fault::sum ? 0.9f : 1.0f) * part(glossy, outgoing, incident);
   }
 
  private:
-  static float part(bool glossy, vec3 outgoing, vec3 incident) {
+  WFPG_HD static float part(bool glossy, vec3 outgoing, vec3 incident) {
     if (outgoing.z <= 0.0f || incident.z <= 0.0f) return 0.0f;
     return glossy ? 0.5f / pi : incident.z / pi;
   }
-  static vec3 draw(bool glossy, vec2 u) {
+  WFPG_HD static vec3 draw(bool glossy, vec2 u) {
     const float z = glossy ? 1.0f - u.x : std::sqrt(1.0f - u.x), turn = 2.0f * pi * u.y;
     const float r = std::sqrt(1.0f - z * z);
     return glm::normalize(vec3(r * std::cos(turn), r * std::sin(turn), z));
@@ -157,15 +157,15 @@ static_assert(wfpg::has_separate_parts_v<parted_bsdf>);
 struct diffuse_boundary {
   float ior = 1.5f;
   bool scales_radiance = true;
-  bool is_delta() const { return false; }
-  bool transmits() const { return true; }
-  float eval(vec3 outgoing, vec3 incident) const {
+  WFPG_HD bool is_delta() const { return false; }
+  WFPG_HD bool transmits() const { return true; }
+  WFPG_HD float eval(vec3 outgoing, vec3 incident) const {
     const float n_out = outgoing.z > 0.0f ? 1.0f : ior;
     const float scale = (scales_radiance ? n_out * n_out : 1.0f) / (ior * ior);
     return 0.5f * scale * std::fabs(incident.z) / pi;
   }
-  float pdf(vec3, vec3 incident) const { return 0.5f * std::fabs(incident.z) / pi; }
-  bsdf_sample sample(vec3 outgoing, vec2 u) const {
+  WFPG_HD float pdf(vec3, vec3 incident) const { return 0.5f * std::fabs(incident.z) / pi; }
+  WFPG_HD bsdf_sample sample(vec3 outgoing, vec2 u) const {
     const float side = u.x < 0.5f ? 1.0f : -1.0f, x = u.x < 0.5f ? 2.0f * u.x : 2.0f * u.x - 1.0f;
     const float z = std::sqrt(1.0f - x), r = std::sqrt(x), turn = 2.0f * pi * u.y;
     const vec3 d = glm::normalize(vec3(r * std::cos(turn), r * std::sin(turn), side * z));
@@ -192,40 +192,41 @@ WFPG_TEST_CASE("check_bsdf: correct BSDFs pass", "[testing]") {
 
 }  // namespace
 
-using seq = wfpg::exec::seq;
-
 TEST_CASE("check_bsdf: each fault is found and named", "[testing]") {
-  check_passes(check_faulty<seq>(bsdf_fault::none));
-  check_names(check_faulty<seq>(bsdf_fault::large_pdf),
+  check_passes(check_faulty<one_policy>(bsdf_fault::none));
+  check_names(check_faulty<one_policy>(bsdf_fault::large_pdf),
               {"the integral of pdf()", "is 1.02, but the share", "is 1 of"});
-  check_names(check_faulty<seq>(bsdf_fault::no_jacobian),
+  check_names(check_faulty<one_policy>(bsdf_fault::no_jacobian),
               {"pdf() disagrees with sample(): seen from (", "has pdf", "pdf() says"});
-  check_names(check_faulty<seq>(bsdf_fault::uniform_pdf), {"sample() draws too", "z in [", "chi^2", "p = "});
-  check_names(check_faulty<seq>(bsdf_fault::empty_sector),
+  check_names(check_faulty<one_policy>(bsdf_fault::uniform_pdf),
+              {"sample() draws too", "z in [", "chi^2", "p = "});
+  check_names(check_faulty<one_policy>(bsdf_fault::empty_sector),
               {"sample() draws too few", "phi in [", "observed 0", "p = "});
-  check_names(check_faulty<seq>(bsdf_fault::fails_in_sector), {"sample() draws too few", "observed 0"});
-  check_names(check_faulty<seq>(bsdf_fault::nan_at_grazing), {"eval() is ", "nan", "expected finite"});
-  check_names(check_faulty<seq>(bsdf_fault::infinite_sample), {"sample() seen from", "gives pdf inf"});
-  check_names(check_faulty<seq>(bsdf_fault::negative_eval), {"eval() is -0.1, expected finite and at least"});
-  check_names(check_faulty<seq>(bsdf_fault::eval_beyond_pdf),
+  check_names(check_faulty<one_policy>(bsdf_fault::fails_in_sector),
+              {"sample() draws too few", "observed 0"});
+  check_names(check_faulty<one_policy>(bsdf_fault::nan_at_grazing), {"eval() is ", "nan", "expected finite"});
+  check_names(check_faulty<one_policy>(bsdf_fault::infinite_sample), {"sample() seen from", "gives pdf inf"});
+  check_names(check_faulty<one_policy>(bsdf_fault::negative_eval),
+              {"eval() is -0.1, expected finite and at least"});
+  check_names(check_faulty<one_policy>(bsdf_fault::eval_beyond_pdf),
               {"eval() is ", "where pdf() is 0, expected a positive pdf()"});
-  check_names(check_faulty<seq>(bsdf_fault::bright),
+  check_names(check_faulty<one_policy>(bsdf_fault::bright),
               {"energy is not conserved", "is 1.05, expected at most 1"});
-  check_names(check_faulty<seq>(bsdf_fault::not_reciprocal), {"eval() is not reciprocal", "expected"});
-  check_names(check_faulty<seq>(bsdf_fault::long_direction), {"of length 1.01, expected unit length"});
-  check_names(check_faulty<seq>(bsdf_fault::leaks), {"through the surface", "transmits() is false"});
-  check_passes(check_faulty<seq>(bsdf_fault::not_reciprocal, false));
+  check_names(check_faulty<one_policy>(bsdf_fault::not_reciprocal), {"eval() is not reciprocal", "expected"});
+  check_names(check_faulty<one_policy>(bsdf_fault::long_direction), {"of length 1.01, expected unit length"});
+  check_names(check_faulty<one_policy>(bsdf_fault::leaks), {"through the surface", "transmits() is false"});
+  check_passes(check_faulty<one_policy>(bsdf_fault::not_reciprocal, false));
 }
 
 TEST_CASE("check_bsdf: faults of delta BSDFs", "[testing]") {
-  const seq exec;
+  const one_policy exec;
   check_passes(check_bsdf(exec, faulty_mirror{}));
   check_names(check_bsdf(exec, faulty_mirror{1.2f}), {"gives pdf 1.2, expected a probability"});
   check_names(check_bsdf(exec, faulty_mirror{1.0f, 0.3f}), {"eval() is 0.3", "expected 0 of a delta BSDF"});
 }
 
 TEST_CASE("check_bsdf: faults of parts", "[testing]") {
-  const seq exec;
+  const one_policy exec;
   const auto check = [&](part_fault fault) { return check_bsdf(exec, parted_bsdf{fault}); };
   check_passes(check(part_fault::none));
   check_names(check(part_fault::share), {"glossy() seen from", "gives share 1.3, expected in [0, 1]"});
@@ -236,7 +237,7 @@ TEST_CASE("check_bsdf: faults of parts", "[testing]") {
 }
 
 TEST_CASE("check_bsdf: radiance through a boundary of indices", "[testing]") {
-  const seq exec;
+  const one_policy exec;
   bsdf_check_options options;
   options.ior = 1.5f;
   check_passes(check_bsdf(exec, diffuse_boundary{}, options));
@@ -251,7 +252,7 @@ TEST_CASE("check_bsdf: radiance through a boundary of indices", "[testing]") {
 }
 
 TEST_CASE("check_bsdf: correct samplers are rejected no more often than said", "[testing]") {
-  const seq exec;
+  const one_policy exec;
   bsdf_check_options options{tilted};
   options.samples = 4096;
   options.significance = 0.05;
@@ -263,7 +264,7 @@ TEST_CASE("check_bsdf: correct samplers are rejected no more often than said", "
 }
 
 TEST_CASE("check_bsdf: options out of range are refused", "[testing]") {
-  const seq exec;
+  const one_policy exec;
   const auto check = [&](const auto& change) {
     bsdf_check_options options;
     change(options);

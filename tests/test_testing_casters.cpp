@@ -21,7 +21,8 @@ using wfpg::testing::check_surfaces;
 
 namespace {
 
-const float nan_value = std::numeric_limits<float>::quiet_NaN();
+constexpr float infinity = std::numeric_limits<float>::infinity();
+constexpr float nan_value = std::numeric_limits<float>::quiet_NaN();
 
 enum class caster_fault { none, doubled, nan, infinite, negative, ignores_t_max, dark, zero };
 
@@ -30,13 +31,13 @@ struct faulty_caster {
   caster_fault fault = caster_fault::none;
   bool open_top = false;
 
-  ray_hit operator()(ray r) const {
+  WFPG_HD ray_hit operator()(ray r) const {
     if (fault == caster_fault::ignores_t_max) r.t_max = 3.0e38f;
     ray_hit hit = box_caster{open_top}(r);
     const bool rare = r.direction.x > 0.9f;
     if (fault == caster_fault::doubled && hit.is_hit()) hit.distance *= 2.0f;
     if (fault == caster_fault::nan && rare) hit.distance = nan_value;
-    if (fault == caster_fault::infinite && rare) hit.distance = std::numeric_limits<float>::infinity();
+    if (fault == caster_fault::infinite && rare) hit.distance = infinity;
     if (fault == caster_fault::zero && rare) hit.distance = 0.0f;
     if (fault == caster_fault::negative) hit.distance = -std::fabs(hit.distance);
     if (fault == caster_fault::dark && !hit.is_hit()) hit.radiance = -1.0f;
@@ -49,10 +50,9 @@ struct shifted_caster {
   std::size_t shift = 0, unwritten = 0;
   template <class Exec>
   void cast(const Exec& exec, wfpg::array_view<const ray> rays, wfpg::array_view<ray_hit> hits) const {
-    const std::size_t shift = this->shift;
-    exec.for_each(rays.size() - unwritten, [rays, hits, shift](std::size_t i) {
-      hits[i] = box_caster{}(rays[(i + shift) % rays.size()]);
-    });
+    const std::size_t further = shift;
+    exec.for_each(rays.size() - unwritten,
+                  [=] WFPG_HD(std::size_t i) { hits[i] = box_caster{}(rays[(i + further) % rays.size()]); });
   }
 };
 
@@ -95,7 +95,8 @@ WFPG_TEST_CASE("check_surfaces: a wave's correct surfaces pass, and the first wr
   const Exec exec;
   const auto tree = box_octree(exec, 32);
   std::vector<test_surface> host = wall_surfaces(200, 4);
-  for (const test_surface& s : host) check_passes(check_surface(s, tree.view()));
+  const auto on_host = box_octree(host_policy(), 32);
+  for (const test_surface& s : host) check_passes(check_surface(s, on_host.view()));
   const auto report = [&] {
     const wfpg::buffer<test_surface, Exec> device(exec, host);
     return check_surfaces(exec, stored_surfaces{const_view<test_surface>(device)}, host.size(), tree.view());
@@ -110,10 +111,8 @@ WFPG_TEST_CASE("check_surfaces: a wave's correct surfaces pass, and the first wr
 
 }  // namespace
 
-using seq = wfpg::exec::seq;
-
 TEST_CASE("check_ray_caster: each fault is found and named", "[testing]") {
-  const seq exec;
+  const one_policy exec;
   const auto tree = box_octree(exec, 32);
   const auto check = [&](caster_fault fault, bool open_top = false) {
     return check_ray_caster(exec, faulty_caster{fault, open_top}, unit_box);
@@ -158,8 +157,7 @@ TEST_CASE("check_surface: each fault is found and named", "[testing]") {
               {"position is (0.5, nan, 0), expected finite"});
   check_names(check([](auto& s) { s.geometric_normal.x = nan_value; }), {"geometric_normal is (nan"});
   check_names(check([](auto& s) { s.normal.x = nan_value; }), {"normal is (nan"});
-  check_names(check([](auto& s) { s.outgoing.x = std::numeric_limits<float>::infinity(); }),
-              {"outgoing is (inf"});
+  check_names(check([](auto& s) { s.outgoing.x = infinity; }), {"outgoing is (inf"});
   check_names(check([](auto& s) { s.geometric_normal *= 2.0f; }), {"geometric_normal", "of length 2"});
   check_names(check([](auto& s) { s.normal *= 0.5f; }), {"normal is (0, 0, 0.5) of length 0.5"});
   check_names(check([](auto& s) { s.outgoing = vec3(0.0f); }), {"outgoing is (0, 0, 0) of length 0"});
@@ -167,7 +165,7 @@ TEST_CASE("check_surface: each fault is found and named", "[testing]") {
   check_names(check([](auto& s) { s.normal = -s.normal; }), {"dot product -1, expected on the same side"});
   check_passes(check([](auto& s) { s.active = false, s.normal = vec3(nan_value); }));
 
-  const seq exec;
+  const host_policy exec;
   const auto tree = box_octree(exec, 32);
   check_passes(check_surface(right, tree.view()));
   test_surface floating = right;

@@ -1,6 +1,7 @@
 // The two normals of a voxel: packing, k-means against a naive one, thin walls.
 #include "support/cached_scene.hpp"
 #include "support/catch.hpp"
+#include "support/octree_nodes.hpp"
 #include "support/policies.hpp"
 
 #include <wfpg/detail/voxel_normals.hpp>
@@ -85,6 +86,11 @@ WFPG_TEST_CASE("normals of voxels are those of a naive k-means", "[exitance_cach
   const auto areas = scene.fragments.areas.to_host(scene.exec);
   const auto begin = to_host(scene.exec, scene.tree.leaf_fragment_begin());
   const auto tree = scene.octree();
+  const std::vector<node_record> nodes = nodes_of(scene.exec, tree);
+  const auto view = scene.view();
+  const std::vector<vec3> node_normals = evaluate(scene.exec, nodes.size(), [=] WFPG_HD(std::size_t node) {
+    return view.normal(static_cast<node_id>(node));
+  });
   std::vector<double> node_areas(tree.node_count(), 0.0);
   double worst = 0.0;
   for (node_id node = tree.node_count(); node-- > 0;) {
@@ -95,13 +101,13 @@ WFPG_TEST_CASE("normals of voxels are those of a naive k-means", "[exitance_cach
       for (std::size_t i = begin[leaf]; i < end; ++i)
         members.push_back({wfpg::unpack_direction(normals[i]), areas[i]});
     } else {
-      for (std::uint32_t c = 0; c < tree.child_count(node); ++c) {
-        const node_id child = tree.first_child(node) + c;
-        members.push_back({scene.view().normal(child), node_areas[child]});
+      for (std::uint32_t c = 0; c < nodes[node].child_count; ++c) {
+        const node_id child = nodes[node].first_child + c;
+        members.push_back({node_normals[child], node_areas[child]});
       }
     }
     for (const weighted& m : members) node_areas[node] += m.area;
-    worst = std::max(worst, degrees_between(scene.view().normal(node), naive_normal(members)));
+    worst = std::max(worst, degrees_between(node_normals[node], naive_normal(members)));
   }
   CHECK(worst < 1.01);
 }
@@ -120,19 +126,19 @@ WFPG_TEST_CASE("a thin wall's voxel has one normal for either side", "[exitance_
                                  }),
                                  1);
   const auto normal_at = [&](uvec3 voxel) {
-    const node_id leaf = scene.octree().leaf_at(voxel);
+    const node_id leaf = scene.leaf_at(voxel);
     REQUIRE(leaf != invalid_node);
-    return scene.view().normal(leaf);
+    return scene.normal(leaf);
   };
   CHECK(degrees_between(normal_at({0, 0, 0}), z) < 0.1);
   CHECK(degrees_between(normal_at({2, 0, 0}), -z) < 0.1);
   CHECK(degrees_between(normal_at({4, 0, 0}), -z) < 0.1);
   CHECK(degrees_between(normal_at({6, 0, 0}), z) < 0.1);
   CHECK(degrees_between(normal_at({0, 2, 0}), x) < 0.1);
-  const node_id leaf = scene.octree().leaf_at(uvec3(2, 0, 0));
-  CHECK(scene.view().side_facing(leaf, -z) == 0);
-  CHECK(scene.view().side_facing(leaf, glm::normalize(vec3(5, 5, -1))) == 0);
-  CHECK(scene.view().side_facing(leaf, z) == 1);
+  const node_id leaf = scene.leaf_at(uvec3(2, 0, 0));
+  CHECK(scene.side_facing(leaf, -z) == 0);
+  CHECK(scene.side_facing(leaf, glm::normalize(vec3(5, 5, -1))) == 0);
+  CHECK(scene.side_facing(leaf, z) == 1);
 }
 
 }  // namespace

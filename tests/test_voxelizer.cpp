@@ -131,7 +131,7 @@ std::vector<scenario> all_scenarios() {
   std::vector<scenario> all;
   const auto add = [&](const char* name, test_mesh mesh, std::uint32_t resolution, bool area_once = true) {
     scenario s{name, std::move(mesh), resolution, area_once};
-    const wfpg::exec::tbb exec;
+    const one_policy exec;
     s.first = std::make_unique<const fragments>(fragments_of(exec, s.mesh, resolution));
     s.truth = brute_force(s.mesh, s.first->grid);
     all.push_back(std::move(s));

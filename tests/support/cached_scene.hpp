@@ -1,6 +1,8 @@
 // A scene with an octree and an exitance cache, and deposits into it by a policy.
 #pragma once
 
+#include "support/deposits.hpp"
+#include "support/evaluate.hpp"
 #include "support/policies.hpp"
 #include "support/random_meshes.hpp"
 
@@ -28,6 +30,36 @@ struct cached_scene {
 
   wfpg::sparse_voxel_octree_view octree() const { return tree.view(); }
   wfpg::exitance_cache_view view() const { return cache.view(); }
+
+  // What views say of one place or node.
+  wfpg::node_id leaf_at(wfpg::vec3 p) const {
+    const auto tree = octree();
+    return evaluate(exec, [=] WFPG_HD() { return tree.leaf_at(p); });
+  }
+  wfpg::node_id leaf_at(wfpg::uvec3 voxel) const {
+    const auto tree = octree();
+    return evaluate(exec, [=] WFPG_HD() { return tree.leaf_at(voxel); });
+  }
+  wfpg::node_id parent(wfpg::node_id node) const {
+    const auto tree = octree();
+    return evaluate(exec, [=] WFPG_HD() { return tree.parent(node); });
+  }
+  wfpg::vec3 normal(wfpg::node_id node) const {
+    const auto of = view();
+    return evaluate(exec, [=] WFPG_HD() { return of.normal(node); });
+  }
+  std::uint32_t side_facing(wfpg::node_id node, wfpg::vec3 direction) const {
+    const auto of = view();
+    return evaluate(exec, [=] WFPG_HD() { return of.side_facing(node, direction); });
+  }
+  float radiance(wfpg::node_id node, std::uint32_t side) const {
+    const auto of = view();
+    return evaluate(exec, [=] WFPG_HD() { return of.radiance(node, side); });
+  }
+  float read(wfpg::node_id node, wfpg::vec3 toward) const {
+    const auto of = view();
+    return evaluate(exec, [=] WFPG_HD() { return of.read(node, toward); });
+  }
 };
 
 /// Fragments at the centres of voxels of a grid of 8³ unit voxels from the origin.
@@ -55,24 +87,9 @@ wfpg::voxel_fragments<Exec> fragments_in_grid(const std::vector<voxel_normal>& l
   return fragments;
 }
 
-struct deposit {
-  wfpg::vec3 position{0.5f};
-  wfpg::vec3 direction{0.0f, 0.0f, 1.0f};
-  float radiance = 1.0f;
-};
-
-struct make_deposits {
-  wfpg::exitance_cache_view cache;
-  wfpg::array_view<const deposit> deposits;
-  void operator()(std::size_t i) const {
-    cache.deposit(deposits[i].position, deposits[i].direction, deposits[i].radiance);
-  }
-};
-
 template <class Exec>
-void deposit_all(cached_scene<Exec>& scene, const std::vector<deposit>& deposits) {
-  const wfpg::buffer<deposit, Exec> device(scene.exec, deposits);
-  scene.exec.for_each(deposits.size(), make_deposits{scene.view(), device.view()});
+void deposit_all(const cached_scene<Exec>& scene, const std::vector<deposit>& deposits) {
+  deposit_all(scene.exec, scene.view(), deposits);
 }
 
 }  // namespace wfpg_test

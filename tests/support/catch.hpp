@@ -7,3 +7,20 @@ using Catch::Approx;
 #else
 #include <catch2/catch.hpp>
 #endif
+
+#if defined(__CUDACC__)
+// Catch2's own macro makes an anonymous namespace, and nvcc takes one inside another for the same.
+#undef TEST_CASE
+#define WFPG_TEST_JOINED_(a, b) a##b
+#define WFPG_TEST_JOINED(a, b) WFPG_TEST_JOINED_(a, b)
+#define WFPG_REGISTERED_TEST_CASE(function, registered, ...) \
+  static void function();                                    \
+  [[maybe_unused]] static const bool registered = [] {       \
+    REGISTER_TEST_CASE(function, __VA_ARGS__);               \
+    return true;                                             \
+  }();                                                       \
+  static void function()
+#define TEST_CASE(...)                                                    \
+  WFPG_REGISTERED_TEST_CASE(WFPG_TEST_JOINED(registered_test_, __LINE__), \
+                            WFPG_TEST_JOINED(is_registered_test_, __LINE__), __VA_ARGS__)
+#endif

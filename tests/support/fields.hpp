@@ -2,6 +2,7 @@
 // policy.
 #pragma once
 
+#include "support/evaluate.hpp"
 #include "support/policies.hpp"
 
 #include <wfpg/field_sampler.hpp>
@@ -51,7 +52,7 @@ struct build_grid {
   std::uint32_t resolution;
   float floor;
   template <class Block>
-  void operator()(Block& block, std::size_t) const {
+  WFPG_HD void operator()(Block& block, std::size_t) const {
     wfpg::detail::build_distribution(block, {words}, static_cast<int>(resolution), floor);
   }
 };
@@ -79,5 +80,14 @@ class built_field {
   wfpg::buffer<std::uint32_t, Exec> words_;
   std::uint32_t resolution_;
 };
+
+/// The weights of a distribution's cells, row by row.
+template <class Exec>
+std::vector<std::uint32_t> cell_weights(const Exec& exec, const wfpg::grid_distribution& grid) {
+  const std::uint32_t n = grid.resolution();
+  return evaluate(exec, std::size_t(n) * n, [=] WFPG_HD(std::size_t i) {
+    return grid.weight(static_cast<std::uint32_t>(i) % n, static_cast<std::uint32_t>(i) / n);
+  });
+}
 
 }  // namespace wfpg_test

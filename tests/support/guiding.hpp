@@ -1,6 +1,7 @@
 // A guider in the unit box with a bright patch in its ceiling, and a path tracer of two bounces around it.
 #pragma once
 
+#include "support/evaluate.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
@@ -30,7 +31,7 @@ inline std::string refusal(const std::function<void()>& call) {
 /// The ceiling's patch, 0.7 <= x, z <= 0.9 at y = 1, and its radiance.
 constexpr float patch_low = 0.7f, patch_high = 0.9f, patch_radiance = 10.0f;
 
-inline float emitted(vec3 p) {
+WFPG_HD inline float emitted(vec3 p) {
   const bool inside = p.x >= patch_low && p.x <= patch_high && p.z >= patch_low && p.z <= patch_high;
   return inside && p.y > 0.999f ? patch_radiance : 0.0f;
 }
@@ -92,6 +93,33 @@ class wave_of_surfaces {
   std::uint64_t seed_;
 };
 
+/// Whether a ray has a field, and how many of the first `rays` have one.
+template <class Exec>
+bool guides(const Exec& exec, const wfpg::guide_view& view, std::uint32_t ray) {
+  return evaluate(exec, [=] WFPG_HD() { return view.guides(ray); });
+}
+template <class Exec>
+std::size_t count_guided(const Exec& exec, const wfpg::guide_view& view, std::size_t rays) {
+  return count_where(exec, rays,
+                     [=] WFPG_HD(std::size_t ray) { return view.guides(static_cast<std::uint32_t>(ray)); });
+}
+
+/// What the BSDFs of rays say of the density of directions.
+struct density_of_bsdf {
+  wfpg::array_view<const test_surface> surfaces;
+  wfpg::array_view<const wfpg::sampled_direction> drawn;
+  WFPG_HD float operator()(std::size_t i) const {
+    return surfaces[i].bsdf.pdf(surfaces[i].outgoing, drawn[i].direction);
+  }
+};
+template <class Exec>
+std::vector<float> bsdf_densities(const Exec& exec, const std::vector<test_surface>& surfaces,
+                                  const std::vector<wfpg::sampled_direction>& drawn) {
+  const wfpg::buffer<test_surface, Exec> s(exec, surfaces);
+  const wfpg::buffer<wfpg::sampled_direction, Exec> d(exec, drawn);
+  return evaluate(exec, drawn.size(), density_of_bsdf{s.view(), d.view()});
+}
+
 /// A guider of the box that knows the patch.
 template <class Exec>
 struct guided_box {
@@ -100,13 +128,13 @@ struct guided_box {
 
   explicit guided_box(const wfpg::guider_options& options = box_options(),
                       wfpg::memory_resource* resource = nullptr)
-      : exec(resource), guider(exec, box_mesh<Exec>(exec).view(), options) {}
+      : exec(Exec().with_resource(resource)), guider(exec, box_mesh<Exec>(exec).view(), options) {}
   explicit guided_box(wfpg::field_lifetime lifetime)
       : guided_box(box_options(wfpg::guiding_mode::oriented, lifetime)) {}
 
   /// Deposits the patch on 40² points a wall, and begins the sample after it.
   void learn() {
-    deposit_on_walls(guider.cache(), 40,
+    deposit_on_walls(exec, guider.cache(), 40,
                      [](std::uint32_t face, float u, float v) { return emitted(face_point(face, u, v)); });
     guider.end_sample();
     guider.begin_sample();
@@ -169,7 +197,7 @@ struct follow_path {
   wfpg::path_recorder_view recorder;
   std::uint32_t depth;
 
-  void operator()(std::size_t path) const {
+  WFPG_HD void operator()(std::size_t path) const {
     path_step& step = paths[path];
     test_surface& surface = surfaces[path];
     const wfpg::sampled_direction& d = directions[path];
@@ -189,13 +217,13 @@ struct follow_path {
   }
 
  private:
-  static vec3 inward_normal(vec3 p) {
+  WFPG_HD static vec3 inward_normal(vec3 p) {
     std::uint32_t nearest = 0;
     for (std::uint32_t face = 1; face < 6; ++face)
       if (away(p, face) < away(p, nearest)) nearest = face;
     return face_normal(nearest);
   }
-  static float away(vec3 p, std::uint32_t face) {
+  WFPG_HD static float away(vec3 p, std::uint32_t face) {
     return std::abs(p[int(face / 2)] - (face % 2 ? 1.0f : 0.0f));
   }
 };
@@ -212,7 +240,8 @@ std::vector<float> trace_paths(const Exec& exec, wfpg::path_guider<Exec>& guider
     const wfpg::buffer<wfpg::sampled_direction, Exec> directions(exec, paths);
     guider.begin_sample();
     const wfpg::path_recorder_view recorder = guider.recorder();
-    exec.for_each(paths, [recorder, at = surfaces.view()](std::size_t i) {
+    const wfpg::array_view<test_surface> at = surfaces.view();
+    exec.for_each(paths, [=] WFPG_HD(std::size_t i) {
       recorder.vertex(i, 0, at[i].position, at[i].outgoing, vec3(1.0f));
     });
     for (std::uint32_t depth = 0; depth < 2; ++depth) {

@@ -1,46 +1,57 @@
 // A field store over the lit unit box, samples and waves for it, and a caster that notes its cones.
 #pragma once
 
+#include "support/evaluate.hpp"
 #include "support/guiding.hpp"
 #include "support/lit_box.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
+#include <wfpg/detail/atomic.hpp>
 #include <wfpg/field_store.hpp>
 
-#include <atomic>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 namespace wfpg_test {
 
-/// Cones that were cast, from any number of threads.
-class cone_log {
- public:
-  explicit cone_log(std::size_t room = 0) : cones_(room) {}
-
-  void note(const wfpg::ray& cone) {
-    const std::size_t at = count_.fetch_add(1);
-    if (at < cones_.size()) cones_[at] = cone;
-  }
-  std::size_t count() const { return count_; }
-  std::size_t take() { return count_.exchange(0); }
-  const wfpg::ray& operator[](std::size_t i) const { return cones_[i]; }
-
- private:
-  std::atomic<std::size_t> count_{0};
-  std::vector<wfpg::ray> cones_;
-};
-
-/// Inline: the box's hits, noted.
+/// Inline: the box's hits, and notes of the cones from any number of threads.
 struct noting_caster {
-  cone_log* log;
+  std::uint32_t* count;
+  wfpg::array_view<wfpg::ray> cones;
   box_caster box;
-  wfpg::ray_hit operator()(const wfpg::ray& cone) const {
-    log->note(cone);
+  WFPG_HD wfpg::ray_hit operator()(const wfpg::ray& cone) const {
+    const std::uint32_t at = wfpg::detail::atomic_add(count, 1);
+    if (at < cones.size()) cones[at] = cone;
     return box(cone);
   }
+};
+
+/// Cones that were cast, the first so many of them kept.
+template <class Exec>
+class cone_log {
+ public:
+  cone_log(const Exec& exec, std::size_t room)
+      : exec_(exec), count_(exec, std::vector<std::uint32_t>{0}), cones_(exec, room) {}
+
+  noting_caster caster() const { return {count_.data(), cones_.view(), {}}; }
+  std::size_t count() const { return wfpg::read_element(exec_, count_.data()); }
+  /// The count, which begins anew.
+  std::size_t take() {
+    const std::size_t counted = count();
+    count_ = wfpg::buffer<std::uint32_t, Exec>(exec_, std::vector<std::uint32_t>{0});
+    return counted;
+  }
+  std::vector<wfpg::ray> cones() const { return cones(std::min(count(), cones_.size())); }
+  /// The first n, also after take().
+  std::vector<wfpg::ray> cones(std::size_t n) const { return cones_.to_host(exec_, n); }
+
+ private:
+  Exec exec_;
+  wfpg::buffer<std::uint32_t, Exec> count_;
+  wfpg::buffer<wfpg::ray, Exec> cones_;
 };
 
 inline float patch_light(std::uint32_t face, float u, float v) {
@@ -53,7 +64,7 @@ inline wfpg::kept_field_options slots_of(std::uint32_t resolution, std::size_t s
   wfpg::kept_field_options options;
   options.resolution = resolution;
   options.recast = recast;
-  options.budget_bytes = slots * wfpg::field_store<wfpg::exec::tbb>::bytes_a_slot(resolution);
+  options.budget_bytes = slots * wfpg::field_store<one_policy>::bytes_a_slot(resolution);
   return options;
 }
 
@@ -65,14 +76,14 @@ struct kept_box {
   wfpg::guiding_mode mode;
   wfpg::field_options field;
   std::uint32_t sample = 0;
-  cone_log log;
+  cone_log<Exec> log;
   wfpg::buffer<test_surface, Exec> surfaces;  // of the last wave
 
   static constexpr std::size_t max_rays = 1024;
 
   explicit kept_box(const wfpg::kept_field_options& options,
                     wfpg::guiding_mode guiding = wfpg::guiding_mode::oriented, std::size_t noted = 0)
-      : store(box.exec, box.tree.view(), {2, 32}, options, max_rays), mode(guiding), log(noted) {}
+      : store(box.exec, box.tree.view(), {2, 32}, options, max_rays), mode(guiding), log(box.exec, noted) {}
 
   const Exec& exec() const { return box.exec; }
   void begin() { store.begin_sample(exec(), ++sample); }
@@ -92,9 +103,7 @@ struct kept_box {
                                                       {}};
     return store.prepare(exec(), kept, caster, buffer_bytes);
   }
-  wfpg::guide_view prepare(const std::vector<test_surface>& wave) {
-    return prepare(wave, noting_caster{&log, {}});
-  }
+  wfpg::guide_view prepare(const std::vector<test_surface>& wave) { return prepare(wave, log.caster()); }
   /// Cones that a wave casts.
   std::size_t cones(const std::vector<test_surface>& wave) {
     log.take();
@@ -120,6 +129,10 @@ struct kept_box {
 
   wfpg::kept_field_statistics counts() const { return store.statistics(exec()); }
   wfpg::detail::field_store_state state() const { return wfpg::read_element(exec(), store.state()); }
+  /// A ray's field; its cells lie in the policy's memory.
+  wfpg::directional_field field_of(const wfpg::guide_view& view, std::uint32_t ray) const {
+    return evaluate(exec(), [=] WFPG_HD() { return view.mixture(ray).field; });
+  }
 };
 
 /// Rays of one place, `n` times.
@@ -127,14 +140,8 @@ inline std::vector<test_surface> rays_at(vec3 position, vec3 normal, std::size_t
   return std::vector<test_surface>(n, make_surface(position, normal, normal));
 }
 
-inline std::size_t count_guided(const wfpg::guide_view& view, std::size_t rays) {
-  std::size_t n = 0;
-  for (std::size_t ray = 0; ray < rays; ++ray) n += view.guides(static_cast<std::uint32_t>(ray));
-  return n;
-}
-
 /// A ray's field in one number: frame, share and every weight.
-inline std::uint64_t field_bits(const wfpg::guide_mixture& mixture) {
+WFPG_HD inline std::uint64_t field_bits(const wfpg::guide_mixture& mixture) {
   if (mixture.field.empty()) return 0;
   const wfpg::grid_distribution& grid = mixture.field.grid();
   std::uint64_t bits = wfpg::detail::hash(mixture.field.hemisphere(), grid.resolution());
@@ -146,11 +153,11 @@ inline std::uint64_t field_bits(const wfpg::guide_mixture& mixture) {
   return bits;
 }
 
-inline std::vector<std::uint64_t> field_bits(const wfpg::guide_view& view, std::size_t rays) {
-  std::vector<std::uint64_t> bits;
-  for (std::size_t ray = 0; ray < rays; ++ray)
-    bits.push_back(field_bits(view.mixture(static_cast<std::uint32_t>(ray))));
-  return bits;
+template <class Exec>
+std::vector<std::uint64_t> field_bits(const Exec& exec, const wfpg::guide_view& view, std::size_t rays) {
+  return evaluate(exec, rays, [=] WFPG_HD(std::size_t ray) {
+    return field_bits(view.mixture(static_cast<std::uint32_t>(ray)));
+  });
 }
 
 }  // namespace wfpg_test

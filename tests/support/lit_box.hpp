@@ -31,7 +31,7 @@ struct lit_box {
   /// Deposits light in 64² points a wall.
   template <class Radiance>
   void shine(const Radiance& radiance) {
-    deposit_on_walls(cache.view(), 64, radiance);
+    deposit_on_walls(exec, cache.view(), 64, radiance);
     cache.update(exec);
   }
 };

@@ -1,18 +1,27 @@
 // The execution policies that tests run on, and a test case for each of them: WFPG_TEST_CASE defines one test
-// per policy and warp width, named "NAME - tbb16" and tagged [tbb][w16].
+// per policy and warp width, named "NAME - tbb16" and tagged [tbb][w16]. A CUDA compiler makes of the same
+// sources the CUDA policy's tests, "NAME - cuda" and tagged [cuda].
 //
-// WFPG_TEST_ONLY_TBB leaves the other policies out, for the thread sanitizer.
+// WFPG_TEST_ONLY_TBB leaves the other policies out, for the thread sanitizer; WFPG_TEST_SEVERAL_POLICIES says
+// that seq, omp and tbb are there side by side.
 #pragma once
 
 #include "support/catch.hpp"
 
+#if defined(__CUDACC__)
+#include <wfpg/exec/cuda.hpp>
+#include <wfpg/exec/seq.hpp>
+#else
 #if !defined(WFPG_TEST_ONLY_TBB)
+#define WFPG_TEST_SEVERAL_POLICIES
 #include <wfpg/exec/omp.hpp>
 #include <wfpg/exec/seq.hpp>
 #endif
-#include <wfpg/buffer.hpp>
 #include <wfpg/exec/tbb.hpp>
+#endif
+#include <wfpg/buffer.hpp>
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
@@ -31,7 +40,12 @@
   WFPG_TEST_ONE(function, name, tags, policy, 16)      \
   WFPG_TEST_ONE(function, name, tags, policy, 32)
 
-#if defined(WFPG_TEST_ONLY_TBB)
+#if defined(__CUDACC__)
+#define WFPG_TEST_POLICIES(function, name, tags) \
+  TEST_CASE(name " - cuda", tags "[cuda]") {     \
+    function<wfpg::exec::cuda>();                \
+  }
+#elif defined(WFPG_TEST_ONLY_TBB)
 #define WFPG_TEST_POLICIES(function, name, tags) WFPG_TEST_WIDTHS(function, name, tags, tbb)
 #else
 #define WFPG_TEST_POLICIES(function, name, tags) \
@@ -51,6 +65,38 @@
 #define WFPG_TEST_CASE(name, tags) WFPG_TEST_CASE_(WFPG_TEST_JOIN(policy_test_, __LINE__), name, tags)
 
 namespace wfpg_test {
+
+#if defined(__CUDACC__)
+/// The policy of tests that need no more than one.
+using one_policy = wfpg::exec::cuda;
+/// One whose memory the host reads.
+using host_policy = wfpg::exec::seq;
+/// Whether loops run in the host's threads: only then they may throw, and have scratch memory of the
+/// resource.
+constexpr bool loops_on_host = false;
+#else
+using one_policy = wfpg::exec::tbb;
+using host_policy = wfpg::exec::tbb;
+constexpr bool loops_on_host = true;
+#endif
+
+/// Whether two kernels gave the same number by the same floating-point operations: to the bit on a host, and
+/// nearly where the compiler fuses multiplications and additions by what surrounds them.
+WFPG_HD inline bool alike(float a, float b) {
+  return loops_on_host ? a == b : std::fabs(a - b) <= 2.0e-6f * std::fabs(b);
+}
+WFPG_HD inline bool alike(wfpg::vec3 a, wfpg::vec3 b) {
+  return loops_on_host ? a == b : glm::distance(a, b) <= 2.0e-6f * glm::length(b);
+}
+
+/// Where a policy's memory comes from that was not told otherwise.
+inline wfpg::memory_resource* default_resource() {
+#if defined(__CUDACC__)
+  return wfpg::detail::stream_resource::of(nullptr);
+#else
+  return std::pmr::get_default_resource();
+#endif
+}
 
 /// The elements of a view in the policy's memory, on the host.
 template <class Exec, class T>

@@ -40,21 +40,23 @@ struct draw_product {
   wfpg::array_view<product_draw> drawn;
 
   template <class Block>
-  void operator()(Block& block, std::size_t) const {
+  WFPG_HD void operator()(Block& block, std::size_t) const {
     block.for_each_warp(1, [&](const auto& warp, int) {
-      *product = wfpg::detail::multiply(warp, field, points, surface, weights);
-      for (std::size_t i = 0; i < drawn.size(); ++i) drawn[i] = draw(static_cast<std::uint32_t>(i));
+      const wfpg::product_field made = wfpg::detail::multiply(warp, field, points, surface, weights);
+      warp.for_each(1, [&](int) { *product = made; });
+      warp.for_each(static_cast<int>(drawn.size()),
+                    [&](int i) { drawn[i] = draw(made, static_cast<std::uint32_t>(i)); });
     });
   }
 
  private:
-  product_draw draw(std::uint32_t i) const {
+  WFPG_HD product_draw draw(const wfpg::product_field& made, std::uint32_t i) const {
     const hashed_numbers random{5};
     product_draw d;
-    if (product->empty()) return d;
-    d.product.direction = product->sample(random(i, 0), d.product.pdf);
-    d.asked = product->pdf(d.product.direction);
-    const wfpg::product_mixture mixture{*product, 0.7f};
+    if (made.empty()) return d;
+    d.product.direction = made.sample(random(i, 0), d.product.pdf);
+    d.asked = made.pdf(d.product.direction);
+    const wfpg::product_mixture mixture{made, 0.7f};
     d.mixed = mixture.sample(surface, random(i, 1).x, random(i, 2));
     if (d.mixed.pdf > 0.0f) d.mixed_asked = mixture.pdf(surface, d.mixed.direction);
     return d;
@@ -68,7 +70,8 @@ class made_product {
   /// Over the hemisphere above `up`, or over the sphere. `seed` is of the points in blocks.
   made_product(const Exec& exec, const product_size& size, const std::vector<float>& values, bool hemisphere,
                const wfpg::surface<Bsdf>& surface, std::uint64_t seed, std::size_t samples)
-      : built_(exec, values, size.field, 0.01f),
+      : exec_(exec),
+        built_(exec, values, size.field, 0.01f),
         field_(hemisphere ? wfpg::directional_field(built_.grid(), up)
                           : wfpg::directional_field(built_.grid())),
         resolution_(size.product),
@@ -99,13 +102,13 @@ class made_product {
 
   /// The integral of the density over each cell.
   std::vector<double> cells() const {
-    std::vector<double> result;
     const std::uint32_t n = field_.grid().resolution();
-    for (std::uint32_t i = 0; i < n * n; ++i) {
+    const wfpg::directional_field field = field_;
+    const wfpg::product_field product = product_;
+    return evaluate(exec_, std::size_t(n) * n, [=] WFPG_HD(std::size_t i) {
       const vec2 middle = (vec2(float(i % n), float(i / n)) + 0.5f) / float(n);
-      result.push_back(double(product_.pdf(field_.direction(middle))) * double(field_.cell_solid_angle()));
-    }
-    return result;
+      return double(product.pdf(field.direction(middle))) * double(field.cell_solid_angle());
+    });
   }
   /// Directions drawn in each cell.
   std::vector<double> counts() const {
@@ -122,6 +125,7 @@ class made_product {
  private:
   std::size_t blocks() const { return std::size_t(resolution_) * resolution_; }
 
+  Exec exec_;
   built_field<Exec> built_;
   wfpg::directional_field field_;
   std::uint32_t resolution_;

@@ -3,6 +3,7 @@
 // resource.
 #pragma once
 
+#include "support/deposits.hpp"
 #include "support/policies.hpp"
 
 #include <wfpg/bsdf.hpp>
@@ -169,7 +170,8 @@ struct batch_box_caster {
     if (calls->calls++ == calls->throw_at) throw std::runtime_error("the caster fails on request");
     calls->rays += rays.size();
     if (rays.size() > calls->largest) calls->largest = rays.size();
-    exec.for_each(rays.size(), [rays, hits, box = box](std::size_t i) { hits[i] = box(rays[i]); });
+    const box_caster one = box;
+    exec.for_each(rays.size(), [=] WFPG_HD(std::size_t i) { hits[i] = one(rays[i]); });
   }
 };
 
@@ -189,32 +191,40 @@ inline std::vector<test_surface> wall_surfaces(std::size_t n, std::uint64_t seed
   return result;
 }
 
-/// Deposits `radiance(face, u, v)` toward the inside, on a grid of n² points on each face.
-template <class Cache, class Radiance>
-void deposit_on_walls(const Cache& cache, int n, const Radiance& radiance) {
+/// Deposits `radiance(face, u, v)`, a function on the host, toward the inside, on a grid of n² points on each
+/// face.
+template <class Exec, class Radiance>
+void deposit_on_walls(const Exec& exec, const wfpg::exitance_cache_view& cache, int n,
+                      const Radiance& radiance) {
+  std::vector<deposit> light;
   for (std::uint32_t face = 0; face < 6; ++face)
     for (int i = 0; i < n * n; ++i) {
       const float u = (float(i % n) + 0.5f) / float(n), v = (float(i / n) + 0.5f) / float(n);
-      cache.deposit(face_point(face, u, v), face_normal(face), float(radiance(face, u, v)));
+      light.push_back({face_point(face, u, v), face_normal(face), float(radiance(face, u, v))});
     }
+  deposit_all(exec, cache, light);
 }
 
-/// Counts what is asked of the default resource.
+/// Counts what is asked of a resource.
 class counting_resource : public wfpg::memory_resource {
  public:
+  explicit counting_resource(wfpg::memory_resource* upstream = default_resource()) : upstream_(upstream) {}
+
   std::size_t allocations = 0, bytes_in_use = 0;
 
  private:
   void* do_allocate(std::size_t bytes, std::size_t alignment) override {
     ++allocations;
     bytes_in_use += bytes;
-    return std::pmr::new_delete_resource()->allocate(bytes, alignment);
+    return upstream_->allocate(bytes, alignment);
   }
   void do_deallocate(void* block, std::size_t bytes, std::size_t alignment) override {
     bytes_in_use -= bytes;
-    std::pmr::new_delete_resource()->deallocate(block, bytes, alignment);
+    upstream_->deallocate(block, bytes, alignment);
   }
   bool do_is_equal(const wfpg::memory_resource& other) const noexcept override { return this == &other; }
+
+  wfpg::memory_resource* upstream_;
 };
 
 }  // namespace wfpg_test

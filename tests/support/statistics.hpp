@@ -1,8 +1,9 @@
 // What every sampler of directions has to pass: its frequencies, its energy, its moments, and that it reports
-// the density that it answers when asked. Made of <wfpg/testing.hpp>'s own parts, for densities on the host.
+// the density that it answers when asked. Made of <wfpg/testing.hpp>'s own parts.
 #pragma once
 
 #include "support/chi_square.hpp"
+#include "support/evaluate.hpp"
 
 #include <wfpg/types.hpp>
 
@@ -18,6 +19,28 @@ struct drawn_direction {
   wfpg::vec3 direction{0.0f};
   float pdf = 0.0f;
 };
+
+/// The densities of directions that a function on the host gives one by one.
+template <class F>
+auto each(const F& f) {
+  return [f](const std::vector<wfpg::vec3>& directions) {
+    std::vector<float> densities;
+    for (const wfpg::vec3 d : directions) densities.push_back(float(f(d)));
+    return densities;
+  };
+}
+
+/// The same of a functor that a policy runs.
+template <class Exec, class F>
+struct densities_by {
+  Exec exec;
+  F f;
+  std::vector<float> operator()(const std::vector<wfpg::vec3>& directions) const {
+    return evaluate(exec, directions, f);
+  }
+};
+template <class Exec, class F>
+densities_by(Exec, F) -> densities_by<Exec, F>;
 
 /// What was found; `frequencies` is for a chi_square_family that judges many samplers together.
 struct sampler_report : wfpg::testing::check_report {
@@ -70,20 +93,23 @@ class sampler_check {
   template <class Factor>
   bins_type integrate(const Factor& factor) const {
     const auto values = [&](const std::vector<wfpg::vec3>& directions) {
-      std::vector<float> result;
-      for (const wfpg::vec3 d : directions) result.push_back(pdf_(d) * factor(d));
+      std::vector<float> result = pdf_(directions);
+      for (std::size_t i = 0; i < result.size(); ++i) result[i] *= factor(directions[i]);
       return result;
     };
     return {wfpg::detail::frame(wfpg::vec3(0.0f, 0.0f, 1.0f)), values, double(counted_.size()), hints_};
   }
 
   std::string query() const {
+    std::vector<wfpg::vec3> directions;
+    for (const drawn_direction& d : drawn_) directions.push_back(d.direction);
+    const std::vector<float> densities = pdf_(directions);
     for (std::size_t i = 0; i < drawn_.size(); ++i) {
       const drawn_direction& d = drawn_[i];
       const wfpg::detail::in_words toward{d.direction};
       if (!(std::fabs(glm::length(d.direction) - 1.0f) < 1.0e-4f))
         return wfpg::detail::sentence("query: sample ", i, ", ", toward, ", has not unit length");
-      const float asked = pdf_(d.direction);
+      const float asked = densities[i];
       if (!(d.pdf > 0.0f && std::fabs(asked - d.pdf) <= options_.query * d.pdf))
         return wfpg::detail::sentence("query: sample ", i, " toward ", toward, " was drawn with density ",
                                       d.pdf, ", pdf() says ", asked);
@@ -135,7 +161,7 @@ class sampler_check {
   std::vector<wfpg::vec3> hints_, counted_;
 };
 
-/// The same in one call. `pdf`: (vec3) -> float, on the host.
+/// The same in one call. `pdf`: (const std::vector<vec3>&) -> std::vector<float>.
 template <class Density>
 sampler_report check_sampler(const std::vector<drawn_direction>& drawn, const Density& pdf,
                              const sampler_check_options& options = {}) {

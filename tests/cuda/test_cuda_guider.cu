@@ -1,5 +1,6 @@
 // The guider on the CUDA policy: its integer stages against the serial policy's, its directions but for
 // rounding, and one seed twice.
+#include "cuda/walls.hpp"
 #include "support/scenes.hpp"
 
 #include <wfpg/exec/cuda.hpp>
@@ -20,31 +21,9 @@ namespace {
 constexpr std::uint32_t rays = 20000, deposits = 50000;
 constexpr int samples = 4;
 
-/// Points of the unit box's walls, of three BSDFs.
-struct walls {
-  WFPG_HD test_surface operator()(std::uint32_t ray) const {
-    const vec2 u = hashed_numbers{3}(ray, 0);
-    const vec3 normal = face_normal(ray % 6);
-    const bsdf_kind kind = ray % 5 < 3    ? bsdf_kind::lambert
-                           : ray % 5 == 3 ? bsdf_kind::glossy
-                                          : bsdf_kind::glass;
-    return make_surface(face_point(ray % 6, u.x, u.y), normal, normal, kind);
-  }
-};
-
 struct do_nothing {
   template <class Block>
   WFPG_HD void operator()(Block&, std::size_t) const {}
-};
-
-/// Light on the walls, most of it in a corner of the ceiling.
-struct light_walls {
-  wfpg::exitance_cache_view cache;
-  WFPG_HD void operator()(std::size_t i) const {
-    const test_surface s = walls()(static_cast<std::uint32_t>(i));
-    const bool bright = s.position.y == 1.0f && s.position.x > 0.7f;
-    cache.deposit(s.position, s.normal, bright ? 10.0f : 0.1f);
-  }
 };
 
 struct guided {

@@ -1,0 +1,68 @@
+// Asking what lies in a policy's memory: functors run through the policy, and what they give comes back.
+#pragma once
+
+#include "support/policies.hpp"
+
+#include <cstddef>
+#include <type_traits>
+#include <vector>
+
+namespace wfpg_test {
+
+/// What f gives, in a std::vector: of bools bytes, which have addresses.
+template <class T>
+using result_of = std::conditional_t<std::is_same_v<std::decay_t<T>, bool>, unsigned char, std::decay_t<T>>;
+
+template <class F, class Result>
+struct evaluate_each {
+  F f;
+  wfpg::array_view<Result> results;
+  WFPG_HD void operator()(std::size_t i) const { results[i] = f(i); }
+};
+
+/// f(i) for i in [0, n).
+template <class Exec, class F, class Result = result_of<decltype(std::declval<const F&>()(std::size_t(0)))>>
+std::vector<Result> evaluate(const Exec& exec, std::size_t n, const F& f) {
+  const wfpg::buffer<Result, Exec> results(exec, n);
+  exec.for_each(n, evaluate_each<F, Result>{f, results.view()});
+  return results.to_host(exec);
+}
+
+/// In how many i of [0, n) f(i) is true.
+template <class Exec, class F>
+std::size_t count_where(const Exec& exec, std::size_t n, const F& f) {
+  std::size_t count = 0;
+  for (const auto found : evaluate(exec, n, f)) count += found ? 1 : 0;
+  return count;
+}
+
+template <class F>
+struct call_once {
+  F f;
+  WFPG_HD auto operator()(std::size_t) const { return f(); }
+};
+
+/// f().
+template <class Exec, class F, class Result = result_of<decltype(std::declval<const F&>()())>>
+Result evaluate(const Exec& exec, const F& f) {
+  const wfpg::buffer<Result, Exec> result(exec, 1);
+  exec.for_each(1, evaluate_each<call_once<F>, Result>{{f}, result.view()});
+  return wfpg::read_element(exec, result.data());
+}
+
+template <class F, class T>
+struct call_with {
+  F f;
+  wfpg::array_view<const T> arguments;
+  WFPG_HD auto operator()(std::size_t i) const { return f(arguments[i]); }
+};
+
+/// f(argument) for each of some arguments.
+template <class Exec, class T, class F,
+          class Result = result_of<decltype(std::declval<const F&>()(std::declval<const T&>()))>>
+std::vector<Result> evaluate(const Exec& exec, const std::vector<T>& arguments, const F& f) {
+  const wfpg::buffer<T, Exec> device(exec, arguments);
+  return evaluate(exec, arguments.size(), call_with<F, T>{f, device.view()});
+}
+
+}  // namespace wfpg_test
