@@ -17,6 +17,7 @@ namespace render {
 /// What a batch of rays asks; each has a program in optix_programs.cu.
 enum class optix_query { intersect, occluded, cast };
 
+/// Owns what OptiX makes for one mesh. Launches may run on several streams at once.
 class optix_tracer {
  public:
   /// Builds on the current device, ordered on `stream`, and waits for it. `memory` hands out device memory
