@@ -82,8 +82,7 @@ WFPG_TEST_CASE("normals of voxels are those of a naive k-means", "[exitance_cach
   }
   const cached_scene<Exec> scene(fragments_in_grid<Exec>(list), 1);
   const auto codes = scene.fragments.codes.to_host(scene.exec);
-  const auto normals = scene.fragments.normals.to_host(scene.exec);
-  const auto areas = scene.fragments.areas.to_host(scene.exec);
+  const auto surfaces = scene.fragments.surfaces.to_host(scene.exec);
   const auto begin = to_host(scene.exec, scene.tree.leaf_fragment_begin());
   const auto tree = scene.octree();
   const std::vector<node_record> nodes = nodes_of(scene.exec, tree);
@@ -99,7 +98,7 @@ WFPG_TEST_CASE("normals of voxels are those of a naive k-means", "[exitance_cach
       const std::size_t leaf = node - tree.first_leaf();
       const std::size_t end = leaf + 1 < begin.size() ? begin[leaf + 1] : codes.size();
       for (std::size_t i = begin[leaf]; i < end; ++i)
-        members.push_back({wfpg::unpack_direction(normals[i]), areas[i]});
+        members.push_back({wfpg::unpack_direction(surfaces[i].normal), surfaces[i].area});
     } else {
       for (std::uint32_t c = 0; c < nodes[node].child_count; ++c) {
         const node_id child = nodes[node].first_child + c;

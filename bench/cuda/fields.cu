@@ -35,9 +35,9 @@ struct cast_cones {
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t bin) const {
     const wfpg::detail::field_cells cone_of(fields.origin(bin), field_size);
-    block.for_each(static_cast<int>(cells), [&](int cell) {
-      hits[bin * cells + static_cast<std::size_t>(cell)] =
-          room_caster()(cone_of.cone(static_cast<std::uint32_t>(cell)));
+    block.for_each(static_cast<int>(cells), [&](int k) {
+      const auto i = static_cast<std::uint32_t>(k);
+      hits[bin * cells + i] = room_caster()(cone_of.cone(wfpg::detail::cell_in_order(i, field_size)));
     });
   }
 };
@@ -53,7 +53,7 @@ struct keep_nothing {
   WFPG_HD void finish(Block& block, std::size_t bin, const wfpg::directional_field& field) const {
     block.for_each(1, [&](int) { totals[bin] = field.grid().total(); });
   }
-  static std::size_t scratch_bytes(std::size_t making) { return sizeof(std::uint32_t) * cells + 16 + making; }
+  static std::size_t scratch_bytes() { return sizeof(std::uint32_t) * cells + 16; }
 };
 
 /// 2,048 fields of 128² over a wave, their cones already cast.
@@ -89,19 +89,14 @@ class workload {
     exec.for_each(std::size_t(p) * p,
                   wfpg::detail::draw_product_points{hemisphere, hemisphere + p * p, p, 1});
     serve = serve_type{surfaces, hashed_numbers{}, {}, directions.view()};
-    sink = {bins,
-            serve,
-            {0.7f, 0.5f, 64},
-            field_size,
-            {hemisphere, hemisphere + p * p, p},
-            exec_policy::warps_per_block};
+    sink = {bins, serve, {0.7f, 0.5f, 64}, field_size, {hemisphere, hemisphere + p * p, p}};
   }
 
   /// Every field through a sink.
   template <class Sink>
   void make(const Sink& into) const {
     const std::size_t making = wfpg::detail::field_scratch_bytes(field_size, exec_policy::warps_per_block);
-    exec.for_each_block(field_count, into.scratch_bytes(making),
+    exec.for_each_block(field_count, making + into.scratch_bytes(),
                         wfpg::detail::make_fields<stored_surfaces, wfpg::detail::stored_hits, Sink>{
                             fields, {hits.view(), 0, cells}, into, 0});
   }

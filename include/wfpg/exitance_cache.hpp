@@ -184,6 +184,15 @@ class exact_sum {
   std::uint64_t sum_ = 0;
 };
 
+struct clear_leaves {
+  leaf_exitance* leaves;
+  std::uint32_t* newest;
+  WFPG_HD void operator()(std::size_t leaf) const {
+    leaves[leaf] = {};
+    newest[2 * leaf] = newest[2 * leaf + 1] = no_deposit;
+  }
+};
+
 /// The first deposit of each side adds all of them to the mean.
 struct fold_deposits {
   array_view<const std::uint64_t> queue;
@@ -286,9 +295,8 @@ class exitance_cache {
 
   /// Forgets all light, and what is queued.
   void clear(const Exec& exec) {
-    ::thrust::fill_n(exec.thrust(), leaves_.data(), leaves_.size(), detail::leaf_exitance{});
+    exec.for_each(leaves_.size(), detail::clear_leaves{leaves_.data(), newest_.data()});
     ::thrust::fill_n(exec.thrust(), inner_radiance_.data(), inner_radiance_.size(), -1.0f);
-    ::thrust::fill_n(exec.thrust(), newest_.data(), newest_.size(), detail::no_deposit);
     ::thrust::fill_n(exec.thrust(), counters_.data() + exitance_cache_view::counter_queued, 1, 0u);
   }
 

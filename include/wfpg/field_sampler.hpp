@@ -66,6 +66,10 @@ class grid_distribution {
            before(b.x, b.y);
   }
   WFPG_HD std::uint32_t weight(std::uint32_t x, std::uint32_t y) const { return weight(cell_block{x, y, 1}); }
+  /// The sum of columns 0 to x and rows 0 to y.
+  WFPG_HD std::uint32_t sum_through(std::uint32_t x, std::uint32_t y) const {
+    return sums_[y * resolution_ + x];
+  }
 
   /// A point of [0,1)² from u in [0,1)². Monotone in each coordinate inside a row: stratified u stay
   /// stratified.

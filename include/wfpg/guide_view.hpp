@@ -3,7 +3,6 @@
 // that were made resident; the fused form draws the same directions from the same random numbers.
 #pragma once
 
-#include <wfpg/detail/lanes.hpp>
 #include <wfpg/mis.hpp>
 #include <wfpg/product_sampler.hpp>
 #include <wfpg/types.hpp>
@@ -55,38 +54,13 @@ class guide_view {
     const std::uint32_t field = field_of_ray_[ray];
     return {fields_.field(field), fields_.fields[field].fraction};
   }
-  /// The ray's mixture of product and BSDF, made by a warp: P² to 2 P² evaluations of the BSDF into `words`,
-  /// P² of them, which it reads as long as it lives. Precondition: product_resolution() > 0.
-  template <class Warp, class Bsdf>
-  WFPG_HD product_mixture product(const Warp& warp, std::uint32_t ray, const surface<Bsdf>& s,
-                                  std::uint32_t* words) const {
-    if (!guides(ray)) return {};
-    const std::uint32_t field = field_of_ray_[ray];
-    return {detail::multiply(warp, fields_.field(field), fields_.points, s, words),
-            fields_.fields[field].fraction};
-  }
-  /// The same by one thread.
+  /// The ray's mixture of product and BSDF: P² to 2 P² evaluations of the BSDF into `words`, P² of them,
+  /// which it reads as long as it lives. Precondition: product_resolution() > 0.
   template <class Bsdf>
   WFPG_HD product_mixture product(std::uint32_t ray, const surface<Bsdf>& s, std::uint32_t* words) const {
-    return product(detail::emulated_warp<8>(), ray, s, words);
-  }
-
-  /// The same in two steps, that the lanes of a warp may each keep another ray's: the words by a warp, where
-  /// they are needed; and the mixture.
-  template <class Warp, class Bsdf>
-  WFPG_HD void weigh(const Warp& warp, std::uint32_t ray, const surface<Bsdf>& s,
-                     std::uint32_t* words) const {
-    if (!s.active || !guides(ray)) return;
-    const directional_field field = fields_.field(field_of_ray_[ray]);
-    if (detail::needs_weights(field, s)) detail::weigh_blocks(warp, field, fields_.points, s, words);
-  }
-  template <class Bsdf>
-  WFPG_HD product_mixture weighed(std::uint32_t ray, const surface<Bsdf>& s,
-                                  const std::uint32_t* words) const {
     if (!guides(ray)) return {};
     const std::uint32_t field = field_of_ray_[ray];
-    return {detail::weighed_product(fields_.field(field), product_resolution(), s, words),
-            fields_.fields[field].fraction};
+    return {detail::multiply(fields_.field(field), fields_.points, s, words), fields_.fields[field].fraction};
   }
 
   /// A direction and its density from the field alone. Precondition: guides(ray).
@@ -116,7 +90,7 @@ class guide_view {
   template <class Bsdf, class F>
   WFPG_HD auto with_mixture(std::uint32_t ray, const surface<Bsdf>& s, const F& f) const {
     if (product_resolution() == 0) return f(mixture(ray));
-    std::uint32_t words[max_product_resolution * max_product_resolution];
+    std::uint32_t words[max_product_words];
     return f(product(ray, s, words));
   }
 

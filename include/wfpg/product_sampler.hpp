@@ -1,12 +1,15 @@
 // Product sampling: a ray draws from a field times its own BSDF, in two levels (paper, section 3.6; thesis,
 // section 4.5, Algorithms 6 and 7; after Conty Estevez & Lecocq 2018, "Fast Product Importance Sampling of
-// Environment Maps"). The F x F cells of a field form P x P blocks, whose sums its summed-area table has. One
-// warp multiplies the blocks by the BSDF, which it evaluates at a point or two in each, and scans them; a
-// direction is drawn from a block and then from the cells inside it. The density is that of what was
-// evaluated, exactly: probability of the block times that of the cell inside it, over the cell's solid angle.
+// Environment Maps"). The F x F cells of a field form P x P blocks, whose sums its summed-area table has. The
+// blocks are multiplied by the BSDF, evaluated at a point or two in each, and summed; a direction is drawn
+// from a block and then from the cells inside it. The density is that of what was evaluated, exactly:
+// probability of the block times that of the cell inside it, over the cell's solid angle. The paper gives a
+// ray's product to a warp; one thread a ray is several times faster on a GPU, since what a BSDF computes from
+// the outgoing direction is computed once, all lanes read the same point, and no lane waits while one ray is
+// served.
 //
-// Memory: 4 P² bytes a warp, and nothing a field. Cost: P² evaluations of the BSDF a ray, and one more for
-// each that is black; a direction takes O(log P + log F), a density O(1).
+// Memory: 4 P² bytes a ray in work, and nothing a field. Cost: P² evaluations of the BSDF a ray, and one more
+// for each that is black; a direction takes O(log P + log F), a density O(1).
 #pragma once
 
 #include <wfpg/bsdf.hpp>
@@ -21,6 +24,8 @@ namespace wfpg {
 
 /// The largest P of products.
 inline constexpr std::uint32_t max_product_resolution = 16;
+/// Words that hold any product: 1 KiB.
+inline constexpr std::uint32_t max_product_words = max_product_resolution * max_product_resolution;
 
 /// A block as products see it: where they evaluate BSDFs, jittered anew for each sample and depth, so that a
 /// lobe between points is not missed forever; and the mean of all its directions.
@@ -197,55 +202,38 @@ WFPG_HD bool has_product(const directional_field& field, const surface<Bsdf>& s,
            s.bsdf.glossy(s.outgoing).share == 0.0f;
 }
 
-/// Whether a field is to be multiplied for a surface, block by block. Of a delta BSDF nothing would be left.
+/// Multiplies a field by a surface's BSDF; `words` holds P², which the product reads as long as it lives.
+/// Weights are integers, scaled by the largest of them: exact in every sum. Of a delta BSDF nothing is left.
 template <class Bsdf>
-WFPG_HD bool needs_weights(const directional_field& field, const surface<Bsdf>& s) {
-  return !s.bsdf.is_delta() && !has_product(field, s, facing_normal(s));
-}
-
-/// Multiplies a field's blocks by a surface's BSDF, by one warp, into P² words. Weights are integers, scaled
-/// by the largest of them: alike on every width, and exact in every sum.
-template <class Warp, class Bsdf>
-WFPG_HD void weigh_blocks(const Warp& warp, const directional_field& field, const product_points& points,
-                          const surface<Bsdf>& s, std::uint32_t* words) {
-  const vec3 up = facing_normal(s);
-  const std::uint32_t p = points.resolution, side = field.grid().resolution() / p;
-  const auto n = static_cast<int>(p * p);
-  const product_point* const local = field.hemisphere() ? points.hemisphere : points.sphere;
-  warp.for_each(n, [&](int i) {
-    const std::uint32_t x = static_cast<std::uint32_t>(i) % p, y = static_cast<std::uint32_t>(i) / p;
-    const std::uint32_t sum = field.grid().weight({x * side, y * side, side});
-    words[i] = float_bits(sum > 0 ? static_cast<float>(sum) * block_factor(s, up, field, local[i]) : 0.0f);
-  });
-  warp.sync();
-  auto largest = warp.map([](int) { return 0.0f; });
-  for (int first = 0; first < n; first += Warp::width)  // P² is a power of two: lanes beyond it read again
-    largest =
-        warp.map([&](int lane) { return max(largest[lane], bits_float(words[(first + lane) & (n - 1)])); });
-  const float brightest = warp.reduce(largest, [](float a, float b) { return max(a, b); });
-  const float scale = brightest > 1.0e-25f ? 0x1p31f / static_cast<float>(n) / brightest : 0.0f;
-  warp.inclusive_scan(n, words, [&](int i) {
-    const float product = bits_float(words[i]);
-    return product > 0.0f && scale > 0.0f ? max(static_cast<std::uint32_t>(product * scale), 1u) : 0u;
-  });
-  warp.sync();
-}
-
-/// The product that weigh_blocks made where it was needed.
-template <class Bsdf>
-WFPG_HD product_field weighed_product(const directional_field& field, std::uint32_t resolution,
-                                      const surface<Bsdf>& s, const std::uint32_t* words) {
-  if (s.bsdf.is_delta()) return {};
-  if (has_product(field, s, facing_normal(s))) return product_field(field);
-  return words[resolution * resolution - 1] > 0 ? product_field(field, resolution, words) : product_field();
-}
-
-/// Multiplies a field by a surface's BSDF, by one warp; `words` holds P².
-template <class Warp, class Bsdf>
-WFPG_HD product_field multiply(const Warp& warp, const directional_field& field, const product_points& points,
+WFPG_HD product_field multiply(const directional_field& field, const product_points& points,
                                const surface<Bsdf>& s, std::uint32_t* words) {
-  if (needs_weights(field, s)) weigh_blocks(warp, field, points, s, words);
-  return weighed_product(field, points.resolution, s, words);
+  if (s.bsdf.is_delta()) return {};
+  const vec3 up = facing_normal(s);
+  if (has_product(field, s, up)) return product_field(field);
+  const std::uint32_t p = points.resolution, side = field.grid().resolution() / p;
+  const product_point* const local = field.hemisphere() ? points.hemisphere : points.sphere;
+  // The table's entries at the blocks' far corners, each read once; then blocks from the last to the first,
+  // so that those still needed are there.
+  for (std::uint32_t i = 0; i < p * p; ++i)
+    words[i] = field.grid().sum_through((i % p + 1) * side - 1, (i / p + 1) * side - 1);
+  float brightest = 0.0f;
+  for (std::uint32_t i = p * p; i-- > 0;) {
+    const std::uint32_t left = i % p > 0 ? words[i - 1] : 0, above = i >= p ? words[i - p] : 0;
+    const std::uint32_t corner = i % p > 0 && i >= p ? words[i - p - 1] : 0;
+    const std::uint32_t sum = words[i] - left - above + corner;
+    const float product = sum > 0 ? static_cast<float>(sum) * block_factor(s, up, field, local[i]) : 0.0f;
+    words[i] = float_bits(product);
+    brightest = max(brightest, product);
+  }
+  if (!(brightest > 1.0e-25f)) return {};
+  const float scale = 0x1p31f / static_cast<float>(p * p) / brightest;
+  std::uint32_t through = 0;
+  for (std::uint32_t i = 0; i < p * p; ++i) {
+    const float product = bits_float(words[i]);
+    if (product > 0.0f) through += max(static_cast<std::uint32_t>(product * scale), 1u);
+    words[i] = through;
+  }
+  return {field, p, words};
 }
 
 }  // namespace detail

@@ -14,6 +14,7 @@
 #include <wfpg/types.hpp>
 #include <wfpg/voxelizer.hpp>
 
+#include <thrust/copy.h>
 #include <thrust/fill.h>
 #include <thrust/functional.h>
 #include <thrust/iterator/counting_iterator.h>
@@ -172,70 +173,85 @@ class sparse_voxel_octree_view {
 
 namespace detail {
 
-/// 1 for the first of the fragments of a voxel, 0 for the others.
+/// Whether a fragment is the first of its voxel's.
 struct starts_voxel {
   array_view<const morton_code> codes;
-  WFPG_HD std::uint32_t operator()(std::size_t i) const {
-    return i == 0 || codes[i] != codes[i - 1] ? 1u : 0u;
-  }
+  WFPG_HD bool operator()(std::uint32_t i) const { return i == 0 || codes[i] != codes[i - 1]; }
 };
 
-/// The voxels of sorted fragments, given for each fragment how many voxels have begun.
-struct gather_voxels {
+/// What is known of a leaf before there are nodes: its code, and the first level, from the root, on which it
+/// and the leaf before it have nodes of their own.
+struct describe_leaves {
   array_view<const morton_code> codes;
-  array_view<const std::uint32_t> voxels_through;
-  array_view<morton_code> voxel_codes;
-  array_view<std::uint32_t> fragment_begin;
-  WFPG_HD void operator()(std::size_t i) const {
-    const std::uint32_t voxel = voxels_through[i] - 1;
-    if (i > 0 && voxels_through[i - 1] == voxels_through[i]) return;
-    voxel_codes[voxel] = codes[i];
-    fragment_begin[voxel] = static_cast<std::uint32_t>(i);
+  array_view<const std::uint32_t> fragment_begin;
+  std::uint32_t depth;
+  array_view<morton_code> leaf_codes;
+  array_view<std::uint8_t> first_levels;
+
+  WFPG_HD void operator()(std::size_t leaf) const {
+    const std::uint32_t fragment = fragment_begin[leaf];
+    leaf_codes[leaf] = codes[fragment];
+    std::uint32_t level = leaf > 0 ? depth : 0;
+    for (morton_code apart = leaf > 0 ? (codes[fragment] ^ codes[fragment - 1]) >> 3 : 0; apart > 0;
+         apart >>= 3)
+      --level;
+    first_levels[leaf] = static_cast<std::uint8_t>(level);
   }
 };
 
 /// Every level of the octree over its leaves, one level after the other: element l · leaves + i is the node
-/// of level l that holds leaf i. The first element of each node stands for it, and counting those numbers the
-/// nodes.
-struct level_elements {
-  array_view<const morton_code> leaf_codes;
-  std::uint32_t depth;
+/// of level l that holds leaf i. 1 for the first element of each node: counting those numbers the nodes.
+struct starts_node {
+  array_view<const std::uint8_t> first_levels;
+  float per_leaf;  // 1 / leaves
 
-  WFPG_HD std::uint32_t leaves() const { return static_cast<std::uint32_t>(leaf_codes.size()); }
   WFPG_HD std::uint32_t operator()(std::uint32_t element) const {
-    return starts(element / leaves(), element % leaves()) ? 1u : 0u;
-  }
-  WFPG_HD bool starts(std::uint32_t level, std::uint32_t leaf) const {
-    return leaf == 0 || (leaf_codes[leaf] ^ leaf_codes[leaf - 1]) >> 3 * (depth - level) != 0;
+    const auto leaves = static_cast<std::uint32_t>(first_levels.size());
+    // Division by estimate: there are 13 levels at most, so that it errs by one at most.
+    auto level = static_cast<std::uint32_t>(static_cast<float>(element) * per_leaf);
+    auto rest = static_cast<std::int64_t>(element) - static_cast<std::int64_t>(level) * leaves;
+    if (rest < 0) {
+      --level;
+      rest += leaves;
+    } else if (rest >= static_cast<std::int64_t>(leaves)) {
+      ++level;
+      rest -= leaves;
+    }
+    return first_levels[static_cast<std::size_t>(rest)] <= level ? 1u : 0u;
   }
 };
 
 struct gather_level_ends {
   array_view<const std::uint32_t> nodes_through;  // an element of the levels
-  std::uint32_t leaves;
+  std::size_t leaves;
   node_id* ends;
   WFPG_HD void operator()(std::size_t level) const { ends[level] = nodes_through[(level + 1) * leaves - 1]; }
 };
 
-/// Links each node with its parent, and remembers its first leaf.
+/// Links the nodes that begin with a leaf with their parents, and remembers that leaf.
 struct link_nodes {
-  level_elements levels;
+  array_view<const std::uint8_t> first_levels;
   array_view<const std::uint32_t> nodes_through;
+  std::uint32_t depth;
   node_id* parents;
   node_id* first_children;
   std::uint32_t* first_leaf_of;  // a node: counted from the first leaf
 
-  WFPG_HD void operator()(std::size_t i) const {
-    const auto element = static_cast<std::uint32_t>(i);
-    const std::uint32_t level = element / levels.leaves(), leaf = element % levels.leaves();
-    if (!levels.starts(level, leaf)) return;
-    const node_id node = nodes_through[element] - 1;
-    first_leaf_of[node] = leaf;
-    parents[node] = invalid_node;
-    if (level == 0) return;
-    const node_id up = nodes_through[element - levels.leaves()] - 1;
-    parents[node] = up;
-    if (levels.starts(level - 1, leaf)) first_children[up] = node;
+  WFPG_HD void operator()(std::size_t leaf) const {
+    const std::uint32_t first = first_levels[leaf];
+    node_id up = first > 0 ? node(first - 1, leaf) : invalid_node;
+    for (std::uint32_t level = first; level <= depth; ++level) {
+      const node_id here = node(level, leaf);
+      first_leaf_of[here] = static_cast<std::uint32_t>(leaf);
+      parents[here] = up;
+      if (level > first) first_children[up] = here;
+      up = here;
+    }
+  }
+
+ private:
+  WFPG_HD node_id node(std::uint32_t level, std::size_t leaf) const {
+    return nodes_through[level * first_levels.size() + leaf] - 1;
   }
 };
 
@@ -318,49 +334,57 @@ class sparse_voxel_octree {
   void release_build_data() { leaf_fragment_begin_ = {}; }
 
  private:
-  /// The codes of the fragments' voxels.
-  buffer<morton_code, Exec> find_leaves(const Exec& exec, const voxel_fragments<Exec>& fragments) {
+  struct leaves_of_build {
+    buffer<morton_code, Exec> codes;
+    buffer<std::uint8_t, Exec> first_levels;
+  };
+
+  /// The fragments' voxels.
+  leaves_of_build find_leaves(const Exec& exec, const voxel_fragments<Exec>& fragments) {
     const std::size_t n = fragments.size();
     const array_view<const morton_code> codes = fragments.codes.view();
-    const buffer<std::uint32_t, Exec> through(exec, n);
-    const ::thrust::counting_iterator<std::size_t> first(0);
-    ::thrust::transform_inclusive_scan(exec.thrust(), first, first + static_cast<std::ptrdiff_t>(n),
-                                       through.data(), detail::starts_voxel{codes},
-                                       ::thrust::plus<std::uint32_t>());
-    const std::size_t leaves = n > 0 ? read_element(exec, through.data() + n - 1) : 0;
-    buffer<morton_code, Exec> leaf_codes(exec, leaves);
+    const buffer<std::uint32_t, Exec> begin(exec, n);
+    const ::thrust::counting_iterator<std::uint32_t> first(0);
+    std::uint32_t* const end = ::thrust::copy_if(exec.thrust(), first, first + static_cast<std::uint32_t>(n),
+                                                 begin.data(), detail::starts_voxel{codes});
+    const auto leaves = static_cast<std::size_t>(end - begin.data());
     leaf_fragment_begin_ = buffer<std::uint32_t, Exec>(exec, leaves);
-    exec.for_each(
-        n, detail::gather_voxels{codes, through.view(), leaf_codes.view(), leaf_fragment_begin_.view()});
-    return leaf_codes;
+    ::thrust::copy_n(exec.thrust(), begin.data(), leaves, leaf_fragment_begin_.data());
+    leaves_of_build result{{exec, leaves}, {exec, leaves}};
+    exec.for_each(leaves, detail::describe_leaves{codes, leaf_fragment_begin_.view(), view_.depth_,
+                                                  result.codes.view(), result.first_levels.view()});
+    return result;
   }
 
-  void build_levels(const Exec& exec, const buffer<morton_code, Exec>& leaf_codes) {
-    const std::uint64_t element_count = std::uint64_t(view_.depth_ + 1) * leaf_codes.size();
+  void build_levels(const Exec& exec, const leaves_of_build& leaves) {
+    const std::size_t leaf_count = leaves.codes.size();
+    const std::uint64_t element_count = std::uint64_t(view_.depth_ + 1) * leaf_count;
     detail::require(element_count < invalid_node, "number of leaves times levels", element_count,
                     "less than 2^32 - 1");
     const auto elements = static_cast<std::uint32_t>(element_count);
-    const detail::level_elements levels{leaf_codes.view(), view_.depth_};
     const buffer<std::uint32_t, Exec> through(exec, elements);
     const ::thrust::counting_iterator<std::uint32_t> first(0);
-    ::thrust::transform_inclusive_scan(exec.thrust(), first, first + elements, through.data(), levels,
-                                       ::thrust::plus<std::uint32_t>());
-    find_level_ends(exec, through, levels.leaves());
+    ::thrust::transform_inclusive_scan(
+        exec.thrust(), first, first + elements, through.data(),
+        detail::starts_node{leaves.first_levels.view(), 1.0f / static_cast<float>(leaf_count)},
+        ::thrust::plus<std::uint32_t>());
+    find_level_ends(exec, through, leaf_count);
     allocate(exec);
     const buffer<std::uint32_t, Exec> first_leaf_of(exec, view_.node_count());
-    exec.for_each(elements, detail::link_nodes{levels, through.view(), parents_.data(),
-                                               first_children_.data(), first_leaf_of.data()});
+    exec.for_each(leaf_count,
+                  detail::link_nodes{leaves.first_levels.view(), through.view(), view_.depth_,
+                                     parents_.data(), first_children_.data(), first_leaf_of.data()});
     exec.for_each(first_children_.size(),
-                  detail::find_child_masks{leaf_codes.view(), first_leaf_of.data(), first_children_.view(),
+                  detail::find_child_masks{leaves.codes.view(), first_leaf_of.data(), first_children_.view(),
                                            view_.node_count(), view_, child_masks_.data()});
     const std::uint32_t top = view_.top_level_;
     ::thrust::fill_n(exec.thrust(), top_.data(), top_.size(), invalid_node);
     exec.for_each(view_.level_begin_[top + 1] - view_.level_begin_[top],
-                  detail::fill_top{leaf_codes.view(), first_leaf_of.data(), view_.level_begin_[top], top,
+                  detail::fill_top{leaves.codes.view(), first_leaf_of.data(), view_.level_begin_[top], top,
                                    view_.depth_, top_.data()});
   }
 
-  void find_level_ends(const Exec& exec, const buffer<std::uint32_t, Exec>& through, std::uint32_t leaves) {
+  void find_level_ends(const Exec& exec, const buffer<std::uint32_t, Exec>& through, std::size_t leaves) {
     if (leaves == 0) return;
     const buffer<node_id, Exec> ends(exec, view_.depth_ + 1);
     exec.for_each(ends.size(), detail::gather_level_ends{through.view(), leaves, ends.data()});

@@ -166,7 +166,7 @@ struct triangle_bounds {
 };
 
 /// A triangle's columns in items of work of equal size, so that a wall and a sliver weigh alike.
-inline constexpr std::uint64_t columns_per_item = 64;
+inline constexpr std::uint64_t columns_per_item = 16;
 
 struct count_items {
   triangle_reader reader;
@@ -187,8 +187,8 @@ struct count_items {
   }
 };
 
-/// Visits the voxels of one item of work. `items_through`: for each triangle the items up to and with its
-/// own.
+/// Visits the voxels of one item of work, f(triangle, voxel). `items_through`: for each triangle the items up
+/// to and with its own.
 struct item_voxels {
   triangle_reader reader;
   array_view<const std::uint64_t> items_through;
@@ -206,12 +206,11 @@ struct item_voxels {
     grid_triangle t{};
     report_counter reason;
     if (!reader.vertices(low, t, reason)) return;
-    const vec3 normal = unit_normal(t.a, t.b, t.c);
     const triangle_columns columns(reader.in_grid(t), reader.grid.resolution);
     const std::uint64_t first = (item - (low ? items_through[low - 1] : 0)) * columns_per_item;
     const std::uint64_t last = min(first + columns_per_item, columns.count());
     for (std::uint64_t c = first; c < last; ++c)
-      columns.for_each_voxel(c, [&](uvec3 voxel, const grid_triangle& local) { f(normal, voxel, local); });
+      columns.for_each_voxel(c, [&](uvec3 voxel) { f(static_cast<std::uint32_t>(low), voxel); });
   }
 };
 
@@ -220,11 +219,12 @@ struct count_fragments {
   array_view<std::uint64_t> counts;
   WFPG_HD void operator()(std::size_t item) const {
     std::uint64_t n = 0;
-    voxels.for_each(item, [&](vec3, uvec3, const grid_triangle&) { ++n; });
+    voxels.for_each(item, [&](std::uint32_t, uvec3) { ++n; });
     counts[item] = n;
   }
 };
 
+/// Writes fragments, with their triangles where their normals will be.
 struct emit_fragments {
   item_voxels voxels;
   array_view<const std::uint64_t> fragments_through;
@@ -233,12 +233,28 @@ struct emit_fragments {
 
   WFPG_HD void operator()(std::size_t item) const {
     std::uint64_t at = item ? fragments_through[item - 1] : 0;
-    const float voxel = voxels.reader.grid.voxel_size();
-    voxels.for_each(item, [&](vec3 normal, uvec3 coordinates, const grid_triangle& local) {
-      codes[at] = morton_encode(coordinates);
-      surfaces[at] = {pack_direction(normal), area_inside(local) * voxel * voxel};
+    voxels.for_each(item, [&](std::uint32_t triangle, uvec3 voxel) {
+      codes[at] = morton_encode(voxel);
+      surfaces[at].normal = triangle;
       ++at;
     });
+  }
+};
+
+/// The surface of each fragment: clipping takes longer than finding it, and here all threads clip.
+struct measure_fragments {
+  triangle_reader reader;
+  array_view<const morton_code> codes;
+  array_view<fragment_surface> surfaces;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    grid_triangle t{};
+    report_counter reason;
+    reader.vertices(surfaces[i].normal, t, reason);
+    const vec3 centre = vec3(morton_decode(codes[i])) + 0.5f;
+    const float voxel = reader.grid.voxel_size();
+    const float area = area_inside(reader.in_grid(t).relative_to(centre)) * voxel * voxel;
+    surfaces[i] = {pack_direction(unit_normal(t.a, t.b, t.c)), area};
   }
 };
 
@@ -291,6 +307,8 @@ voxel_fragments<Exec> voxelize(const Exec& exec, triangle_mesh_view mesh, std::u
   voxel_fragments<Exec> result(exec, fragment_count);
   exec.for_each(item_count,
                 detail::emit_fragments{voxels, counts.view(), result.codes.view(), result.surfaces.view()});
+  exec.for_each(fragment_count,
+                detail::measure_fragments{reader, result.codes.view(), result.surfaces.view()});
   result.grid = reader.grid;
   result.report = detail::read_report(exec, counters);
   return result;

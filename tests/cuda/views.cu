@@ -87,10 +87,10 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(d::emit_fragments{});
   launch(d::check_samples{});
   launch(d::emit_samples{});
-  launch(d::starts_voxel{});
-  launch(d::gather_voxels{});
+  launch(d::measure_fragments{});
+  launch(d::describe_leaves{});
   launch(d::link_nodes{});
-  launch(d::level_elements{});
+  launch(d::starts_node{});
   launch(d::gather_level_ends{});
   launch(d::find_child_masks{});
   launch(d::leaf_normals{});

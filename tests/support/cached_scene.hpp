@@ -72,17 +72,14 @@ template <class Exec>
 wfpg::voxel_fragments<Exec> fragments_in_grid(const std::vector<voxel_normal>& list) {
   const Exec exec;
   std::vector<wfpg::morton_code> codes;
-  std::vector<std::uint32_t> normals;
-  std::vector<float> areas;
+  std::vector<wfpg::fragment_surface> surfaces;
   for (const voxel_normal& f : list) {
     codes.push_back(wfpg::morton_encode(f.voxel));
-    normals.push_back(wfpg::pack_direction(f.normal));
-    areas.push_back(f.area);
+    surfaces.push_back({wfpg::pack_direction(f.normal), f.area});
   }
   wfpg::voxel_fragments<Exec> fragments;
   fragments.codes = wfpg::buffer<wfpg::morton_code, Exec>(exec, codes);
-  fragments.normals = wfpg::buffer<std::uint32_t, Exec>(exec, normals);
-  fragments.areas = wfpg::buffer<float, Exec>(exec, areas);
+  fragments.surfaces = wfpg::buffer<wfpg::fragment_surface, Exec>(exec, surfaces);
   fragments.grid = {wfpg::vec3(0.0f), 8.0f, 8};
   return fragments;
 }

@@ -29,37 +29,37 @@ struct product_draw {
   float mixed_asked = 0.0f;
 };
 
-/// Makes the product by one warp, and draws from it.
 template <class Bsdf>
-struct draw_product {
+struct make_product {
   wfpg::directional_field field;
   wfpg::product_points points;
   wfpg::surface<Bsdf> surface;
   std::uint32_t* weights;
   wfpg::product_field* product;
+  WFPG_HD void operator()(std::size_t) const {
+    *product = wfpg::detail::multiply(field, points, surface, weights);
+  }
+};
+
+template <class Bsdf>
+struct draw_product {
+  const wfpg::product_field* product;
+  wfpg::surface<Bsdf> surface;
   wfpg::array_view<product_draw> drawn;
 
-  template <class Block>
-  WFPG_HD void operator()(Block& block, std::size_t) const {
-    block.for_each_warp(1, [&](const auto& warp, int) {
-      const wfpg::product_field made = wfpg::detail::multiply(warp, field, points, surface, weights);
-      warp.for_each(1, [&](int) { *product = made; });
-      warp.for_each(static_cast<int>(drawn.size()),
-                    [&](int i) { drawn[i] = draw(made, static_cast<std::uint32_t>(i)); });
-    });
-  }
-
- private:
-  WFPG_HD product_draw draw(const wfpg::product_field& made, std::uint32_t i) const {
+  WFPG_HD void operator()(std::size_t i) const {
+    const wfpg::product_field made = *product;
+    const auto draw = static_cast<std::uint32_t>(i);
     const hashed_numbers random{5};
     product_draw d;
-    if (made.empty()) return d;
-    d.product.direction = made.sample(random(i, 0), d.product.pdf);
-    d.asked = made.pdf(d.product.direction);
-    const wfpg::product_mixture mixture{made, 0.7f};
-    d.mixed = mixture.sample(surface, random(i, 1).x, random(i, 2));
-    if (d.mixed.pdf > 0.0f) d.mixed_asked = mixture.pdf(surface, d.mixed.direction);
-    return d;
+    if (!made.empty()) {
+      d.product.direction = made.sample(random(draw, 0), d.product.pdf);
+      d.asked = made.pdf(d.product.direction);
+      const wfpg::product_mixture mixture{made, 0.7f};
+      d.mixed = mixture.sample(surface, random(draw, 1).x, random(draw, 2));
+      if (d.mixed.pdf > 0.0f) d.mixed_asked = mixture.pdf(surface, d.mixed.direction);
+    }
+    drawn[i] = d;
   }
 };
 
@@ -82,13 +82,10 @@ class made_product {
     exec.for_each(blocks(), wfpg::detail::draw_product_points{points_.data(), sphere, resolution_, seed});
     const wfpg::buffer<wfpg::product_field, Exec> product(exec, 1);
     const wfpg::buffer<product_draw, Exec> results(exec, samples);
-    exec.for_each_block(1, 0,
-                        draw_product<Bsdf>{field_,
-                                           {points_.data(), sphere, resolution_},
-                                           surface,
-                                           weights_.data(),
-                                           product.data(),
-                                           results.view()});
+    exec.for_each(
+        1, make_product<Bsdf>{
+               field_, {points_.data(), sphere, resolution_}, surface, weights_.data(), product.data()});
+    exec.for_each(samples, draw_product<Bsdf>{product.data(), surface, results.view()});
     product_ = product.to_host(exec).front();
     drawn_ = results.to_host(exec);
   }

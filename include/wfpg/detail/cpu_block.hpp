@@ -44,10 +44,6 @@ class cpu_block {
     return reinterpret_cast<T*>(result);
   }
 
-  /// Scratch memory taken, and giving back what was taken since: the team is done with it.
-  WFPG_HD std::size_t scratch_used() const { return used_; }
-  WFPG_HD void release_scratch(std::size_t used) { used_ = used; }
-
   /// Sum of f(i) for i in [0, n), given to all; W partial sums, so that floats add up alike on any team.
   template <class F>
   WFPG_HD auto sum(int n, F f) const {

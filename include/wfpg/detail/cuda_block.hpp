@@ -113,9 +113,6 @@ class cuda_block {
     return reinterpret_cast<T*>(result);
   }
 
-  __device__ std::size_t scratch_used() const { return used_; }
-  __device__ void release_scratch(std::size_t used) { used_ = used; }
-
   /// By threads, warps and the warps' sums in order: the same on every run.
   template <class F>
   __device__ auto sum(int n, F f) const {

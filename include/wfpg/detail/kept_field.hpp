@@ -44,7 +44,8 @@ struct kept_field_builder {
     return whole ? kept.resolution * kept.resolution : refresh_cones(kept.resolution, kept.recast);
   }
   WFPG_HD std::uint32_t cell(std::uint32_t slot, bool whole, std::uint32_t cone) const {
-    return whole ? cone : refreshed_cell(cone, kept.slots[slot].builds, kept.resolution, kept.recast);
+    return whole ? cell_in_order(cone, kept.resolution)
+                 : refreshed_cell(cone, kept.slots[slot].builds, kept.resolution, kept.recast);
   }
 
   /// Cones start from the ray that was picked; a field's frame is that of the ray that it was first cast for.

@@ -176,12 +176,10 @@ void path_guider<Exec>::sample_directions(const wave<Surfaces, Random>& w, const
   if (!keeps_fields()) return serve_transient(w, caster, serve);
   const guide_view view = keep_wave(w, caster);
   const auto timed = clock_.time(detail::stage::serve);
-  if (view.product_resolution() == 0) {
+  if (view.product_resolution() == 0)
     exec_.for_each(w.ray_count, detail::serve_view<decltype(serve)>{serve, view});
-  } else {
-    const detail::serve_products<decltype(serve)> products{serve, view, w.ray_count};
-    exec_.for_each_block(products.blocks(), detail::product_scratch::bytes(Exec::warps_per_block), products);
-  }
+  else
+    exec_.for_each(w.ray_count, detail::serve_products<decltype(serve)>{serve, view});
 }
 
 template <class Exec>
@@ -224,8 +222,7 @@ void path_guider<Exec>::serve_transient(const wave<Surfaces, Random>& w, const C
     rest.ray_keys = fields.bins.ray_keys;
     const auto timed = clock_.time(detail::stage::fields);
     const product_points points = points_at(w.depth);
-    const detail::transient_sink<Serve> sink{fields.bins,       serve,  fraction(),
-                                             fields.resolution, points, Exec::warps_per_block};
+    const detail::transient_sink<Serve> sink{fields.bins, serve, fraction(), fields.resolution, points};
     detail::for_each_field(exec_, fields, caster, sink, options_.caster_buffer_bytes);
   }
   const auto timed = clock_.time(detail::stage::serve);

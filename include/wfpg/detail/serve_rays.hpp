@@ -61,59 +61,15 @@ struct serve_view {
   }
 };
 
-/// Scratch memory in which the warps of a block make products: of some rays one after the other by all lanes,
-/// and then lanes serve these rays, one each.
-struct product_scratch {
-  std::uint32_t resolution;  // P
-
-  static std::size_t bytes(int warps) {
-    return sizeof(std::uint32_t) * words_a_warp * static_cast<std::size_t>(warps) + 16;
-  }
-
-  /// weigh(warp, i, words) by the warp and serve(i, words) by a lane, for i in [0, n).
-  template <class Block, class Weigh, class Serve>
-  WFPG_HD void for_each(Block& block, int n, const Weigh& weigh, const Serve& serve) const {
-    auto* const all =
-        block.template scratch<std::uint32_t>(words_a_warp * static_cast<std::size_t>(Block::warps));
-    const auto words_a_ray = static_cast<int>(resolution * resolution);
-    const int rays = min(static_cast<int>(words_a_warp) / words_a_ray, Block::warp::width);
-    block.for_each_warp((n + rays - 1) / rays, [&](const auto& warp, int batch) {
-      std::uint32_t* const words = all + words_a_warp * static_cast<std::size_t>(warp.index());
-      const int first = batch * rays, count = min(rays, n - first);
-      for (int i = 0; i < count; ++i) weigh(warp, first + i, words + i * words_a_ray);
-      warp.for_each(count, [&](int i) { serve(first + i, words + i * words_a_ray); });
-      warp.sync();  // the words are read until here
-    });
-  }
-
- private:
-  static constexpr std::size_t words_a_warp = 2 * max_product_resolution * max_product_resolution;
-};
-
-/// Runs of rays whose fields are in memory, with products.
+/// The same with products.
 template <class Serve>
 struct serve_products {
-  static constexpr std::size_t run = 256;
   Serve serve;
   guide_view view;
-  std::size_t ray_count;
-
-  std::size_t blocks() const { return (ray_count + run - 1) / run; }
-
-  template <class Block>
-  WFPG_HD void operator()(Block& block, std::size_t i) const {
-    const auto first = static_cast<std::uint32_t>(i * run);
-    const auto count = static_cast<int>(min(run, ray_count - first));
-    product_scratch{view.product_resolution()}.for_each(
-        block, count,
-        [&](const auto& warp, int k, std::uint32_t* words) {
-          const std::uint32_t ray = first + static_cast<std::uint32_t>(k);
-          view.weigh(warp, ray, serve.surfaces(ray), words);
-        },
-        [&](int k, const std::uint32_t* words) {
-          const std::uint32_t ray = first + static_cast<std::uint32_t>(k);
-          serve(ray, [&](const auto& s) { return view.weighed(ray, s, words); });
-        });
+  WFPG_HD void operator()(std::size_t i) const {
+    const auto ray = static_cast<std::uint32_t>(i);
+    std::uint32_t words[max_product_words];
+    serve(ray, [&](const auto& s) { return view.product(ray, s, words); });
   }
 };
 
@@ -136,12 +92,8 @@ struct transient_sink {
   mixture_fraction fraction;
   std::uint32_t resolution;
   product_points points;
-  int warps;  // of a block
 
-  std::size_t scratch_bytes(std::size_t making) const {
-    const std::size_t serving = points.resolution > 0 ? product_scratch::bytes(warps) : 0;
-    return sizeof(std::uint32_t) * resolution * resolution + 16 + max(making, serving);
-  }
+  std::size_t scratch_bytes() const { return sizeof(std::uint32_t) * resolution * resolution + 16; }
 
   template <class Block>
   WFPG_HD std::uint32_t* words(Block& block, std::size_t) const {
@@ -151,24 +103,16 @@ struct transient_sink {
   WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field) const {
     const float share = fraction(bins.size(bin));
     const std::uint32_t* const rays = bins.permutation.data() + bins.begin(bin);
-    const auto count = static_cast<int>(bins.size(bin));
-    if (points.resolution == 0) {
-      block.for_each(count, [&](int i) {
+    block.for_each(static_cast<int>(bins.size(bin)), [&](int i) {
+      if (points.resolution == 0) {
         serve(rays[i], [&](const auto&) { return guide_mixture{field, share}; });
+        return;
+      }
+      std::uint32_t words[max_product_words];
+      serve(rays[i], [&](const auto& s) -> product_mixture {
+        return {multiply(field, points, s, words), share};
       });
-      return;
-    }
-    product_scratch{points.resolution}.for_each(
-        block, count,
-        [&](const auto& warp, int i, std::uint32_t* own) {
-          const auto s = serve.surfaces(rays[i]);
-          if (needs_weights(field, s)) weigh_blocks(warp, field, points, s, own);
-        },
-        [&](int i, const std::uint32_t* own) {
-          serve(rays[i], [&](const auto& s) -> product_mixture {
-            return {weighed_product(field, points.resolution, s, own), share};
-          });
-        });
+    });
   }
 };
 
@@ -181,7 +125,7 @@ struct resident_sink {
   mixture_fraction fraction;
   std::uint32_t resolution;
 
-  static std::size_t scratch_bytes(std::size_t making) { return making; }
+  static std::size_t scratch_bytes() { return 0; }
 
   template <class Block>
   WFPG_HD std::uint32_t* words(Block&, std::size_t bin) const {

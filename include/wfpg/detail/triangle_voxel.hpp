@@ -62,8 +62,12 @@ struct clip_polygon {
   }
 };
 
-/// What of the polygon lies where sign * v[axis] <= 0.5 (Sutherland & Hodgman 1974).
-WFPG_HD inline clip_polygon clip(const clip_polygon& in, int axis, float sign) {
+/// Cuts off what of the polygon lies where sign * v[axis] > 0.5 (Sutherland & Hodgman 1974). Most planes cut
+/// nothing.
+WFPG_HD inline void clip(clip_polygon& in, int axis, float sign) {
+  bool crosses = false;
+  for (int i = 0; i < in.count; ++i) crosses = crosses || sign * in.vertices[i][axis] > 0.5f;
+  if (!crosses) return;
   clip_polygon out;
   for (int i = 0; i < in.count; ++i) {
     const vec3 p = in.vertices[i];
@@ -73,7 +77,7 @@ WFPG_HD inline clip_polygon clip(const clip_polygon& in, int axis, float sign) {
     if (dp >= 0.0f) out.push(p);
     if ((dp >= 0.0f) != (dq >= 0.0f)) out.push(p + (q - p) * (dp / (dp - dq)));
   }
-  return out;
+  in = out;
 }
 
 /// The area of a triangle, relative to a voxel's centre, inside the voxel; in square voxels.
@@ -82,7 +86,10 @@ WFPG_HD inline float area_inside(const grid_triangle& t) {
   polygon.push(t.a);
   polygon.push(t.b);
   polygon.push(t.c);
-  for (int axis = 0; axis < 3; ++axis) polygon = clip(clip(polygon, axis, 1.0f), axis, -1.0f);
+  for (int axis = 0; axis < 3; ++axis) {
+    clip(polygon, axis, 1.0f);
+    clip(polygon, axis, -1.0f);
+  }
   vec3 twice(0.0f);
   for (int i = 2; i < polygon.count; ++i)
     twice +=
@@ -129,7 +136,7 @@ class triangle_columns {
            static_cast<std::uint64_t>(upper_[v_] - lower_[v_] + 1);
   }
 
-  /// f(voxel, triangle relative to its centre) for each voxel of column i that the triangle touches.
+  /// f(voxel) for each voxel of column i that the triangle touches.
   template <class F>
   WFPG_HD void for_each_voxel(std::uint64_t i, F f) const {
     const auto width = static_cast<std::uint64_t>(upper_[u_] - lower_[u_] + 1);
@@ -141,7 +148,7 @@ class triangle_columns {
     for (voxel[w_] = first; voxel[w_] <= last; ++voxel[w_]) {
       const uvec3 coordinates(voxel[0], voxel[1], voxel[2]);
       const grid_triangle local = triangle_.relative_to(vec3(coordinates) + 0.5f);
-      if (overlaps_cube(local, 0.5f + touch_tolerance)) f(coordinates, local);
+      if (overlaps_cube(local, 0.5f + touch_tolerance)) f(coordinates);
     }
   }
 

@@ -32,35 +32,53 @@ struct weighted_normal {
   float area;
 };
 
+/// Normals that lie together. Two of these rather than an array: a GPU keeps them in registers.
+struct normal_cluster {
+  vec3 mean;
+  vec3 sum{0.0f};
+  float area = 0.0f;
+
+  WFPG_HD explicit normal_cluster(vec3 seed) : mean(seed) {}
+  WFPG_HD void begin() {
+    sum = vec3(0.0f);
+    area = 0.0f;
+  }
+  WFPG_HD void add(vec3 normal, float weight) {
+    sum += normal * weight;
+    area += weight;
+  }
+  /// To the mean of what was added; how far, as 1 - cosine.
+  WFPG_HD float move() {
+    const vec3 average = sum / max(area, 1.0e-30f);
+    const float length = glm::length(average);
+    if (!(length > 1.0e-6f)) return 0.0f;
+    const vec3 before = mean;
+    mean = average / length;
+    return 1.0f - glm::dot(mean, before);
+  }
+};
+
 /// Clusters normals around the first one and its opposite, by area, in at most 8 rounds; the mean of the
 /// larger cluster. `members(i)` gives the i-th of n > 0 weighted normals.
 template <class Members>
 WFPG_HD vec3 dominant_normal(const Members& members, std::uint32_t n) {
   constexpr int rounds = 8;
-  vec3 means[2] = {members(0).normal, -members(0).normal};
-  float areas[2] = {0.0f, 0.0f};
+  normal_cluster ahead{members(0).normal}, behind{-members(0).normal};
   for (int round = 0; round < rounds; ++round) {
-    vec3 sums[2] = {vec3(0.0f), vec3(0.0f)};
-    areas[0] = areas[1] = 0.0f;
+    ahead.begin();
+    behind.begin();
     for (std::uint32_t i = 0; i < n; ++i) {
       const weighted_normal m = members(i);
-      const int cluster = glm::dot(m.normal, means[0]) >= glm::dot(m.normal, means[1]) ? 0 : 1;
-      const float weight =
-          max(m.area, 1.0e-30f);  // a voxel that surfaces only touch has no area, but normals
-      sums[cluster] += m.normal * weight;
-      areas[cluster] += weight;
+      const bool is_ahead = glm::dot(m.normal, ahead.mean) >= glm::dot(m.normal, behind.mean);
+      // A voxel that surfaces only touch has no area, but normals.
+      const float weight = max(m.area, 1.0e-30f);
+      ahead.add(m.normal, is_ahead ? weight : 0.0f);
+      behind.add(m.normal, is_ahead ? 0.0f : weight);
     }
-    float moved = 0.0f;
-    for (int cluster = 0; cluster < 2; ++cluster) {
-      const float length = glm::length(sums[cluster] / max(areas[cluster], 1.0e-30f));
-      if (!(length > 1.0e-6f)) continue;
-      const vec3 mean = sums[cluster] / max(areas[cluster], 1.0e-30f) / length;
-      moved = max(moved, 1.0f - glm::dot(mean, means[cluster]));
-      means[cluster] = mean;
-    }
+    const float moved = max(ahead.move(), behind.move());
     if (moved < 1.0e-6f) break;
   }
-  return areas[1] > areas[0] ? means[1] : means[0];
+  return behind.area > ahead.area ? behind.mean : ahead.mean;
 }
 
 struct leaf_normals {
