@@ -9,6 +9,7 @@
 
 #include <wfpg/buffer.hpp>
 #include <wfpg/detail/atomic.hpp>
+#include <wfpg/detail/bottom_up.hpp>
 #include <wfpg/detail/thrust.hpp>
 #include <wfpg/detail/voxel_normals.hpp>
 #include <wfpg/sparse_voxel_octree.hpp>
@@ -184,15 +185,6 @@ class exact_sum {
   std::uint64_t sum_ = 0;
 };
 
-struct clear_leaves {
-  leaf_exitance* leaves;
-  std::uint32_t* newest;
-  WFPG_HD void operator()(std::size_t leaf) const {
-    leaves[leaf] = {};
-    newest[2 * leaf] = newest[2 * leaf + 1] = no_deposit;
-  }
-};
-
 /// The first deposit of each side adds all of them to the mean.
 struct fold_deposits {
   array_view<const std::uint64_t> queue;
@@ -230,13 +222,11 @@ struct fold_deposits {
   }
 };
 
-/// A level's nodes receive the mean of their children's matching sides, of those that have data.
+/// A node receives the mean of its children's matching sides, of those that have data.
 struct average_children {
   exitance_cache_view cache;
-  node_id level_begin;
   float* inner_radiance;
-  WFPG_HD void operator()(std::size_t i) const {
-    const node_id node = level_begin + static_cast<node_id>(i);
+  WFPG_HD void operator()(node_id node) const {
     const node_id first = cache.octree().first_child(node);
     const node_id end = first + cache.octree().child_count(node);
     for (std::uint32_t side = 0; side < 2; ++side) {
@@ -280,9 +270,7 @@ class exitance_cache {
     view_.newest_ = newest_.data();
     view_.counters_ = counters_.data();
     view_.capacity_ = static_cast<std::uint32_t>(queue_capacity);
-    detail::build_voxel_normals(exec, tree, fragments, normals_.view());
-    exec.for_each(swapped_sides_.size(),
-                  detail::match_sides{view_.tree_, normals_.view(), swapped_sides_.view()});
+    detail::build_voxel_normals(exec, tree, fragments, normals_.view(), swapped_sides_.view());
     ::thrust::fill_n(exec.thrust(), counters_.data(), counters_.size(), 0u);
     clear(exec);
   }
@@ -295,8 +283,9 @@ class exitance_cache {
 
   /// Forgets all light, and what is queued.
   void clear(const Exec& exec) {
-    exec.for_each(leaves_.size(), detail::clear_leaves{leaves_.data(), newest_.data()});
+    exec.fill_bytes(leaves_.data(), 0, leaves_.bytes());  // means and counts of zero
     ::thrust::fill_n(exec.thrust(), inner_radiance_.data(), inner_radiance_.size(), -1.0f);
+    ::thrust::fill_n(exec.thrust(), newest_.data(), newest_.size(), detail::no_deposit);
     ::thrust::fill_n(exec.thrust(), counters_.data() + exitance_cache_view::counter_queued, 1, 0u);
   }
 
@@ -305,9 +294,7 @@ class exitance_cache {
     const std::uint32_t* const queued = counters_.data() + exitance_cache_view::counter_queued;
     exec.for_each(exec::device_count{queued, queue_.size()},
                   detail::fold_deposits{queue_.view(), newest_.data(), leaves_.data()});
-    for (std::uint32_t level = view_.tree_.depth(); level-- > 0;)
-      exec.for_each(view_.tree_.level_begin(level + 1) - view_.tree_.level_begin(level),
-                    detail::average_children{view_, view_.tree_.level_begin(level), inner_radiance_.data()});
+    detail::for_each_bottom_up(exec, view_.tree_, 0, detail::average_children{view_, inner_radiance_.data()});
     ::thrust::fill_n(exec.thrust(), counters_.data() + exitance_cache_view::counter_queued, 1, 0u);
   }
 

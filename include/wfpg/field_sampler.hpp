@@ -201,13 +201,16 @@ struct cell_words {
   WFPG_HD void set(int i, float value) const { words[i] = float_bits(value); }
 };
 
-/// Turns F² non-negative finite cell values, each plus `floor`, into a distribution in place. All values zero
-/// (their sum below 1e-25): uniform. The values' sum is below 3e38.
+/// Turns F² non-negative finite cell values, each plus a floor, into a distribution in place. The floor is
+/// `absolute`, and `relative` times the values' mean. All of it zero (the sum below 1e-25): uniform. The
+/// values' sum is below 3e38.
 template <class Block>
 WFPG_HD grid_distribution build_distribution(const Block& block, const cell_words& cells, int resolution,
-                                             float floor) {
+                                             float absolute, float relative = 0.0f) {
   const int n = resolution * resolution;
-  const float total = block.sum(n, [&](int i) { return cells.get(i) + floor; });
+  const float sum = block.sum(n, [&](int i) { return cells.get(i); });
+  const float floor = absolute + relative * sum / static_cast<float>(n);
+  const float total = sum + floor * static_cast<float>(n);
   // Weights sum to 2³¹ and some rounding, below 2³².
   const float scale = total > 1.0e-25f ? 0x1p31f / total : 0.0f;
   block.for_each(n, [&](int i) {
@@ -221,8 +224,14 @@ WFPG_HD grid_distribution build_distribution(const Block& block, const cell_word
     warp.inclusive_scan(resolution, row, [&](int x) { return row[x]; });
   });
   block.sync();
-  block.for_each(resolution, [&](int x) {
-    for (int i = x + resolution; i < n; i += resolution) cells.words[i] += cells.words[i - resolution];
+  constexpr int width = Block::warp::width;
+  block.for_each_warp((resolution + width - 1) / width, [&](const auto& warp, int strip) {
+    auto sums = warp.map([](int) { return 0u; });
+    for (int y = 0; y < resolution; ++y)
+      warp.for_each_lane([&](int lane) {
+        const int x = strip * width + lane;
+        if (x < resolution) cells.words[y * resolution + x] = sums[lane] += cells.words[y * resolution + x];
+      });
   });
   block.sync();
   return {cells.words, static_cast<std::uint32_t>(resolution)};

@@ -128,12 +128,8 @@ WFPG_HD grid_distribution finish_field(Block& block, const cell_words& cells, in
     const float alpha = hemisphere ? options.filter_alpha * 1.41421356f : options.filter_alpha;
     field_filter(cells, resolution, hemisphere, alpha).apply(block, scratch);
   }
-  float floor = options.floor;
-  if (!options.absolute_floor) {
-    const int n = resolution * resolution;
-    floor *= block.sum(n, [&](int i) { return cells.get(i); }) / static_cast<float>(n);
-  }
-  return build_distribution(block, cells, resolution, floor);
+  return build_distribution(block, cells, resolution, options.absolute_floor ? options.floor : 0.0f,
+                            options.absolute_floor ? 0.0f : options.floor);
 }
 
 /// Where cones from a surface start: off it, on the outgoing side.

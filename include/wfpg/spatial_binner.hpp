@@ -8,6 +8,7 @@
 
 #include <wfpg/buffer.hpp>
 #include <wfpg/detail/atomic.hpp>
+#include <wfpg/detail/bottom_up.hpp>
 #include <wfpg/partitioner.hpp>
 #include <wfpg/sparse_voxel_octree.hpp>
 #include <wfpg/types.hpp>
@@ -86,10 +87,8 @@ struct count_at_leaves {
 
 struct sum_children {
   sparse_voxel_octree_view tree;
-  node_id level_begin;
   std::uint32_t* node_counts;
-  WFPG_HD void operator()(std::size_t i) const {
-    const node_id node = level_begin + static_cast<node_id>(i);
+  WFPG_HD void operator()(node_id node) const {
     const node_id first = tree.first_child(node);
     std::uint32_t sum = 0;
     for (std::uint32_t c = 0; c < tree.child_count(node); ++c) sum += node_counts[first + c];
@@ -144,9 +143,8 @@ class spatial_binner {
     ::thrust::fill_n(exec.thrust(), node_counts_.data(), node_counts_.size(), 0u);
     ::thrust::fill_n(exec.thrust(), unbinned_.data(), 1, 0u);
     exec.for_each(n, detail::count_at_leaves<Rays>{rays, tree_, keys, node_counts_.data(), unbinned_.data()});
-    for (std::uint32_t level = tree_.depth(); level-- > options_.min_level;)
-      exec.for_each(tree_.level_begin(level + 1) - tree_.level_begin(level),
-                    detail::sum_children{tree_, tree_.level_begin(level), node_counts_.data()});
+    detail::for_each_bottom_up(exec, tree_, options_.min_level,
+                               detail::sum_children{tree_, node_counts_.data()});
     exec.for_each(n, detail::ascend_to_marked{tree_, node_counts_.data(), options_, keys});
     return {partitioner_.partition(exec, keys, detail::bits_of(tree_.node_count() * orientations)), keys};
   }

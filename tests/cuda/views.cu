@@ -83,6 +83,7 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   use_caster<<<1, 1>>>(wfpg::svo_ray_caster(tree), wfpg::ray{}, nullptr);
 
   launch(d::count_items{});
+  launch(d::mark_first_items{});
   launch(d::count_fragments{});
   launch(d::emit_fragments{});
   launch(d::check_samples{});
@@ -120,8 +121,7 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(d::index_slots{slots, nullptr, nullptr, state});
   launch(d::invalidate_fields{{}, nullptr, tree, {}});
   launch(d::mark_leaves{tree, {}, 3, {}});
-  launch(d::sum_counts{tree, 0, {}});
-  launch(d::match_sides{});
+  launch(d::sum_counts{tree, {}});
   launch(d::fill_top{});
   launch(d::adapt_pressure{state});
 

@@ -7,6 +7,7 @@
 
 #include <wfpg/buffer.hpp>
 #include <wfpg/detail/atomic.hpp>
+#include <wfpg/detail/bottom_up.hpp>
 #include <wfpg/detail/thrust.hpp>
 #include <wfpg/sparse_voxel_octree.hpp>
 #include <wfpg/spatial_binner.hpp>
@@ -42,10 +43,8 @@ struct bin_marks_view {
 
 struct sum_counts {
   sparse_voxel_octree_view tree;
-  node_id level_begin;
   bin_marks_view marks;
-  WFPG_HD void operator()(std::size_t i) const {
-    const node_id node = level_begin + static_cast<node_id>(i);
+  WFPG_HD void operator()(node_id node) const {
     const node_id first = tree.first_child(node);
     std::uint64_t sum = 0;
     for (std::uint32_t c = 0; c < tree.child_count(node); ++c) sum += marks.rays(first + c);
@@ -102,9 +101,7 @@ class bin_marks {
 
   /// Marks anew after `samples` samples. `room`: bins that can have fields; `pressure`: on the device.
   void mark(const Exec& exec, std::uint32_t samples, std::size_t room, const std::uint32_t* pressure) {
-    for (std::uint32_t level = tree_.depth(); level-- > 0;)
-      exec.for_each(tree_.level_begin(level + 1) - tree_.level_begin(level),
-                    sum_counts{tree_, tree_.level_begin(level), view()});
+    for_each_bottom_up(exec, tree_, 0, sum_counts{tree_, view()});
     mark_bins(exec, {options_.rays_per_bin, samples, room, pressure});
   }
 

@@ -43,6 +43,10 @@ class cpu_policy {
     if (bytes) std::memcpy(to, from, bytes);
   }
 
+  void fill_bytes(void* to, unsigned char value, std::size_t bytes) const {
+    if (bytes) std::memset(to, value, bytes);
+  }
+
   /// Sorts n pairs stably by their keys, whose number of bits Thrust's sorts here have no use for.
   template <class Key, class Value>
   void sort_pairs(std::size_t n, int, const Key* keys, const Value* values, Key* sorted_keys,

@@ -105,7 +105,8 @@ class field_filter {
       aside[i] = at(i % size_, y);
     });
     block.sync();
-    const int width = std::decay_t<decltype(block)>::warp::width, strips = (size_ + width - 1) / width;
+    constexpr int width = Block::warp::width;
+    const int strips = (size_ + width - 1) / width;
     block.for_each_warp(strips * segment_count, [&](const auto& warp, int i) {
       filter_segment(warp, i % strips * width, i / strips * segment,
                      aside + i / strips * (2 * radius * size_));

@@ -52,49 +52,85 @@ WFPG_HD inline bool overlaps_cube(const grid_triangle& t, float half) {
   return true;
 }
 
-/// A convex polygon of a clipped triangle: three vertices and at most one more for each of six planes.
-struct clip_polygon {
-  vec3 vertices[9];
-  int count = 0;
+/// The mean of clamp(v, -1/2, 1/2) where v goes evenly from a to b.
+WFPG_HD inline float mean_clamped(float a, float b) {
+  const float low = min(a, b), high = max(a, b);
+  if (low >= -0.5f && high <= 0.5f) return 0.5f * (low + high);
+  if (high <= -0.5f) return -0.5f;
+  if (low >= 0.5f) return 0.5f;
+  const float below = max(-0.5f - low, 0.0f), above = max(high - 0.5f, 0.0f);
+  const float from = max(low, -0.5f), to = min(high, 0.5f);
+  return (0.5f * (above - below) + 0.5f * (from + to) * (to - from)) / (high - low);
+}
 
-  WFPG_HD void push(vec3 v) {
-    if (count < 9) vertices[count++] = v;
+/// The area of a closed polygon inside the unit square about the origin, edge by edge: what lies between an
+/// edge and a base line, inside the square, counts with the edge's direction. No polygon is kept.
+struct area_in_square {
+  float base;  // the nearer to the polygon, the less of small ones is lost to rounding
+  float sum = 0.0f;
+
+  WFPG_HD void edge(vec2 p, vec2 q) {
+    const float from = clamp(p.x, -0.5f, 0.5f), to = clamp(q.x, -0.5f, 0.5f);
+    if (from == to) return;
+    const float slope = (q.y - p.y) / (q.x - p.x);
+    const float y_from = from == p.x ? p.y : p.y + slope * (from - p.x);
+    const float y_to = to == q.x ? q.y : q.y + slope * (to - q.x);
+    sum += (to - from) * (mean_clamped(y_from, y_to) - base);
   }
 };
 
-/// Cuts off what of the polygon lies where sign * v[axis] > 0.5 (Sutherland & Hodgman 1974). Most planes cut
-/// nothing.
-WFPG_HD inline void clip(clip_polygon& in, int axis, float sign) {
-  bool crosses = false;
-  for (int i = 0; i < in.count; ++i) crosses = crosses || sign * in.vertices[i][axis] > 0.5f;
-  if (!crosses) return;
-  clip_polygon out;
-  for (int i = 0; i < in.count; ++i) {
-    const vec3 p = in.vertices[i];
-    const vec3 q = in.vertices[i + 1 < in.count ? i + 1 : 0];
-    const float dp = 0.5f - sign * p[axis];
-    const float dq = 0.5f - sign * q[axis];
-    if (dp >= 0.0f) out.push(p);
-    if ((dp >= 0.0f) != (dq >= 0.0f)) out.push(p + (q - p) * (dp / (dp - dq)));
-  }
-  in = out;
-}
+/// One of the two planes that bound the third coordinate of a polygon: where its edges come in and go out.
+struct bounding_plane {
+  float side;  // +1 or -1: the plane is at side/2
+  vec2 enter{0.0f}, leave{0.0f};
+  bool crossed = false;
 
-/// The area of a triangle, relative to a voxel's centre, inside the voxel; in square voxels.
-WFPG_HD inline float area_inside(const grid_triangle& t) {
-  clip_polygon polygon;
-  polygon.push(t.a);
-  polygon.push(t.b);
-  polygon.push(t.c);
-  for (int axis = 0; axis < 3; ++axis) {
-    clip(polygon, axis, 1.0f);
-    clip(polygon, axis, -1.0f);
+  /// Cuts what lies beyond the plane off the edge from p to q, of which [begin, end] is left.
+  WFPG_HD void cut(vec3 p, vec3 q, float& begin, float& end) {
+    const float from = 0.5f - side * p.z, to = 0.5f - side * q.z;  // inside: at least 0
+    if ((from >= 0.0f) == (to >= 0.0f)) {
+      if (from < 0.0f) end = -1.0f;
+      return;
+    }
+    crossed = true;
+    const float t = from / (from - to);
+    const vec2 at = vec2(p.x, p.y) + (vec2(q.x, q.y) - vec2(p.x, p.y)) * t;
+    if (from >= 0.0f) {
+      leave = at;
+      end = min(end, t);
+    } else {
+      enter = at;
+      begin = max(begin, t);
+    }
   }
-  vec3 twice(0.0f);
-  for (int i = 2; i < polygon.count; ++i)
-    twice +=
-        glm::cross(polygon.vertices[i - 1] - polygon.vertices[0], polygon.vertices[i] - polygon.vertices[0]);
-  return 0.5f * glm::length(twice);
+};
+
+/// The area of a triangle, relative to a voxel's centre, inside the voxel; in square voxels. Of its
+/// projection along the dominant axis: the triangle is cut to the voxel's height, and what is left to its
+/// square.
+WFPG_HD inline float area_inside(const grid_triangle& t) {
+  const vec3 n = glm::cross(t.b - t.a, t.c - t.a);
+  const vec3 farthest = glm::max(glm::abs(t.a), glm::max(glm::abs(t.b), glm::abs(t.c)));
+  if (max(farthest.x, max(farthest.y, farthest.z)) <= 0.5f) return 0.5f * glm::length(n);
+  const vec3 size = glm::abs(n);
+  const int w = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
+  if (!(size[w] > 0.0f)) return 0.0f;
+  const auto turned = [w](vec3 v) { return w == 0 ? vec3(v.y, v.z, v.x) : w == 1 ? vec3(v.z, v.x, v.y) : v; };
+  const vec3 corners[3] = {turned(t.a), turned(t.b), turned(t.c)};
+  area_in_square area{clamp(corners[0].y, -0.5f, 0.5f)};
+  bounding_plane upper{1.0f}, lower{-1.0f};
+  for (int i = 0; i < 3; ++i) {
+    const vec3 p = corners[i], q = corners[i < 2 ? i + 1 : 0];
+    float begin = 0.0f, end = 1.0f;
+    upper.cut(p, q, begin, end);
+    lower.cut(p, q, begin, end);
+    if (!(begin < end)) continue;
+    const vec2 from(p.x, p.y), to(q.x, q.y);
+    area.edge(begin > 0.0f ? from + (to - from) * begin : from, end < 1.0f ? from + (to - from) * end : to);
+  }
+  if (upper.crossed) area.edge(upper.leave, upper.enter);
+  if (lower.crossed) area.edge(lower.leave, lower.enter);
+  return fabsf(area.sum) * glm::length(n) / size[w];
 }
 
 /// The unit normal of the counter-clockwise side, or zero where the triangle has no area.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <wfpg/buffer.hpp>
+#include <wfpg/detail/bottom_up.hpp>
 #include <wfpg/octahedral_map.hpp>
 #include <wfpg/sparse_voxel_octree.hpp>
 #include <wfpg/types.hpp>
@@ -103,52 +104,44 @@ struct leaf_normals {
   }
 };
 
+/// An inner node's normal, and which children's sides are swapped: those whose N faces away from it.
 struct inner_normals {
   sparse_voxel_octree_view tree;
-  node_id level_begin;
   array_view<std::uint16_t> normals;
   array_view<float> areas;
+  array_view<std::uint8_t> swapped;
 
-  WFPG_HD void operator()(std::size_t i) const {
-    const node_id node = level_begin + static_cast<node_id>(i);
+  WFPG_HD void operator()(node_id node) const {
     const node_id first = tree.first_child(node);
     const std::uint32_t n = tree.child_count(node);
     const auto member = [&](std::uint32_t c) {
       return weighted_normal{unpack_voxel_normal(normals[first + c]), areas[first + c]};
     };
+    const std::uint16_t packed = pack_voxel_normal(dominant_normal(member, n));
+    const vec3 normal = unpack_voxel_direction(packed);
     float area = 0.0f;
-    for (std::uint32_t c = 0; c < n; ++c) area += areas[first + c];
-    normals[node] = pack_voxel_normal(dominant_normal(member, n));
-    areas[node] = area;
-  }
-};
-
-/// Which children's sides are swapped: those whose N faces away from their parent's.
-struct match_sides {
-  sparse_voxel_octree_view tree;
-  array_view<const std::uint16_t> normals;
-  array_view<std::uint8_t> swapped;
-  WFPG_HD void operator()(std::size_t node) const {
-    const auto id = static_cast<node_id>(node);
-    const vec3 n = unpack_voxel_direction(normals[id]);
     std::uint32_t bits = 0;
-    for (std::uint32_t c = 0; c < tree.child_count(id); ++c)
-      if (glm::dot(n, unpack_voxel_direction(normals[tree.first_child(id) + c])) < 0.0f) bits |= 1u << c;
-    swapped[id] = static_cast<std::uint8_t>(bits);
+    for (std::uint32_t c = 0; c < n; ++c) {
+      area += areas[first + c];
+      if (glm::dot(normal, unpack_voxel_direction(normals[first + c])) < 0.0f) bits |= 1u << c;
+    }
+    normals[node] = packed;
+    areas[node] = area;
+    swapped[node] = static_cast<std::uint8_t>(bits);
   }
 };
 
-/// Fills the normals of all nodes of a tree just built from sorted fragments.
+/// Fills the normals of all nodes of a tree just built from sorted fragments, and what inner nodes know of
+/// their children's sides.
 template <class Exec>
 void build_voxel_normals(const Exec& exec, const sparse_voxel_octree<Exec>& tree,
-                         const voxel_fragments<Exec>& fragments, array_view<std::uint16_t> normals) {
+                         const voxel_fragments<Exec>& fragments, array_view<std::uint16_t> normals,
+                         array_view<std::uint8_t> swapped) {
   const sparse_voxel_octree_view view = tree.view();
   const buffer<float, Exec> areas(exec, view.node_count());
   exec.for_each(view.leaf_count(), leaf_normals{tree.leaf_fragment_begin(), fragments.surfaces.view(),
                                                 view.first_leaf(), normals, areas.view()});
-  for (std::uint32_t level = view.depth(); level-- > 0;)
-    exec.for_each(view.level_begin(level + 1) - view.level_begin(level),
-                  inner_normals{view, view.level_begin(level), normals, areas.view()});
+  for_each_bottom_up(exec, view, 0, inner_normals{view, normals, areas.view(), swapped});
 }
 
 }  // namespace wfpg::detail

@@ -149,6 +149,10 @@ class cuda {
     copy(to, from, bytes, cudaMemcpyHostToDevice);
   }
 
+  void fill_bytes(void* to, unsigned char value, std::size_t bytes) const {
+    if (bytes) wfpg::detail::check_cuda(cudaMemsetAsync(to, value, bytes, stream_), "cudaMemsetAsync");
+  }
+
   /// Sorts n pairs stably by the low bits of their keys.
   template <class Key, class Value>
   void sort_pairs(std::size_t n, int bits, const Key* keys, const Value* values, Key* sorted_keys,

@@ -7,6 +7,7 @@
 //                                Exec with_resource(memory_resource*) const;
 //                                void copy_to_host(void* to, const void* from, std::size_t bytes) const;
 //                                void copy_from_host(void* to, const void* from, std::size_t bytes) const;
+//                                void fill_bytes(void* to, unsigned char value, std::size_t bytes) const;
 //   2. who sorts and scans:      auto thrust() const;  a Thrust policy whose temporaries come from resource()
 //                                void sort_pairs(n, bits, const K* keys, const V* values, K* sorted_keys,
 //                                                V* sorted_values) const;
