@@ -34,7 +34,7 @@ struct raw_cells {
   wfpg::array_view<float> values;
   wfpg::array_view<wfpg::ray> cones;
   WFPG_HD void operator()(std::size_t i) const {
-    cones[i] = cells.cone(static_cast<std::uint32_t>(i));
+    cones[i] = cells.cone(wfpg::detail::cell_at(static_cast<std::uint32_t>(i), cells.resolution));
     values[i] =
         cells.weigh(cells.find(cache, cones[i], caster(cones[i])).radiance(cache), cones[i].direction);
   }
@@ -113,7 +113,7 @@ WFPG_TEST_CASE("radiance field: a uniform furnace is uniform, to the rim and at 
 struct direction_of_cone {
   wfpg::detail::field_cells cells;
   WFPG_HD vec3 operator()(std::size_t cell) const {
-    return cells.cone(static_cast<std::uint32_t>(cell)).direction;
+    return cells.cone(wfpg::detail::cell_at(static_cast<std::uint32_t>(cell), cells.resolution)).direction;
   }
 };
 
@@ -160,7 +160,7 @@ WFPG_TEST_CASE("radiance field: what is not finite or negative from a caster cou
   const wfpg::exitance_cache_view cache = box.cache.view();
   const std::vector<float> environments{2.0f, -2.0f, std::nanf(""), INFINITY, 1e38f};
   const auto values = evaluate(box.exec, environments, [=] WFPG_HD(float environment) {
-    const wfpg::ray cone = cells.cone(0);
+    const wfpg::ray cone = cells.cone({0, 0});
     const wfpg::detail::cone_hit hit = cells.find(cache, cone, {-1.0f, environment});
     return cells.weigh(hit.radiance(cache), cone.direction);
   });

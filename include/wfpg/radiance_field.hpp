@@ -66,13 +66,23 @@ class cone_hit {
   std::uint32_t word_ = escaped;
 };
 
+/// A cell of a field.
+struct field_cell {
+  std::uint32_t x, y;
+
+  WFPG_HD std::uint32_t index(std::uint32_t resolution) const { return y * resolution + x; }
+};
+
+/// The i-th cell, row by row.
+WFPG_HD constexpr field_cell cell_at(std::uint32_t i, std::uint32_t resolution) {
+  return {i % resolution, i / resolution};
+}
 /// The i-th cell in the order in which cones are cast: tiles of 8 x 4, so that the cones of a warp, and of a
 /// batch caster's, go nearly the same way; row by row where tiles do not fit.
-WFPG_HD constexpr std::uint32_t cell_in_order(std::uint32_t i, std::uint32_t resolution) {
-  if (resolution % 8 != 0) return i;
-  const std::uint32_t tile = i / 32, inside = i % 32, tiles_a_row = resolution / 8;
-  const std::uint32_t x = tile % tiles_a_row * 8 + inside % 8, y = tile / tiles_a_row * 4 + inside / 8;
-  return y * resolution + x;
+WFPG_HD constexpr field_cell cell_in_order(std::uint32_t i, std::uint32_t resolution) {
+  if (resolution % 8 != 0) return cell_at(i, resolution);
+  const field_cell tile = cell_at(i / 32, resolution / 8);
+  return {tile.x * 8 + i % 8, tile.y * 4 + i % 32 / 8};
 }
 
 /// One field's cells: which direction they look, what they see.
@@ -86,9 +96,9 @@ struct field_cells {
     domain = from.hemisphere ? directional_field(grid, from.normal) : directional_field(grid);
   }
 
-  WFPG_HD ray cone(std::uint32_t cell) const {
-    const vec2 jitter = unit_vec2(hash(origin.seed, cell));
-    const vec2 corner(static_cast<float>(cell % resolution), static_cast<float>(cell / resolution));
+  WFPG_HD ray cone(field_cell cell) const {
+    const vec2 jitter = unit_vec2(hash(origin.seed, cell.index(resolution)));
+    const vec2 corner(static_cast<float>(cell.x), static_cast<float>(cell.y));
     ray result;
     result.origin = origin.position;
     result.direction = domain.direction((corner + jitter) / static_cast<float>(resolution));
@@ -177,9 +187,10 @@ struct bin_fields {
     const field_cells cells(origin(bin), resolution);
     const cell_words words{sink.words(block, bin)};
     block.for_each(size * size, [&](int k) {
-      const auto i = static_cast<std::uint32_t>(k), cell = cell_in_order(i, resolution);
+      const auto i = static_cast<std::uint32_t>(k);
+      const field_cell cell = cell_in_order(i, resolution);
       const ray cone = cells.cone(cell);
-      words.set(static_cast<int>(cell),
+      words.set(static_cast<int>(cell.index(resolution)),
                 cells.weigh(cells.find(cache, cone, hits(bin, i, cone)).radiance(cache), cone.direction));
     });
     block.sync();

@@ -199,8 +199,8 @@ struct describe_leaves {
   }
 };
 
-/// Every level of the octree over its leaves, one level after the other: element l · leaves + i is the node
-/// of level l that holds leaf i. 1 for the first element of each node: counting those numbers the nodes.
+/// Every inner level of the octree over its leaves, one level after the other: element l · leaves + i is the
+/// node of level l that holds leaf i. 1 for the first element of each node: counting those numbers the nodes.
 struct starts_node {
   array_view<const std::uint8_t> first_levels;
   float per_leaf;  // 1 / leaves
@@ -231,8 +231,9 @@ struct gather_level_ends {
 /// Links the nodes that begin with a leaf with their parents, and remembers that leaf.
 struct link_nodes {
   array_view<const std::uint8_t> first_levels;
-  array_view<const std::uint32_t> nodes_through;
+  array_view<const std::uint32_t> nodes_through;  // an element of the levels
   std::uint32_t depth;
+  node_id first_leaf;
   node_id* parents;
   node_id* first_children;
   std::uint32_t* first_leaf_of;  // a node: counted from the first leaf
@@ -251,6 +252,7 @@ struct link_nodes {
 
  private:
   WFPG_HD node_id node(std::uint32_t level, std::size_t leaf) const {
+    if (level == depth) return first_leaf + static_cast<node_id>(leaf);
     return nodes_through[level * first_levels.size() + leaf] - 1;
   }
 };
@@ -329,7 +331,9 @@ class sparse_voxel_octree {
 
   /// Where each leaf's fragments begin in the sorted order, until release_build_data(); a leaf's index counts
   /// from the first leaf.
-  array_view<const std::uint32_t> leaf_fragment_begin() const { return leaf_fragment_begin_.view(); }
+  array_view<const std::uint32_t> leaf_fragment_begin() const {
+    return {leaf_fragment_begin_.data(), leaf_fragment_begin_.size() > 0 ? leaf_count() : 0};
+  }
   /// Frees what only building the cache needs.
   void release_build_data() { leaf_fragment_begin_ = {}; }
 
@@ -343,13 +347,11 @@ class sparse_voxel_octree {
   leaves_of_build find_leaves(const Exec& exec, const voxel_fragments<Exec>& fragments) {
     const std::size_t n = fragments.size();
     const array_view<const morton_code> codes = fragments.codes.view();
-    const buffer<std::uint32_t, Exec> begin(exec, n);
+    leaf_fragment_begin_ = buffer<std::uint32_t, Exec>(exec, n);  // of which there are `leaves`
     const ::thrust::counting_iterator<std::uint32_t> first(0);
     std::uint32_t* const end = ::thrust::copy_if(exec.thrust(), first, first + static_cast<std::uint32_t>(n),
-                                                 begin.data(), detail::starts_voxel{codes});
-    const auto leaves = static_cast<std::size_t>(end - begin.data());
-    leaf_fragment_begin_ = buffer<std::uint32_t, Exec>(exec, leaves);
-    ::thrust::copy_n(exec.thrust(), begin.data(), leaves, leaf_fragment_begin_.data());
+                                                 leaf_fragment_begin_.data(), detail::starts_voxel{codes});
+    const auto leaves = static_cast<std::size_t>(end - leaf_fragment_begin_.data());
     leaves_of_build result{{exec, leaves}, {exec, leaves}};
     exec.for_each(leaves, detail::describe_leaves{codes, leaf_fragment_begin_.view(), view_.depth_,
                                                   result.codes.view(), result.first_levels.view()});
@@ -358,7 +360,7 @@ class sparse_voxel_octree {
 
   void build_levels(const Exec& exec, const leaves_of_build& leaves) {
     const std::size_t leaf_count = leaves.codes.size();
-    const std::uint64_t element_count = std::uint64_t(view_.depth_ + 1) * leaf_count;
+    const std::uint64_t element_count = std::uint64_t(view_.depth_) * leaf_count;
     detail::require(element_count < invalid_node, "number of leaves times levels", element_count,
                     "less than 2^32 - 1");
     const auto elements = static_cast<std::uint32_t>(element_count);
@@ -371,9 +373,9 @@ class sparse_voxel_octree {
     find_level_ends(exec, through, leaf_count);
     allocate(exec);
     const buffer<std::uint32_t, Exec> first_leaf_of(exec, view_.node_count());
-    exec.for_each(leaf_count,
-                  detail::link_nodes{leaves.first_levels.view(), through.view(), view_.depth_,
-                                     parents_.data(), first_children_.data(), first_leaf_of.data()});
+    exec.for_each(leaf_count, detail::link_nodes{leaves.first_levels.view(), through.view(), view_.depth_,
+                                                 view_.first_leaf(), parents_.data(), first_children_.data(),
+                                                 first_leaf_of.data()});
     exec.for_each(first_children_.size(),
                   detail::find_child_masks{leaves.codes.view(), first_leaf_of.data(), first_children_.view(),
                                            view_.node_count(), view_, child_masks_.data()});
@@ -385,12 +387,18 @@ class sparse_voxel_octree {
   }
 
   void find_level_ends(const Exec& exec, const buffer<std::uint32_t, Exec>& through, std::size_t leaves) {
-    if (leaves == 0) return;
-    const buffer<node_id, Exec> ends(exec, view_.depth_ + 1);
-    exec.for_each(ends.size(), detail::gather_level_ends{through.view(), leaves, ends.data()});
-    const std::vector<node_id> host = ends.to_host(exec);
-    for (std::uint32_t level = 1; level < sparse_voxel_octree_view::max_depth + 2; ++level)
-      view_.level_begin_[level] = host[detail::min(level - 1, view_.depth_)];
+    const std::uint32_t depth = view_.depth_;
+    std::vector<node_id> inner_ends(depth, 0);
+    if (leaves > 0 && depth > 0) {
+      const buffer<node_id, Exec> ends(exec, depth);
+      exec.for_each(depth, detail::gather_level_ends{through.view(), leaves, ends.data()});
+      inner_ends = ends.to_host(exec);
+    }
+    for (std::uint32_t level = 1; level <= depth; ++level) view_.level_begin_[level] = inner_ends[level - 1];
+    const std::uint64_t total = view_.level_begin_[depth] + std::uint64_t(leaves);
+    detail::require(total < invalid_node, "number of octree nodes", total, "less than 2^32 - 1");
+    for (std::uint32_t level = depth + 1; level < sparse_voxel_octree_view::max_depth + 2; ++level)
+      view_.level_begin_[level] = static_cast<node_id>(total);
   }
 
   void allocate(const Exec& exec) {

@@ -151,6 +151,12 @@ struct triangle_reader {
     return n_unit.x != 0.0f || n_unit.y != 0.0f || n_unit.z != 0.0f;
   }
 
+  /// The same of one that is known to be sound.
+  WFPG_HD grid_triangle checked(std::uint32_t i) const {
+    const uvec3 index = mesh.triangles[i];
+    return {mesh.positions[index.x], mesh.positions[index.y], mesh.positions[index.z]};
+  }
+
   WFPG_HD grid_triangle in_grid(const grid_triangle& t) const {
     return {grid.to_grid(t.a), grid.to_grid(t.b), grid.to_grid(t.c)};
   }
@@ -207,10 +213,7 @@ struct item_voxels {
   template <class F>
   WFPG_HD void for_each(std::uint64_t item, F f) const {
     const std::uint32_t triangle = triangles[item];
-    grid_triangle t{};
-    report_counter reason;
-    if (!reader.vertices(triangle, t, reason)) return;
-    const triangle_columns columns(reader.in_grid(t), reader.grid.resolution);
+    const triangle_columns columns(reader.in_grid(reader.checked(triangle)), reader.grid.resolution);
     const std::uint64_t first = (item - (triangle > 0 ? items_through[triangle - 1] : 0)) * columns_per_item;
     const std::uint64_t last = min(first + columns_per_item, columns.count());
     for (std::uint64_t c = first; c < last; ++c)
@@ -252,9 +255,7 @@ struct measure_fragments {
   array_view<fragment_surface> surfaces;
 
   WFPG_HD void operator()(std::size_t i) const {
-    grid_triangle t{};
-    report_counter reason;
-    reader.vertices(surfaces[i].normal, t, reason);
+    const grid_triangle t = reader.checked(surfaces[i].normal);
     const vec3 centre = vec3(morton_decode(codes[i])) + 0.5f;
     const float voxel = reader.grid.voxel_size();
     const float area = area_inside(reader.in_grid(t).relative_to(centre)) * voxel * voxel;

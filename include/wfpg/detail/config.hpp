@@ -1,6 +1,8 @@
-// What the compiler is, asked once for the whole library: annotations of functions that run on a device.
-// Includes nothing of the library.
+// What the compiler is, asked once for the whole library: annotations of functions that run on a device, and
+// an instruction that only some processors have. Includes nothing of the library.
 #pragma once
+
+#include <cstdint>
 
 #if defined(__CUDACC__)
 /// Marks a function that runs on the host and, where the compiler has one, on the device.
@@ -19,3 +21,19 @@
 #else
 #define WFPG_VECTORIZE
 #endif
+
+namespace wfpg::detail {
+
+/// Bits set among the lower 8. On a CPU without the processor's own instruction, for which portable builds
+/// call a function.
+WFPG_HD inline std::uint32_t popcount8(std::uint32_t bits) {
+#if defined(__CUDA_ARCH__)
+  return static_cast<std::uint32_t>(__popc(bits));
+#else
+  bits = bits - (bits >> 1 & 0x55u);
+  bits = (bits & 0x33u) + (bits >> 2 & 0x33u);
+  return (bits + (bits >> 4)) & 0x0fu;
+#endif
+}
+
+}  // namespace wfpg::detail

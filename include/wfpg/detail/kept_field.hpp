@@ -43,9 +43,10 @@ struct kept_field_builder {
   WFPG_HD std::uint32_t cone_count(bool whole) const {
     return whole ? kept.resolution * kept.resolution : refresh_cones(kept.resolution, kept.recast);
   }
-  WFPG_HD std::uint32_t cell(std::uint32_t slot, bool whole, std::uint32_t cone) const {
-    return whole ? cell_in_order(cone, kept.resolution)
-                 : refreshed_cell(cone, kept.slots[slot].builds, kept.resolution, kept.recast);
+  WFPG_HD field_cell cell(std::uint32_t slot, bool whole, std::uint32_t cone) const {
+    if (whole) return cell_in_order(cone, kept.resolution);
+    return cell_at(refreshed_cell(cone, kept.slots[slot].builds, kept.resolution, kept.recast),
+                   kept.resolution);
   }
 
   /// Cones start from the ray that was picked; a field's frame is that of the ray that it was first cast for.
@@ -101,9 +102,9 @@ struct build_kept_fields {
     cone_hit* const kept = builder.kept.hits + std::size_t(slot) * n;
     block.for_each(static_cast<int>(builder.cone_count(whole)), [&](int c) {
       const auto cone = static_cast<std::uint32_t>(c);
-      const std::uint32_t cell = builder.cell(slot, whole, cone);
+      const field_cell cell = builder.cell(slot, whole, cone);
       const ray r = cells.cone(cell);
-      kept[cell] = cells.find(builder.wave.cache, r, hits(i, cone, r));
+      kept[cell.index(cells.resolution)] = cells.find(builder.wave.cache, r, hits(i, cone, r));
     });
     block.sync();
     builder.finish(block, slot, cells);

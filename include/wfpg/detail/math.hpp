@@ -29,14 +29,6 @@ WFPG_HD inline bool is_finite(vec3 v) {
   return is_finite(v.x) && is_finite(v.y) && is_finite(v.z);
 }
 
-/// Bits set among the lower 8; without the processor's own instruction, which portable builds call a function
-/// for.
-WFPG_HD constexpr std::uint32_t popcount8(std::uint32_t bits) {
-  bits = bits - (bits >> 1 & 0x55u);
-  bits = (bits & 0x33u) + (bits >> 2 & 0x33u);
-  return (bits + (bits >> 4)) & 0x0fu;
-}
-
 /// How many bits a number has: the least b with x < 2^b.
 WFPG_HD constexpr int bits_of(std::uint32_t x) {
   int bits = 0;

@@ -38,18 +38,25 @@ WFPG_HD inline bool separates(vec3 axis, const grid_triangle& t, float half) {
   return min(a, min(b, c)) > radius || max(a, max(b, c)) < -radius;
 }
 
-/// Whether a triangle, relative to the centre, overlaps the cube of half side `half`: separating axes
-/// (Akenine-Möller 2001, "Fast 3D Triangle-Box Overlap Testing").
-WFPG_HD inline bool overlaps_cube(const grid_triangle& t, float half) {
-  const vec3 edges[3] = {t.b - t.a, t.c - t.b, t.a - t.c};
-  if (separates({1, 0, 0}, t, half) || separates({0, 1, 0}, t, half) || separates({0, 0, 1}, t, half))
-    return false;
-  if (separates(accurate_cross(edges[0], edges[1]), t, half)) return false;
-  for (const vec3& e : edges)
-    if (separates({0, -e.z, e.y}, t, half) || separates({e.z, 0, -e.x}, t, half) ||
-        separates({-e.y, e.x, 0}, t, half))
-      return false;
-  return true;
+/// The same of an axis that is normal to an edge: one end of it, and the third corner.
+WFPG_HD inline bool separates(vec3 axis, vec3 end, vec3 corner, float half) {
+  const float a = glm::dot(axis, end), b = glm::dot(axis, corner);
+  const float radius = half * (fabsf(axis.x) + fabsf(axis.y) + fabsf(axis.z));
+  return min(a, b) > radius || max(a, b) < -radius;
+}
+
+/// Whether an edge from `end`, crossed with one of the cube's, keeps the triangle apart from the cube.
+WFPG_HD inline bool edge_separates(vec3 edge, vec3 end, vec3 corner, float half) {
+  return separates({0.0f, -edge.z, edge.y}, end, corner, half) ||
+         separates({edge.z, 0.0f, -edge.x}, end, corner, half) ||
+         separates({-edge.y, edge.x, 0.0f}, end, corner, half);
+}
+
+/// Whether a triangle, relative to the centre, overlaps the cube of half side `half`, where their boxes do:
+/// separating axes (Akenine-Möller 2001, "Fast 3D Triangle-Box Overlap Testing"). `normal`: of any length.
+WFPG_HD inline bool overlaps_cube(const grid_triangle& t, vec3 normal, float half) {
+  return !separates(normal, t, half) && !edge_separates(t.b - t.a, t.a, t.c, half) &&
+         !edge_separates(t.c - t.b, t.b, t.a, half) && !edge_separates(t.a - t.c, t.c, t.b, half);
 }
 
 /// The mean of clamp(v, -1/2, 1/2) where v goes evenly from a to b.
@@ -149,7 +156,8 @@ WFPG_HD inline vec3 unit_normal(vec3 a, vec3 b, vec3 c) {
 /// column the voxels that its plane can reach.
 class triangle_columns {
  public:
-  WFPG_HD triangle_columns(const grid_triangle& t, std::uint32_t resolution) : triangle_(t) {
+  WFPG_HD triangle_columns(const grid_triangle& t, std::uint32_t resolution)
+      : triangle_(t), normal_(accurate_cross(t.b - t.a, t.c - t.b)) {
     const vec3 n = glm::cross(t.b - t.a, t.c - t.a);
     w_ = fabsf(n.x) > fabsf(n.y) ? (fabsf(n.x) > fabsf(n.z) ? 0 : 2) : (fabsf(n.y) > fabsf(n.z) ? 1 : 2);
     u_ = (w_ + 1) % 3;
@@ -184,7 +192,7 @@ class triangle_columns {
     for (voxel[w_] = first; voxel[w_] <= last; ++voxel[w_]) {
       const uvec3 coordinates(voxel[0], voxel[1], voxel[2]);
       const grid_triangle local = triangle_.relative_to(vec3(coordinates) + 0.5f);
-      if (overlaps_cube(local, 0.5f + touch_tolerance)) f(coordinates);
+      if (overlaps_cube(local, normal_, 0.5f + touch_tolerance)) f(coordinates);
     }
   }
 
@@ -203,6 +211,7 @@ class triangle_columns {
   }
 
   grid_triangle triangle_;
+  vec3 normal_;
   int u_, v_, w_;
   int lower_[3], upper_[3];
   vec2 slope_{0.0f};
