@@ -16,17 +16,23 @@ using wfpg::ray_hit;
 using wfpg::sparse_voxel_octree_view;
 using wfpg::svo_ray_caster;
 
-namespace {
+namespace not_casters {
 
 struct answers_nothing {
-  [[maybe_unused]] void operator()(const ray&) const {}
+  void operator()(const ray&) const {}
 };
 struct not_const {
-  [[maybe_unused]] ray_hit operator()(const ray&) { return {}; }
+  ray_hit operator()(const ray&) { return {}; }
 };
 struct takes_wrong_views {
-  [[maybe_unused]] void cast(const one_policy&, wfpg::array_view<const ray>, std::vector<ray_hit>&) const {}
+  void cast(const one_policy&, wfpg::array_view<const ray>, std::vector<ray_hit>&) const {}
 };
+
+}  // namespace not_casters
+
+namespace {
+
+using namespace not_casters;
 
 static_assert(wfpg::is_inline_caster_v<svo_ray_caster>);
 static_assert(wfpg::is_inline_caster_v<box_caster>);

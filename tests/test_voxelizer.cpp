@@ -323,6 +323,13 @@ fragments from_samples(const Exec& exec, const std::vector<surface_fragment>& sa
   return fragments(exec, wfpg::fragments_from_samples(exec, const_view(device), resolution, bounds));
 }
 
+/// The same direction, packed by a policy and by the host: to the bit, or to the next step of the packing
+/// where a GPU rounds otherwise.
+bool same_packed(std::uint32_t a, std::uint32_t b) {
+  if (loops_on_host) return a == b;
+  return glm::distance(wfpg::unpack_direction(a), wfpg::unpack_direction(b)) < 2.0e-4f;
+}
+
 WFPG_TEST_CASE("samples become fragments of the voxels that hold them", "[voxelizer]") {
   const Exec exec;
   random_numbers random(51);
@@ -342,7 +349,8 @@ WFPG_TEST_CASE("samples become fragments of the voxels that hold them", "[voxeli
       if (glm::any(glm::lessThan(g, dvec3(0))) || glm::any(glm::greaterThanEqual(g, dvec3(16)))) continue;
       const bool on_face = glm::any(glm::lessThan(nearest_face, dvec3(1.0e-5)));
       wrong += used >= f.codes.size() || (!on_face && f.codes[used] != wfpg::morton_encode(uvec3(g))) ||
-               f.areas[used] != s.area || f.normals[used] != wfpg::pack_direction(glm::normalize(s.normal));
+               f.areas[used] != s.area ||
+               !same_packed(f.normals[used], wfpg::pack_direction(glm::normalize(s.normal)));
       ++used;
     }
     CHECK(wrong == 0);
