@@ -44,12 +44,57 @@ struct start_paths {
   }
 };
 
+/// What kernels ask an inline caster.
+template <class Caster>
+struct inline_answers {
+  Caster caster;
+
+  WFPG_HD triangle_hit hit(std::size_t, const wfpg::ray& ray) const { return caster.intersect(ray); }
+  WFPG_HD bool is_hidden(std::size_t, const wfpg::ray& ray) const { return caster.occluded(ray); }
+  WFPG_HD void asks_nothing(std::size_t) const {}
+};
+
+/// The same of a batch caster, which the kernel before has left its rays.
+struct batch_hits {
+  wfpg::array_view<const triangle_hit> hits;
+
+  WFPG_HD triangle_hit hit(std::size_t i, const wfpg::ray&) const { return hits[i]; }
+};
+
+/// Leaves a batch caster the rays of which drop_hidden will have the answers.
+struct batch_questions {
+  wfpg::array_view<wfpg::ray> rays;
+
+  WFPG_HD bool is_hidden(std::size_t i, const wfpg::ray& ray) const {
+    rays[i] = ray;
+    return false;
+  }
+  WFPG_HD void asks_nothing(std::size_t i) const { rays[i] = no_ray(); }
+
+  /// One that no batch caster traces.
+  WFPG_HD static wfpg::ray no_ray() {
+    wfpg::ray ray;
+    ray.t_max = 0.0f;
+    return ray;
+  }
+};
+
+/// Leaves a batch caster the rays of the paths.
+struct write_rays {
+  wfpg::array_view<const path_state> paths;
+  wfpg::array_view<wfpg::ray> rays;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    rays[i] = paths[i].active ? paths[i].ray : batch_questions::no_ray();
+  }
+};
+
 /// Finds the next vertex of each path, gathers what it emits, and names the queue that the path goes to.
-template <class Caster, class Recorder>
+template <class Answers, class Recorder>
 struct trace_paths {
   wave_position at;
   path_lights world;
-  Caster caster;
+  Answers answers;
   Recorder recorder;
   wfpg::array_view<path_state> paths;
   wfpg::array_view<path_vertex> vertices;
@@ -63,7 +108,7 @@ struct trace_paths {
     path_state& path = paths[i];
     if (!path.active) return;
     ++segments[i];
-    const triangle_hit hit = caster.intersect(path.ray);
+    const triangle_hit hit = answers.hit(i, path.ray);
     if (!hit.is_hit()) {
       path.active = false;
       gather(i, path.throughput * world.scene.environment);
@@ -100,21 +145,22 @@ struct trace_paths {
 
 /// Next-event estimation up to its weight: draws a point of a light for each slot and looks whether it is
 /// seen.
-template <class Caster>
+template <class Answers>
 struct query_lights {
   wave_position at;
   path_lights world;
-  Caster caster;
+  Answers answers;
   path_queue queue;
   wfpg::array_view<const path_vertex> vertices;
   wfpg::array_view<light_query> queries;
 
   WFPG_HD void operator()(std::size_t slot) const {
-    queries[slot] = queue.holds(slot) ? query(queue[slot]) : light_query{};
+    answers.asks_nothing(slot);
+    queries[slot] = queue.holds(slot) ? query(slot, queue[slot]) : light_query{};
   }
 
  private:
-  WFPG_HD light_query query(std::uint32_t path) const {
+  WFPG_HD light_query query(std::size_t slot, std::uint32_t path) const {
     const path_vertex& vertex = vertices[path];
     const wfpg::surface<bsdf>& surface = vertex.surface;
     if (surface.bsdf.is_delta()) return {};
@@ -128,11 +174,12 @@ struct query_lights {
     result.pdf = solid_angle_pdf(light.pdf, distance, -glm::dot(light.normal, result.direction));
     if (!(result.pdf > 0.0f)) return {};
     result.value = surface.bsdf.eval_rgb(surface.outgoing, result.direction) * light.radiance / result.pdf;
-    if (!(wfpg::luminance(result.value) > 0.0f) || is_hidden(vertex, light, result.direction)) return {};
-    return result;
+    if (!(wfpg::luminance(result.value) > 0.0f)) return {};
+    return is_hidden(slot, vertex, light, result.direction) ? light_query{} : result;
   }
 
-  WFPG_HD bool is_hidden(const path_vertex& vertex, const light_sample& light, vec3 direction) const {
+  WFPG_HD bool is_hidden(std::size_t slot, const path_vertex& vertex, const light_sample& light,
+                         vec3 direction) const {
     const vec3 end = leave_surface(light.position, light.normal, -direction, light.offset);
     wfpg::ray ray;
     ray.origin =
@@ -140,7 +187,17 @@ struct query_lights {
     ray.t_max = glm::length(end - ray.origin);
     if (!(ray.t_max > 0.0f)) return false;
     ray.direction = (end - ray.origin) / ray.t_max;
-    return caster.occluded(ray);
+    return answers.is_hidden(slot, ray);
+  }
+};
+
+/// Forgets the light samples that a batch caster found hidden.
+struct drop_hidden {
+  wfpg::array_view<const std::uint32_t> hidden;
+  wfpg::array_view<light_query> queries;
+
+  WFPG_HD void operator()(std::size_t slot) const {
+    if (hidden[slot] != 0) queries[slot] = {};
   }
 };
 
