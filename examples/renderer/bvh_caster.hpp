@@ -9,6 +9,7 @@
 
 #include "device_scene.hpp"
 #include "frame.hpp"
+#include "warp_hints.hpp"
 
 #include <wfpg/detail/math.hpp>
 
@@ -19,7 +20,9 @@ namespace render {
 /// What a child of a node is: another node, or up to seven triangles in a row.
 class bvh_child {
  public:
-  bvh_child() = default;  ///< no triangles
+  bvh_child() = default;
+  WFPG_HD explicit bvh_child(std::uint32_t word) : word_(word) {}
+  WFPG_HD static bvh_child none() { return bvh_child(leaf_bit); }
   WFPG_HD static bvh_child node(std::uint32_t index) { return bvh_child(index); }
   WFPG_HD static bvh_child leaf(std::uint32_t first, std::uint32_t count) {
     return bvh_child(leaf_bit | count << count_shift | first);
@@ -28,6 +31,7 @@ class bvh_child {
   static constexpr std::uint32_t most_triangles = 1u << 28;
 
   WFPG_HD bool is_leaf() const { return (word_ & leaf_bit) != 0; }
+  WFPG_HD std::uint32_t word() const { return word_; }
   WFPG_HD std::uint32_t index() const { return word_; }
   WFPG_HD std::uint32_t first() const { return word_ & (most_triangles - 1); }
   WFPG_HD std::uint32_t count() const { return word_ >> count_shift & largest_leaf; }
@@ -35,9 +39,8 @@ class bvh_child {
  private:
   static constexpr std::uint32_t leaf_bit = 1u << 31;
   static constexpr std::uint32_t count_shift = 28;
-  WFPG_HD explicit bvh_child(std::uint32_t word) : word_(word) {}
 
-  std::uint32_t word_ = leaf_bit;
+  std::uint32_t word_;
 };
 
 /// Four children and their boxes: 0 to 255 steps from an origin, a byte for each child. Children that are
@@ -49,7 +52,7 @@ struct alignas(16) bvh_node {
   vec3 step{0.0f};
   std::uint32_t lower[3] = {~0u, ~0u, ~0u};
   std::uint32_t upper[3] = {0, 0, 0};
-  bvh_child children[width];
+  bvh_child children[width] = {bvh_child::none(), bvh_child::none(), bvh_child::none(), bvh_child::none()};
 };
 
 /// A triangle of the hierarchy.
@@ -71,15 +74,6 @@ WFPG_HD inline float difference_of_products(float a, float b, float c, float d) 
   return std::fma(a, b, -cd) - error;
 }
 
-/// 1 + q / 2^15 of byte number `i` of a word: a float that is put together without a conversion.
-WFPG_HD inline float byte_float(std::uint32_t word, int i) {
-#if defined(__CUDA_ARCH__)
-  return __uint_as_float(__byte_perm(word, 0x3f800000u, 0x7604u | static_cast<unsigned>(i) << 4));
-#else
-  return wfpg::detail::bits_float((word >> (8 * i) & 0xffu) << 8 | 0x3f800000u);
-#endif
-}
-
 /// A ray as it meets boxes and triangles.
 struct bvh_ray {
   vec3 origin;
@@ -88,9 +82,14 @@ struct bvh_ray {
   float t_max;  ///< of the nearest hit so far
   vec3 inverse;
   vec3 tangent, bitangent;
+  std::uint32_t one;  ///< byte_float_base
 
-  WFPG_HD explicit bvh_ray(const wfpg::ray& ray)
-      : origin(ray.origin), t_min(glm::max(ray.t_min, 0.0f)), direction(ray.direction), t_max(ray.t_max) {
+  WFPG_HD bvh_ray(const wfpg::ray& ray, std::uint32_t one)
+      : origin(ray.origin),
+        t_min(glm::max(ray.t_min, 0.0f)),
+        direction(ray.direction),
+        t_max(ray.t_max),
+        one(one) {
     inverse = {inverse_of(direction.x), inverse_of(direction.y), inverse_of(direction.z)};
     const frame axes(direction);
     tangent = axes.tangent;
@@ -106,9 +105,11 @@ struct bvh_ray {
 /// where q' is byte_float().
 struct bvh_slabs {
   float slope, near, far;
+  std::uint32_t one;
   std::uint32_t first, last;  ///< bytes of the faces that the ray meets first, and last
 
   WFPG_HD bvh_slabs(const bvh_node& node, const bvh_ray& ray, int axis) {
+    one = ray.one;
     const float inverse = ray.inverse[axis];
     const float distance = (node.origin[axis] - ray.origin[axis]) * inverse;
     slope = node.step[axis] * inverse * 0x1p15f;
@@ -120,8 +121,8 @@ struct bvh_slabs {
     first = ascending ? node.lower[axis] : node.upper[axis];
     last = ascending ? node.upper[axis] : node.lower[axis];
   }
-  WFPG_HD float entry(int child) const { return byte_float(first, child) * slope + near; }
-  WFPG_HD float exit(int child) const { return byte_float(last, child) * slope + far; }
+  WFPG_HD float entry(int child) const { return byte_float(first, child, one) * slope + near; }
+  WFPG_HD float exit(int child) const { return byte_float(last, child, one) * slope + far; }
 };
 
 /// The children of a node that a ray meets, nearest first: their entries' distances as bits of floats, of
@@ -133,8 +134,8 @@ struct bvh_entries {
   WFPG_HD bvh_entries(const bvh_node& node, const bvh_ray& ray) {
     const bvh_slabs x(node, ray, 0), y(node, ray, 1), z(node, ray, 2);
     for (int i = 0; i < bvh_node::width; ++i) {
-      const float entry = fmaxf(fmaxf(x.entry(i), y.entry(i)), fmaxf(z.entry(i), ray.t_min));
-      const float exit = fminf(fminf(x.exit(i), y.exit(i)), fminf(z.exit(i), ray.t_max));
+      const float entry = largest_of(x.entry(i), y.entry(i), z.entry(i), ray.t_min);
+      const float exit = smallest_of(x.exit(i), y.exit(i), z.exit(i), ray.t_max);
       const std::uint32_t bits = wfpg::detail::float_bits(entry);
       keys[i] = entry <= exit ? (bits & ~3u) | static_cast<std::uint32_t>(i) : none;
     }
@@ -180,31 +181,39 @@ class bvh_caster {
     float distance = 0.0f;
   };
 
-  /// A child on the stack, and where the ray enters it.
+  /// A child on the stack, and the distance's bits where the ray enters it.
   struct waiting {
-    bvh_child child;
-    std::uint32_t entry;
+    std::uint32_t child, entry;
   };
+
+  /// With fewer lanes on their way to a leaf, those that are there do not wait for them.
+  static constexpr int least_company = 20;
 
   /// The nearest hit, or any.
   template <bool Any>
   WFPG_HD hit cast(const wfpg::ray& asked) const {
     hit found;
-    if (!nodes_) return found;
-    detail::bvh_ray ray(asked);
-    waiting stack[stack_size];
+    // A ray that is none would meet every box.
+    if (!nodes_ || !wfpg::detail::is_finite(asked.origin) || !wfpg::detail::is_finite(asked.direction))
+      return found;
+    detail::bvh_ray ray(asked, one_);
+    waiting stack[stack_size + bvh_node::width];
     std::uint32_t depth = 0;
     bvh_child at = bvh_child::node(0);
     for (;;) {
-      while (!at.is_leaf()) at = descend(at, ray, stack, depth);
+      if (!at.is_leaf()) {
+        do at = descend(at, ray, stack, depth);
+        while (!at.is_leaf() && detail::lanes_here() >= least_company);
+        if (!at.is_leaf()) continue;
+      }
       const std::uint32_t end = at.first() + at.count();
       for (std::uint32_t i = at.first(); i < end; ++i)
-        if (meet(triangles_[i], ray, found) && Any) return found;
+        if (meet(bvh_triangle(triangles_[i]), ray, found) && Any) return found;
       do {
         if (depth == 0) return found;
         --depth;
       } while (wfpg::detail::bits_float(stack[depth].entry) > ray.t_max);
-      at = stack[depth].child;
+      at = bvh_child(stack[depth].child);
     }
   }
 
@@ -215,9 +224,10 @@ class bvh_caster {
     const detail::bvh_entries entries(node, ray);
     for (int i = bvh_node::width - 1; i > 0; --i) {
       const std::uint32_t key = entries.keys[i];
-      if (key != detail::bvh_entries::none) stack[depth++] = {child_of(node, key), key & ~3u};
+      stack[depth] = {child_of(node, key).word(), key & ~3u};  // overwritten where it is none
+      depth += key != detail::bvh_entries::none ? 1 : 0;
     }
-    return entries.keys[0] != detail::bvh_entries::none ? child_of(node, entries.keys[0]) : bvh_child();
+    return entries.keys[0] != detail::bvh_entries::none ? child_of(node, entries.keys[0]) : bvh_child::none();
   }
 
   // An index into registers would put them into memory.
@@ -254,6 +264,7 @@ class bvh_caster {
   const bvh_node* nodes_ = nullptr;
   const bvh_triangle* triangles_ = nullptr;
   float environment_ = 0.0f;
+  std::uint32_t one_ = detail::byte_float_base;  // where compilers do not know it
 };
 
 }  // namespace render

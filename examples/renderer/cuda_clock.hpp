@@ -1,4 +1,4 @@
-// Stages of work on the CUDA policy, timed by events between them: nothing waits for a stage to end.
+// The clock of the renderer's stages on the CUDA policy. Include it before render_impl.hpp.
 #pragma once
 
 #include "stage_clock.hpp"
@@ -10,6 +10,7 @@
 
 namespace render {
 
+/// Times stages by events between them: nothing waits for a stage to end.
 template <>
 class policy_clock<wfpg::exec::cuda> {
  public:

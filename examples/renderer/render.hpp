@@ -72,6 +72,7 @@ struct octree_report {
 struct render_report {
   std::string scene, method, device;
   int spp = 0;                 ///< rendered
+  std::uint64_t segments = 0;  ///< rays that paths were extended by
   double total_seconds = 0.0;  ///< from building to the last sample
   named_seconds seconds;       ///< by stage; "guide ..." are parts of "directions" and of "update"
   std::vector<std::pair<std::string, std::size_t>> memory;  ///< the guider's bytes, by part

@@ -122,6 +122,7 @@ render_result render_on(const Exec& exec, const scene& scene, const render_optio
     take_samples(tracer, guider, camera, options, progress, result);
     report_guider(guider, tracer.segments(), report);
   }
+  report.segments = tracer.segments();
   result.picture = {options.width, options.height, tracer.picture()};
   report.seconds.insert(report.seconds.begin(), tracer.seconds().begin(), tracer.seconds().end());
   report.seconds.insert(report.seconds.begin(), building.seconds().begin(), building.seconds().end());

@@ -177,9 +177,9 @@ class path_tracer {
   path_lights world_;
   Caster caster_;
   std::size_t count_;
-  wfpg::buffer<path_state, Exec> paths_;
-  wfpg::buffer<path_vertex, Exec> vertices_;
-  wfpg::buffer<light_query, Exec> queries_;
+  tiled_array<path_state, Exec> paths_;
+  tiled_array<path_vertex, Exec> vertices_;
+  tiled_array<light_query, Exec> queries_;
   wfpg::buffer<float, Exec> densities_;
   wfpg::buffer<wfpg::sampled_direction, Exec> directions_;
   wfpg::buffer<std::uint32_t, Exec> keys_, segments_;
