@@ -187,7 +187,7 @@ class bvh_caster {
   };
 
   /// With fewer lanes on their way to a leaf, those that are there do not wait for them.
-  static constexpr int least_company = 20;
+  static constexpr int least_company = 24;
 
   /// The nearest hit, or any.
   template <bool Any>
@@ -197,7 +197,7 @@ class bvh_caster {
     if (!nodes_ || !wfpg::detail::is_finite(asked.origin) || !wfpg::detail::is_finite(asked.direction))
       return found;
     detail::bvh_ray ray(asked, one_);
-    waiting stack[stack_size + bvh_node::width];
+    waiting stack[stack_size];
     std::uint32_t depth = 0;
     bvh_child at = bvh_child::node(0);
     for (;;) {
@@ -224,8 +224,7 @@ class bvh_caster {
     const detail::bvh_entries entries(node, ray);
     for (int i = bvh_node::width - 1; i > 0; --i) {
       const std::uint32_t key = entries.keys[i];
-      stack[depth] = {child_of(node, key).word(), key & ~3u};  // overwritten where it is none
-      depth += key != detail::bvh_entries::none ? 1 : 0;
+      if (key != detail::bvh_entries::none) stack[depth++] = {child_of(node, key).word(), key & ~3u};
     }
     return entries.keys[0] != detail::bvh_entries::none ? child_of(node, entries.keys[0]) : bvh_child::none();
   }
@@ -258,7 +257,11 @@ class bvh_caster {
   }
 
   WFPG_HD static vec2 projected(vec3 p, const detail::bvh_ray& ray) {
-    return {glm::dot(p, ray.tangent), glm::dot(p, ray.bitangent)};
+    return {along(p, ray.tangent), along(p, ray.bitangent)};
+  }
+  // Written out, so that a corner is the same point in each of its triangles, however compilers round.
+  WFPG_HD static float along(vec3 p, vec3 axis) {
+    return std::fma(p.x, axis.x, std::fma(p.y, axis.y, p.z * axis.z));
   }
 
   const bvh_node* nodes_ = nullptr;
