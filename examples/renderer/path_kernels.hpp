@@ -80,22 +80,27 @@ struct batch_questions {
 
 /// Leaves a batch caster the rays of the paths.
 struct write_rays {
+  path_queue queue;
   tiled_view<path_state> paths;
   wfpg::array_view<wfpg::ray> rays;
 
-  WFPG_HD void operator()(std::size_t i) const {
-    const path_state& path = paths[i];
-    rays[i] = path.active ? path.ray() : batch_questions::no_ray();
+  WFPG_HD void operator()(std::size_t slot) const {
+    rays[slot] = batch_questions::no_ray();
+    if (!queue.holds(slot)) return;
+    const path_state& path = paths[queue[slot]];
+    if (path.active) rays[slot] = path.ray();
   }
 };
 
-/// Finds the next vertex of each path, gathers what it emits, and names the queue that the path goes to.
+/// Finds the next vertex of each path that may still go on, gathers what it emits, and names the queue that
+/// the path goes to.
 template <class Answers, class Recorder>
 struct trace_paths {
   wave_position at;
   path_lights world;
   Answers answers;
   Recorder recorder;
+  path_queue queue;  ///< of the vertex before
   tiled_view<path_state> paths;
   tiled_view<path_vertex> vertices;
   wfpg::array_view<std::uint32_t> keys;  ///< the material's kind, or excluded
@@ -103,35 +108,36 @@ struct trace_paths {
   wfpg::array_view<std::uint32_t> segments;
   std::uint32_t excluded;
 
-  WFPG_HD void operator()(std::size_t i) const {
-    keys[i] = excluded;
-    const path_state& path = paths[i];
+  WFPG_HD void operator()(std::size_t slot) const {
+    if (!queue.holds(slot)) return;
+    const std::uint32_t id = queue[slot];
+    keys[id] = excluded;
+    const path_state& path = paths[id];
     if (!path.active) return;
-    ++segments[i];
-    const triangle_hit hit = answers.hit(i, path.ray());
+    ++segments[id];
+    const triangle_hit hit = answers.hit(slot, path.ray());
     if (!hit.is_hit()) {
-      gather(i, path.throughput * world.scene.environment);
-      return end(i);
+      gather(id, path.throughput * world.scene.environment);
+      return end(id);
     }
     const hit_surface found = world.scene.surface(hit, -path.direction);
     const wfpg::surface<bsdf>& surface = found.surface;
-    const auto id = static_cast<std::uint32_t>(i);
     recorder.vertex(id, at.depth, surface.position, surface.outgoing, path.throughput);
-    gather(i, path.throughput * found.emission * emission_weight(path, found));
-    if (at.is_last()) return end(i);
-    vertices.emplace(i, found);
-    keys[i] = static_cast<std::uint32_t>(surface.bsdf.kind);
+    gather(id, path.throughput * found.emission * emission_weight(path, found));
+    if (at.is_last()) return end(id);
+    vertices.emplace(id, found);
+    keys[id] = static_cast<std::uint32_t>(surface.bsdf.kind);
   }
 
  private:
-  WFPG_HD void end(std::size_t i) const {
-    paths.update(i, [](path_state& path) { path.active = 0; });
+  WFPG_HD void end(std::uint32_t id) const {
+    paths.update(id, [](path_state& path) { path.active = 0; });
   }
 
-  WFPG_HD void gather(std::size_t i, vec3 contribution) const {
+  WFPG_HD void gather(std::uint32_t id, vec3 contribution) const {
     if (contribution == vec3(0.0f)) return;
-    radiance[i] += contribution;
-    recorder.emission(static_cast<std::uint32_t>(i), at.depth, contribution);
+    radiance[id] += contribution;
+    recorder.emission(id, at.depth, contribution);
   }
 
   // Against next-event estimation at the vertex before, which could have found the same point.

@@ -81,9 +81,12 @@ struct light_query {
 /// The paths that go on, in the order of their materials: slot -> path.
 struct path_queue {
   wfpg::partition_view by_material;
+  bool all = false;  ///< every path in its own slot
 
-  WFPG_HD bool holds(std::size_t slot) const { return slot < by_material.offsets[*by_material.count]; }
-  WFPG_HD std::uint32_t operator[](std::size_t slot) const { return by_material.permutation[slot]; }
+  WFPG_HD bool holds(std::size_t slot) const { return all || slot < by_material.offsets[*by_material.count]; }
+  WFPG_HD std::uint32_t operator[](std::size_t slot) const {
+    return all ? static_cast<std::uint32_t>(slot) : by_material.permutation[slot];
+  }
 };
 
 /// The surfaces functor of a wave whose rays are the slots of a queue.

@@ -66,10 +66,10 @@ class path_tracer {
       exec_.for_each(count_, start_paths{camera, at.random, paths_.view(), radiance_.view()});
     });
     clock_.measure("update", [&] { guider.begin_sample(); });
-    for (; at.depth < at.max_depth; ++at.depth) {
-      trace(guider, at);
+    for (path_queue queue{{}, true}; at.depth < at.max_depth; ++at.depth) {
+      trace(guider, at, queue);
       if (at.is_last()) break;
-      const path_queue queue = sort_by_material();
+      queue = sort_by_material();
       if (world_.next_event) query(at, queue);
       sample_directions(guider, at, queue);
       shade(guider, at, queue);
@@ -104,24 +104,25 @@ class path_tracer {
   static constexpr bool is_inline = wfpg::is_inline_caster_v<Caster>;
 
   template <class Guider>
-  void trace(Guider& guider, const wave_position& at) {
+  void trace(Guider& guider, const wave_position& at, const path_queue& queue) {
     clock_.measure("trace", [&] {
       if constexpr (is_inline) {
-        trace_with(guider, at, inline_answers<Caster>{caster_});
+        trace_with(guider, at, queue, inline_answers<Caster>{caster_});
       } else {
-        exec_.for_each(count_, write_rays{paths_.view(), rays_.view()});
+        exec_.for_each(count_, write_rays{queue, paths_.view(), rays_.view()});
         caster_.intersect(exec_, wfpg::array_view<const wfpg::ray>(rays_.view()), hits_.view());
-        trace_with(guider, at, batch_hits{hits_.view()});
+        trace_with(guider, at, queue, batch_hits{hits_.view()});
       }
     });
   }
 
   template <class Guider, class Answers>
-  void trace_with(Guider& guider, const wave_position& at, const Answers& answers) {
+  void trace_with(Guider& guider, const wave_position& at, const path_queue& queue, const Answers& answers) {
     auto recorder = guider.recorder();
-    exec_.for_each(count_, trace_paths<Answers, decltype(recorder)>{
-                               at, world_, answers, recorder, paths_.view(), vertices_.view(), keys_.view(),
-                               radiance_.view(), segments_.view(), wfpg::partitioner<Exec>::excluded});
+    exec_.for_each(count_,
+                   trace_paths<Answers, decltype(recorder)>{
+                       at, world_, answers, recorder, queue, paths_.view(), vertices_.view(), keys_.view(),
+                       radiance_.view(), segments_.view(), wfpg::partitioner<Exec>::excluded});
   }
 
   path_queue sort_by_material() {
