@@ -10,6 +10,7 @@
 #include <wfpg/exec/omp.hpp>
 #include <wfpg/exec/seq.hpp>
 #include <wfpg/exec/tbb.hpp>
+#include <wfpg/path_guider.hpp>
 
 #include <tbb/global_control.h>
 
@@ -32,15 +33,51 @@ struct setup {
   std::uint32_t samples = 16;
 };
 
-template <class Exec>
-std::vector<vec3> trace(const scene& scene, const setup& with) {
+/// Embree as casters come that work on batches between kernels.
+class batch_caster {
+ public:
+  batch_caster(const embree_caster& inner) : inner_(inner) {}
+
+  template <class Exec>
+  void intersect(const Exec& exec, wfpg::array_view<const wfpg::ray> rays,
+                 wfpg::array_view<triangle_hit> hits) const {
+    answer(exec, rays, hits, triangle_hit{},
+           [](const embree_caster& c, const wfpg::ray& r) { return c.intersect(r); });
+  }
+  template <class Exec>
+  void occluded(const Exec& exec, wfpg::array_view<const wfpg::ray> rays,
+                wfpg::array_view<std::uint32_t> hidden) const {
+    answer(exec, rays, hidden, 0u,
+           [](const embree_caster& c, const wfpg::ray& r) { return c.occluded(r) ? 1u : 0u; });
+  }
+  template <class Exec>
+  void cast(const Exec& exec, wfpg::array_view<const wfpg::ray> rays,
+            wfpg::array_view<wfpg::ray_hit> hits) const {
+    answer(exec, rays, hits, wfpg::ray_hit{},
+           [](const embree_caster& c, const wfpg::ray& r) { return c(r); });
+  }
+
+ private:
+  template <class Exec, class T, class F>
+  void answer(const Exec& exec, wfpg::array_view<const wfpg::ray> rays, wfpg::array_view<T> answers,
+              const T& miss, const F& ask) const {
+    exec.for_each(rays.size(), [=, inner = inner_](std::size_t i) {
+      answers[i] = rays[i].t_max > rays[i].t_min ? ask(inner, rays[i]) : miss;
+    });
+  }
+
+  embree_caster inner_;
+};
+static_assert(!wfpg::is_inline_caster_v<batch_caster>);
+
+template <class Exec, class Caster = embree_caster, class Guider = unguided<Exec>>
+std::vector<vec3> trace(const scene& scene, const setup& with, Guider guider = Guider(Exec())) {
   const Exec exec;
   const device_scene<Exec> geometry(exec, scene);
   const light_distribution<Exec> lights(exec, scene);
   const embree_scene accelerated(scene);
-  path_tracer<Exec, embree_caster> tracer(exec, {with.side, with.side, with.max_depth, with.seed},
-                                          {geometry.view(), lights.view(), with.nee}, accelerated.caster());
-  unguided<Exec> guider(exec);
+  path_tracer<Exec, Caster> tracer(exec, {with.side, with.side, with.max_depth, with.seed},
+                                   {geometry.view(), lights.view(), with.nee}, accelerated.caster());
   const pinhole camera(scene.view, with.side, with.side);
   for (std::uint32_t i = 0; i < with.samples; ++i) tracer.render_sample(guider, camera, i, 1.0f);
   return tracer.picture();
@@ -131,6 +168,33 @@ TEST_CASE("next-event estimation changes the noise, not the mean", "[renderer]")
     INFO(on.mean() << " with, " << off.mean() << " without");
     CHECK(std::abs(on.mean() - off.mean()) < 4.0 * std::sqrt(on.variance_of_mean() + off.variance_of_mean()));
     CHECK(on.mean() > 0.0);
+  }
+}
+
+TEST_CASE("a batch caster gives the pictures of an inline one", "[renderer]") {
+  using exec_policy = wfpg::exec::tbb;
+  using guider = wfpg::path_guider<exec_policy>;
+  const scene scene = make_builtin_scene("cornell-enclosed");
+  const device_scene<exec_policy> geometry(exec_policy(), scene);
+  for (const bool nee : {false, true}) {
+    const setup with{32, 6, nee, 5, 6};
+    CHECK(same_bits(trace<exec_policy>(scene, with), trace<exec_policy, batch_caster>(scene, with)));
+    for (const wfpg::field_lifetime lifetime :
+         {wfpg::field_lifetime::kept, wfpg::field_lifetime::transient}) {
+      wfpg::guider_options options;
+      options.octree_resolution = 32;
+      options.fields = lifetime;
+      options.field_resolution = options.kept.resolution = 16;
+      options.include_emission = !nee;
+      options.max_paths = 32 * 32;
+      options.max_depth = 6;
+      const auto guided = [&] {
+        const wfpg::triangle_mesh_view mesh{geometry.view().positions, geometry.view().triangles};
+        return guider(exec_policy(), mesh, options);
+      };
+      CHECK(same_bits(trace<exec_policy, embree_caster>(scene, with, guided()),
+                      trace<exec_policy, batch_caster>(scene, with, guided())));
+    }
   }
 }
 

@@ -70,8 +70,12 @@ class embree_caster {
 /// Owns Embree's device and acceleration structure.
 class embree_scene {
  public:
+  static constexpr const char* name = "embree";
+
   /// Builds with all the machine's threads. Throws std::runtime_error where Embree fails.
   explicit embree_scene(const scene& host);
+  template <class Exec>
+  embree_scene(const Exec&, const scene& host, const scene_view&) : embree_scene(host) {}
 
   embree_caster caster() const { return {scene_.get(), environment_}; }
 

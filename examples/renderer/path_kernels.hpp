@@ -33,66 +33,119 @@ struct path_lights {
 struct start_paths {
   pinhole camera;
   random_stream random;
-  wfpg::array_view<path_state> paths;
+  tiled_view<path_state> paths;
   wfpg::array_view<vec3> radiance;
 
   WFPG_HD void operator()(std::size_t i) const {
-    const auto path = static_cast<std::uint32_t>(i);
-    paths[i] = {};
-    paths[i].ray = camera.through(path, random(path, dimension::pixel));
+    const auto pixel = static_cast<std::uint32_t>(i);
+    paths.emplace(i, camera.through(pixel, random(pixel, dimension::pixel)));
     radiance[i] = vec3(0.0f);
   }
 };
 
-/// Finds the next vertex of each path, gathers what it emits, and names the queue that the path goes to.
-template <class Caster, class Recorder>
+/// What kernels ask an inline caster.
+template <class Caster>
+struct inline_answers {
+  Caster caster;
+
+  WFPG_HD triangle_hit hit(std::size_t, const wfpg::ray& ray) const { return caster.intersect(ray); }
+  WFPG_HD bool is_hidden(std::size_t, const wfpg::ray& ray) const { return caster.occluded(ray); }
+  WFPG_HD void asks_nothing(std::size_t) const {}
+};
+
+/// The same of a batch caster, which the kernel before has left its rays.
+struct batch_hits {
+  wfpg::array_view<const triangle_hit> hits;
+
+  WFPG_HD triangle_hit hit(std::size_t i, const wfpg::ray&) const { return hits[i]; }
+};
+
+/// Leaves a batch caster the rays of which drop_hidden will have the answers.
+struct batch_questions {
+  wfpg::array_view<wfpg::ray> rays;
+
+  WFPG_HD bool is_hidden(std::size_t i, const wfpg::ray& ray) const {
+    rays[i] = ray;
+    return false;
+  }
+  WFPG_HD void asks_nothing(std::size_t i) const { rays[i] = no_ray(); }
+
+  /// One that no batch caster traces.
+  WFPG_HD static wfpg::ray no_ray() {
+    wfpg::ray ray;
+    ray.t_max = 0.0f;
+    return ray;
+  }
+};
+
+/// Leaves a batch caster the rays of the paths.
+struct write_rays {
+  path_queue queue;
+  tiled_view<path_state> paths;
+  wfpg::array_view<wfpg::ray> rays;
+
+  WFPG_HD void operator()(std::size_t slot) const {
+    rays[slot] = batch_questions::no_ray();
+    if (!queue.holds(slot)) return;
+    const path_state& path = paths[queue[slot]];
+    if (path.active) rays[slot] = path.ray();
+  }
+};
+
+/// Finds the next vertex of each path that may still go on, gathers what it emits, and names the queue that
+/// the path goes to.
+template <class Answers, class Recorder>
 struct trace_paths {
   wave_position at;
   path_lights world;
-  Caster caster;
+  Answers answers;
   Recorder recorder;
-  wfpg::array_view<path_state> paths;
-  wfpg::array_view<path_vertex> vertices;
+  path_queue queue;  ///< of the vertex before
+  tiled_view<path_state> paths;
+  tiled_view<path_vertex> vertices;
   wfpg::array_view<std::uint32_t> keys;  ///< the material's kind, or excluded
   wfpg::array_view<vec3> radiance;
   wfpg::array_view<std::uint32_t> segments;
   std::uint32_t excluded;
 
-  WFPG_HD void operator()(std::size_t i) const {
-    keys[i] = excluded;
-    path_state& path = paths[i];
+  WFPG_HD void operator()(std::size_t slot) const {
+    if (!queue.holds(slot)) return;
+    const std::uint32_t id = queue[slot];
+    keys[id] = excluded;
+    const path_state& path = paths[id];
     if (!path.active) return;
-    ++segments[i];
-    const triangle_hit hit = caster.intersect(path.ray);
+    ++segments[id];
+    const triangle_hit hit = answers.hit(slot, path.ray());
     if (!hit.is_hit()) {
-      path.active = false;
-      gather(i, path.throughput * world.scene.environment);
-      return;
+      gather(id, path.throughput * world.scene.environment);
+      return end(id);
     }
-    const hit_surface found = world.scene.surface(hit, -path.ray.direction);
+    const hit_surface found = world.scene.surface(hit, -path.direction);
     const wfpg::surface<bsdf>& surface = found.surface;
-    const auto id = static_cast<std::uint32_t>(i);
     recorder.vertex(id, at.depth, surface.position, surface.outgoing, path.throughput);
-    gather(i, path.throughput * found.emission * emission_weight(path, found));
-    path.active = !at.is_last();
-    if (!path.active) return;
-    vertices[i] = {surface, found.offset};
-    keys[i] = static_cast<std::uint32_t>(surface.bsdf.kind);
+    gather(id, path.throughput * found.emission * emission_weight(path, found));
+    if (at.is_last()) return end(id);
+    vertices.emplace(id, found);
+    keys[id] = static_cast<std::uint32_t>(surface.bsdf.kind);
   }
 
  private:
-  WFPG_HD void gather(std::size_t i, vec3 contribution) const {
+  WFPG_HD void end(std::uint32_t id) const {
+    paths.update(id, [](path_state& path) { path.active = 0; });
+  }
+
+  WFPG_HD void gather(std::uint32_t id, vec3 contribution) const {
     if (contribution == vec3(0.0f)) return;
-    radiance[i] += contribution;
-    recorder.emission(static_cast<std::uint32_t>(i), at.depth, contribution);
+    radiance[id] += contribution;
+    recorder.emission(id, at.depth, contribution);
   }
 
   // Against next-event estimation at the vertex before, which could have found the same point.
   WFPG_HD float emission_weight(const path_state& path, const hit_surface& found) const {
     if (!world.next_event || !(path.pdf > 0.0f)) return 1.0f;
     const vec3 normal = found.surface.geometric_normal;
-    const float cosine = std::abs(glm::dot(normal, path.ray.direction));
-    const float distance = glm::length(found.surface.position - path.ray.origin);
+    const float cosine = std::abs(glm::dot(normal, path.direction));
+    const float distance = glm::length(found.surface.position - path.origin);
     return wfpg::power_heuristic(path.pdf,
                                  solid_angle_pdf(world.lights.pdf(found.emission), distance, cosine));
   }
@@ -100,47 +153,58 @@ struct trace_paths {
 
 /// Next-event estimation up to its weight: draws a point of a light for each slot and looks whether it is
 /// seen.
-template <class Caster>
+template <class Answers>
 struct query_lights {
   wave_position at;
   path_lights world;
-  Caster caster;
+  Answers answers;
   path_queue queue;
-  wfpg::array_view<const path_vertex> vertices;
-  wfpg::array_view<light_query> queries;
+  tiled_view<path_vertex> vertices;
+  tiled_view<light_query> queries;
 
   WFPG_HD void operator()(std::size_t slot) const {
-    queries[slot] = queue.holds(slot) ? query(queue[slot]) : light_query{};
+    answers.asks_nothing(slot);
+    queries.emplace(slot, queue.holds(slot) ? query(slot, queue[slot]) : light_query{});
   }
 
  private:
-  WFPG_HD light_query query(std::uint32_t path) const {
+  WFPG_HD light_query query(std::size_t slot, std::uint32_t path) const {
     const path_vertex& vertex = vertices[path];
-    const wfpg::surface<bsdf>& surface = vertex.surface;
-    if (surface.bsdf.is_delta()) return {};
+    const bsdf scatters = vertex.bsdf();
+    if (scatters.is_delta()) return {};
     const light_sample light = world.lights.sample(world.scene, at.draw(path, dimension::light_choice).x,
                                                    at.draw(path, dimension::light_point));
-    const vec3 toward = light.position - surface.position;
+    const vec3 toward = light.position - vertex.position;
     const float distance = glm::length(toward);
     if (!(light.pdf > 0.0f && distance > 0.0f)) return {};
     light_query result;
     result.direction = toward / distance;
     result.pdf = solid_angle_pdf(light.pdf, distance, -glm::dot(light.normal, result.direction));
     if (!(result.pdf > 0.0f)) return {};
-    result.value = surface.bsdf.eval_rgb(surface.outgoing, result.direction) * light.radiance / result.pdf;
-    if (!(wfpg::luminance(result.value) > 0.0f) || is_hidden(vertex, light, result.direction)) return {};
-    return result;
+    result.value = scatters.eval_rgb(vertex.outgoing, result.direction) * light.radiance / result.pdf;
+    if (!(wfpg::luminance(result.value) > 0.0f)) return {};
+    return is_hidden(slot, vertex, light, result.direction) ? light_query{} : result;
   }
 
-  WFPG_HD bool is_hidden(const path_vertex& vertex, const light_sample& light, vec3 direction) const {
+  WFPG_HD bool is_hidden(std::size_t slot, const path_vertex& vertex, const light_sample& light,
+                         vec3 direction) const {
     const vec3 end = leave_surface(light.position, light.normal, -direction, light.offset);
     wfpg::ray ray;
-    ray.origin =
-        leave_surface(vertex.surface.position, vertex.surface.geometric_normal, direction, vertex.offset);
+    ray.origin = leave_surface(vertex.position, vertex.geometric_normal, direction, vertex.offset);
     ray.t_max = glm::length(end - ray.origin);
     if (!(ray.t_max > 0.0f)) return false;
     ray.direction = (end - ray.origin) / ray.t_max;
-    return caster.occluded(ray);
+    return answers.is_hidden(slot, ray);
+  }
+};
+
+/// Forgets the light samples that a batch caster found hidden.
+struct drop_hidden {
+  wfpg::array_view<const std::uint32_t> hidden;
+  tiled_view<light_query> queries;
+
+  WFPG_HD void operator()(std::size_t slot) const {
+    if (hidden[slot] != 0) queries.emplace(slot);
   }
 };
 
@@ -150,20 +214,22 @@ struct shade_paths {
   wave_position at;
   Recorder recorder;
   path_queue queue;
-  wfpg::array_view<const path_vertex> vertices;
-  wfpg::array_view<const light_query> queries;  ///< empty: no next-event estimation
-  wfpg::array_view<const float> densities;      ///< the mixture's, of the queries' directions
+  tiled_view<path_vertex> vertices;
+  tiled_view<light_query> queries;          ///< empty: no next-event estimation
+  wfpg::array_view<const float> densities;  ///< the mixture's, of the queries' directions
   wfpg::array_view<const wfpg::sampled_direction> directions;
-  wfpg::array_view<path_state> paths;
+  tiled_view<path_state> paths;
   wfpg::array_view<vec3> radiance;
 
   WFPG_HD void operator()(std::size_t slot) const {
     if (!queue.holds(slot)) return;
     const std::uint32_t id = queue[slot];
     if (!queries.empty()) add_light(slot, id);
-    path_state& path = paths[id];
-    path.active = scatter(vertices[id], directions[slot], path) &&
-                  survive_roulette(path, at.draw(id, dimension::roulette).x);
+    paths.update(id, [&](path_state& path) {
+      const bool goes_on = scatter(vertices[id], directions[slot], path) &&
+                           survive_roulette(path, at.draw(id, dimension::roulette).x);
+      path.active = goes_on ? 1 : 0;
+    });
   }
 
  private:
@@ -173,7 +239,7 @@ struct shade_paths {
   static constexpr float spared_reflectance = 0.1f;
 
   WFPG_HD void add_light(std::size_t slot, std::uint32_t id) const {
-    const light_query query = queries[slot];
+    const light_query& query = queries[slot];
     if (query.direction == vec3(0.0f)) return;
     const vec3 contribution =
         paths[id].throughput * query.value * wfpg::power_heuristic(query.pdf, densities[slot]);
@@ -186,16 +252,15 @@ struct shade_paths {
                        path_state& path) const {
     if (drawn.technique == wfpg::sampling_technique::none || !(drawn.pdf > 0.0f)) return false;
     const bool delta = drawn.technique == wfpg::sampling_technique::delta;
-    const wfpg::surface<bsdf>& surface = vertex.surface;
-    const vec3 weight = delta ? surface.bsdf.delta_weight_rgb(surface.outgoing, drawn.direction)
-                              : surface.bsdf.eval_rgb(surface.outgoing, drawn.direction) / drawn.pdf;
+    const bsdf scatters = vertex.bsdf();
+    const vec3 weight = delta ? scatters.delta_weight_rgb(vertex.outgoing, drawn.direction)
+                              : scatters.eval_rgb(vertex.outgoing, drawn.direction) / drawn.pdf;
     if (!(wfpg::luminance(weight) > 0.0f)) return false;
     path.throughput *= weight;
-    path.reflectance *= surface.bsdf.reflectance(surface.outgoing, drawn.direction);
+    path.reflectance *= scatters.reflectance(vertex.outgoing, drawn.direction);
     path.pdf = delta ? 0.0f : drawn.pdf;
-    path.ray.origin =
-        leave_surface(surface.position, surface.geometric_normal, drawn.direction, vertex.offset);
-    path.ray.direction = drawn.direction;
+    path.origin = leave_surface(vertex.position, vertex.geometric_normal, drawn.direction, vertex.offset);
+    path.direction = drawn.direction;
     return true;
   }
 

@@ -3,6 +3,7 @@
 
 #include "lights.hpp"
 #include "rng.hpp"
+#include "tiled_array.hpp"
 
 #include <wfpg/partitioner.hpp>
 
@@ -10,17 +11,63 @@ namespace render {
 
 /// A path between two vertices.
 struct path_state {
-  wfpg::ray ray;             ///< of the next segment
-  vec3 throughput{1.0f};     ///< of the path so far, roulette included
-  float pdf = 0.0f;          ///< of the ray's direction, per steradian; 0 from the camera and delta lobes
+  vec3 origin{0.0f};  ///< of the next segment
+  float pdf = 0.0f;   ///< of the direction, per steradian; 0 from the camera and delta lobes
+  vec3 direction{0.0f, 0.0f, 1.0f};
   float reflectance = 1.0f;  ///< what roulette goes by: see survive_roulette
-  bool active = true;
+  vec3 throughput{1.0f};     ///< of the path so far, roulette included
+  std::uint32_t active = 1;  ///< 0: it has ended
+
+  path_state() = default;
+  WFPG_HD explicit path_state(const wfpg::ray& camera_ray)
+      : origin(camera_ray.origin), direction(camera_ray.direction) {}
+
+  WFPG_HD wfpg::ray ray() const {
+    wfpg::ray next;
+    next.origin = origin;
+    next.direction = direction;
+    return next;
+  }
 };
 
-/// A path's last hit.
+/// A path's last hit: its surface without what is in there twice.
 struct path_vertex {
-  wfpg::surface<bsdf> surface;
+  vec3 position{0.0f};
   float offset = 0.0f;  ///< as in surface_point
+  vec3 geometric_normal{0.0f};
+  float alpha = 0.0f;
+  vec3 normal{0.0f};
+  float ior = 0.0f;
+  vec3 outgoing{0.0f};
+  material_kind kind = material_kind::lambert;
+  vec3 colour{0.0f};
+  std::uint32_t unused = 0;
+
+  path_vertex() = default;
+  WFPG_HD explicit path_vertex(const hit_surface& hit)
+      : position(hit.surface.position),
+        offset(hit.offset),
+        geometric_normal(hit.surface.geometric_normal),
+        alpha(hit.surface.bsdf.alpha),
+        normal(hit.surface.normal),
+        ior(hit.surface.bsdf.ior),
+        outgoing(hit.surface.outgoing),
+        kind(hit.surface.bsdf.kind),
+        colour(hit.surface.bsdf.colour) {}
+
+  WFPG_HD render::bsdf bsdf() const {
+    render::bsdf f;
+    f.kind = kind;
+    f.normal = normal;
+    f.geometric_normal = geometric_normal;
+    f.colour = colour;
+    f.alpha = alpha;
+    f.ior = ior;
+    return f;
+  }
+  WFPG_HD wfpg::surface<render::bsdf> surface() const {
+    return {position, geometric_normal, normal, outgoing, bsdf(), true};
+  }
 };
 
 /// A sample of next-event estimation that waits for its weight.
@@ -28,23 +75,27 @@ struct light_query {
   vec3 direction{0.0f};  ///< toward the light, unit length; zero where there is nothing to add
   float pdf = 0.0f;      ///< of the direction by light sampling, per steradian
   vec3 value{0.0f};      ///< BSDF, cosine and radiance over that pdf
+  std::uint32_t unused = 0;
 };
 
 /// The paths that go on, in the order of their materials: slot -> path.
 struct path_queue {
   wfpg::partition_view by_material;
+  bool all = false;  ///< every path in its own slot
 
-  WFPG_HD bool holds(std::size_t slot) const { return slot < by_material.offsets[*by_material.count]; }
-  WFPG_HD std::uint32_t operator[](std::size_t slot) const { return by_material.permutation[slot]; }
+  WFPG_HD bool holds(std::size_t slot) const { return all || slot < by_material.offsets[*by_material.count]; }
+  WFPG_HD std::uint32_t operator[](std::size_t slot) const {
+    return all ? static_cast<std::uint32_t>(slot) : by_material.permutation[slot];
+  }
 };
 
 /// The surfaces functor of a wave whose rays are the slots of a queue.
 struct queued_surfaces {
   path_queue queue;
-  wfpg::array_view<const path_vertex> vertices;
+  tiled_view<path_vertex> vertices;
 
   WFPG_HD wfpg::surface<bsdf> operator()(std::uint32_t slot) const {
-    if (queue.holds(slot)) return vertices[queue[slot]].surface;
+    if (queue.holds(slot)) return vertices[queue[slot]].surface();
     wfpg::surface<bsdf> unused;
     unused.active = false;
     return unused;
@@ -64,7 +115,7 @@ struct queued_random {
 
 /// The query functor of a wave: the direction of each slot's light.
 struct queued_light_directions {
-  wfpg::array_view<const light_query> queries;
+  tiled_view<light_query> queries;
 
   WFPG_HD vec3 operator()(std::uint32_t slot) const { return queries[slot].direction; }
 };

@@ -1,6 +1,8 @@
 // Options made complete and checked; the choice of the device.
 #include "render.hpp"
 
+#include "embree_caster.hpp"
+
 #include <wfpg/error.hpp>
 #include <wfpg/exec/omp.hpp>
 #include <wfpg/exec/seq.hpp>
@@ -8,12 +10,12 @@
 
 namespace render {
 
-extern template render_result render_on(const wfpg::exec::seq&, const scene&, const render_options&,
-                                        const progress_callback&);
-extern template render_result render_on(const wfpg::exec::omp&, const scene&, const render_options&,
-                                        const progress_callback&);
-extern template render_result render_on(const wfpg::exec::tbb&, const scene&, const render_options&,
-                                        const progress_callback&);
+extern template render_result render_on<embree_scene>(const wfpg::exec::seq&, const scene&,
+                                                      const render_options&, const progress_callback&);
+extern template render_result render_on<embree_scene>(const wfpg::exec::omp&, const scene&,
+                                                      const render_options&, const progress_callback&);
+extern template render_result render_on<embree_scene>(const wfpg::exec::tbb&, const scene&,
+                                                      const render_options&, const progress_callback&);
 
 namespace {
 
@@ -44,11 +46,13 @@ render_result render_completed(const scene& scene, const render_options& options
                                const progress_callback& progress) {
   switch (options.where) {
     case device::omp:
-      return render_on(wfpg::exec::omp(), scene, options, progress);
+      return render_on<embree_scene>(wfpg::exec::omp(), scene, options, progress);
     case device::seq:
-      return render_on(wfpg::exec::seq(), scene, options, progress);
+      return render_on<embree_scene>(wfpg::exec::seq(), scene, options, progress);
+    case device::cuda:
+      return render_on_cuda(scene, options, progress);
     default:
-      return render_on(wfpg::exec::tbb(), scene, options, progress);
+      return render_on<embree_scene>(wfpg::exec::tbb(), scene, options, progress);
   }
 }
 
@@ -60,7 +64,10 @@ render_result render(const scene& scene, const render_options& options, const pr
   result.report.method = options.method == sampling_method::pt     ? "pt"
                          : options.method == sampling_method::wfpg ? "wfpg"
                                                                    : "wfpg-product";
-  result.report.device = options.where == device::cpu ? "cpu" : options.where == device::omp ? "omp" : "seq";
+  result.report.device = options.where == device::cpu   ? "cpu"
+                         : options.where == device::omp ? "omp"
+                         : options.where == device::seq ? "seq"
+                                                        : "cuda";
   return result;
 }
 

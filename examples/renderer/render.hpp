@@ -18,7 +18,7 @@ namespace render {
 enum class sampling_method { pt, wfpg, wfpg_product };
 enum class guiding { oriented, plain };
 enum class fields { kept, transient };
-enum class device { cpu, omp, seq };  ///< TBB, OpenMP, one thread
+enum class device { cpu, omp, seq, cuda };  ///< TBB, OpenMP, one thread, a GPU
 
 struct render_options {
   sampling_method method = sampling_method::wfpg;
@@ -72,8 +72,9 @@ struct octree_report {
 struct render_report {
   std::string scene, method, device;
   int spp = 0;                 ///< rendered
+  std::uint64_t segments = 0;  ///< rays that paths were extended by
   double total_seconds = 0.0;  ///< from building to the last sample
-  named_seconds seconds;       ///< by stage; "guide ..." are parts of "directions" and of the samples' ends
+  named_seconds seconds;       ///< by stage; "guide ..." are parts of "directions" and of "update"
   std::vector<std::pair<std::string, std::size_t>> memory;  ///< the guider's bytes, by part
   std::size_t persistent_bytes = 0;
   std::size_t transient_bytes = 0;
@@ -112,13 +113,18 @@ struct render_progress {
 using progress_callback = std::function<void(const render_progress&)>;
 
 /// Renders on options.where. Throws std::invalid_argument for options or scenes that cannot be right; the
-/// message names what. `progress` may be empty.
+/// message names what; std::runtime_error where the device cannot be used. `progress` may be empty.
 render_result render(const scene& scene, const render_options& options, const progress_callback& progress);
 
-/// The same on a policy, whatever options.where says; instantiated in render_seq.cpp, render_omp.cpp and
+/// The same on a policy, whatever options.where says, with the ray caster of an Accelerated, which is made
+/// from the policy, the scene and its arrays there; instantiated in render_seq.cpp, render_omp.cpp and
 /// render_tbb.cpp.
-template <class Exec>
+template <class Accelerated, class Exec>
 render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
                         const progress_callback& progress);
+
+/// The same on a GPU, which throws std::runtime_error where there is none.
+render_result render_on_cuda(const scene& scene, const render_options& options,
+                             const progress_callback& progress);
 
 }  // namespace render

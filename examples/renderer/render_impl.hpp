@@ -1,7 +1,6 @@
 // render_on for any policy: builds what a rendering needs, takes samples until the budget is spent, reports.
 #pragma once
 
-#include "embree_caster.hpp"
 #include "guider_report.hpp"
 #include "render.hpp"
 #include "unguided.hpp"
@@ -53,8 +52,8 @@ class sample_budget {
 };
 
 /// The samples of one rendering, whatever their directions come from.
-template <class Exec, class Guider>
-void take_samples(path_tracer<Exec, embree_caster>& tracer, Guider& guider, const pinhole& camera,
+template <class Exec, class Caster, class Guider>
+void take_samples(path_tracer<Exec, Caster>& tracer, Guider& guider, const pinhole& camera,
                   const render_options& options, const progress_callback& progress, render_result& result) {
   sample_budget budget(options);
   while (!budget.is_spent()) {
@@ -93,7 +92,7 @@ inline wfpg::guider_options guider_options_of(const render_options& options) {
   return guided;
 }
 
-template <class Exec>
+template <class Accelerated, class Exec>
 render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
                         const progress_callback& progress) {
   const stopwatch total;
@@ -103,12 +102,13 @@ render_result render_on(const Exec& exec, const scene& scene, const render_optio
 
   const device_scene<Exec> geometry(exec, scene);
   const light_distribution<Exec> lights(exec, scene);
-  std::unique_ptr<const embree_scene> accelerated;
-  building.measure("embree", [&] { accelerated = std::make_unique<const embree_scene>(scene); });
+  std::unique_ptr<const Accelerated> accelerated;
+  building.measure(Accelerated::name,
+                   [&] { accelerated = std::make_unique<const Accelerated>(exec, scene, geometry.view()); });
   const tracer_settings settings{options.width, options.height, static_cast<std::uint32_t>(options.max_depth),
                                  options.seed};
-  path_tracer<Exec, embree_caster> tracer(exec, settings, {geometry.view(), lights.view(), options.nee},
-                                          accelerated->caster());
+  path_tracer<Exec, decltype(accelerated->caster())> tracer(
+      exec, settings, {geometry.view(), lights.view(), options.nee}, accelerated->caster());
   const pinhole camera(scene.view, options.width, options.height);
   if (options.method == sampling_method::pt) {
     unguided<Exec> guider(exec);
@@ -122,9 +122,9 @@ render_result render_on(const Exec& exec, const scene& scene, const render_optio
     take_samples(tracer, guider, camera, options, progress, result);
     report_guider(guider, tracer.segments(), report);
   }
+  report.segments = tracer.segments();
   result.picture = {options.width, options.height, tracer.picture()};
-  report.seconds.insert(report.seconds.begin(), tracer.clock().seconds().begin(),
-                        tracer.clock().seconds().end());
+  report.seconds.insert(report.seconds.begin(), tracer.seconds().begin(), tracer.seconds().end());
   report.seconds.insert(report.seconds.begin(), building.seconds().begin(), building.seconds().end());
   report.total_seconds = total.seconds();
   return result;

@@ -1,11 +1,12 @@
 // The renderer on the policy exec::seq: one thread, for debugging and as the others' reference.
+#include "embree_caster.hpp"
 #include "render_impl.hpp"
 
 #include <wfpg/exec/seq.hpp>
 
 namespace render {
 
-template render_result render_on(const wfpg::exec::seq&, const scene&, const render_options&,
-                                 const progress_callback&);
+template render_result render_on<embree_scene>(const wfpg::exec::seq&, const scene&, const render_options&,
+                                               const progress_callback&);
 
 }  // namespace render

@@ -1,11 +1,12 @@
 // The renderer on the policy exec::tbb: TBB.
+#include "embree_caster.hpp"
 #include "render_impl.hpp"
 
 #include <wfpg/exec/tbb.hpp>
 
 namespace render {
 
-template render_result render_on(const wfpg::exec::tbb&, const scene&, const render_options&,
-                                 const progress_callback&);
+template render_result render_on<embree_scene>(const wfpg::exec::tbb&, const scene&, const render_options&,
+                                               const progress_callback&);
 
 }  // namespace render

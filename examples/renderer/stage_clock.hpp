@@ -36,4 +36,15 @@ class stage_clock {
   named_seconds seconds_;
 };
 
+/// The stages of work on a policy, whose calls return when the work is done. A policy whose calls return
+/// before has a specialisation of its own.
+template <class Exec>
+class policy_clock : public stage_clock {
+ public:
+  explicit policy_clock(const Exec&) {}
+
+  /// Adds what measure() could not know yet; the work has been waited for.
+  void resolve() {}
+};
+
 }  // namespace render

@@ -52,6 +52,7 @@ void write_stats(const std::string& path, const render_report& report,
                  const std::optional<image_error>& error) {
   json stats{
       {"scene", report.scene}, {"method", report.method}, {"device", report.device}, {"spp", report.spp}};
+  stats["segments"] = report.segments;
   stats["seconds"] = seconds_of(report);
   stats["memory"] = memory_of(report);
   stats["octree"] = octree_of(report.octree);

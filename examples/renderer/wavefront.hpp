@@ -6,6 +6,7 @@
 
 #include <wfpg/buffer.hpp>
 #include <wfpg/partitioner.hpp>
+#include <wfpg/ray_caster.hpp>
 #include <wfpg/wave.hpp>
 
 #include <cstdint>
@@ -22,6 +23,12 @@ struct tracer_settings {
 };
 
 /// Renders samples of a scene with directions from a guider.
+///
+/// A Caster is one of the guider's that also finds triangles. Inline, it is called inside the kernels:
+///   triangle_hit intersect(const wfpg::ray&) const;  bool occluded(const wfpg::ray&) const;
+/// in batches, between them, and rays with t_max <= t_min are misses:
+///   void intersect(const Exec&, wfpg::array_view<const wfpg::ray>, wfpg::array_view<triangle_hit>) const;
+///   void occluded(const Exec&, wfpg::array_view<const wfpg::ray>, wfpg::array_view<std::uint32_t>) const;
 ///
 /// Emission at vertices 1 to max_depth counts; next-event estimation, where it is on, is done at vertices 1
 /// to max_depth - 1, so that both estimate the same sum. Work is ordered by path, never by arrival: one seed
@@ -45,29 +52,35 @@ class path_tracer {
         segments_(exec, std::vector<std::uint32_t>(count_, 0)),
         radiance_(exec, count_),
         film_(exec, std::vector<glm::dvec3>(count_, glm::dvec3(0.0))),
-        partitioner_(exec, count_) {}
+        partitioner_(exec, count_),
+        rays_(exec, is_inline ? 0 : count_),
+        hits_(exec, is_inline ? 0 : count_),
+        hidden_(exec, is_inline || !world.next_event ? 0 : count_),
+        clock_(exec) {}
 
-  /// Sample number `sample` (from 0) of each pixel; `weight` >= 0 is its share of the picture.
+  /// Sample number `sample` (from 0) of each pixel; `weight` >= 0 is its share of the picture. Waits for it.
   template <class Guider>
   void render_sample(Guider& guider, const pinhole& camera, std::uint32_t sample, float weight) {
     wave_position at{{settings_.seed, sample}, 0, settings_.max_depth};
     clock_.measure("camera", [&] {
       exec_.for_each(count_, start_paths{camera, at.random, paths_.view(), radiance_.view()});
     });
-    guider.begin_sample();
-    for (; at.depth < at.max_depth; ++at.depth) {
-      trace(guider, at);
+    clock_.measure("update", [&] { guider.begin_sample(); });
+    for (path_queue queue{{}, true}; at.depth < at.max_depth; ++at.depth) {
+      trace(guider, at, queue);
       if (at.is_last()) break;
-      const path_queue queue = sort_by_material();
+      queue = sort_by_material();
       if (world_.next_event) query(at, queue);
       sample_directions(guider, at, queue);
       shade(guider, at, queue);
     }
-    guider.end_sample();
+    clock_.measure("update", [&] { guider.end_sample(); });
     clock_.measure("film", [&] {
       exec_.for_each(count_, add_to_film{radiance_.view(), film_.view(), static_cast<double>(weight)});
     });
     weight_ += static_cast<double>(weight);
+    wfpg::read_element(exec_, radiance_.data());  // waits: who looks at the time sees all of the sample
+    clock_.resolve();
   }
 
   /// Weighted mean of the samples, row by row; black where their weights sum to 0.
@@ -85,17 +98,31 @@ class path_tracer {
     return std::accumulate(counts.begin(), counts.end(), std::uint64_t(0));
   }
 
-  const stage_clock& clock() const { return clock_; }
+  const named_seconds& seconds() const { return clock_.seconds(); }
 
  private:
+  static constexpr bool is_inline = wfpg::is_inline_caster_v<Caster>;
+
   template <class Guider>
-  void trace(Guider& guider, const wave_position& at) {
+  void trace(Guider& guider, const wave_position& at, const path_queue& queue) {
     clock_.measure("trace", [&] {
-      auto recorder = guider.recorder();
-      exec_.for_each(count_, trace_paths<Caster, decltype(recorder)>{
-                                 at, world_, caster_, recorder, paths_.view(), vertices_.view(), keys_.view(),
-                                 radiance_.view(), segments_.view(), wfpg::partitioner<Exec>::excluded});
+      if constexpr (is_inline) {
+        trace_with(guider, at, queue, inline_answers<Caster>{caster_});
+      } else {
+        exec_.for_each(count_, write_rays{queue, paths_.view(), rays_.view()});
+        caster_.intersect(exec_, wfpg::array_view<const wfpg::ray>(rays_.view()), hits_.view());
+        trace_with(guider, at, queue, batch_hits{hits_.view()});
+      }
     });
+  }
+
+  template <class Guider, class Answers>
+  void trace_with(Guider& guider, const wave_position& at, const path_queue& queue, const Answers& answers) {
+    auto recorder = guider.recorder();
+    exec_.for_each(count_,
+                   trace_paths<Answers, decltype(recorder)>{
+                       at, world_, answers, recorder, queue, paths_.view(), vertices_.view(), keys_.view(),
+                       radiance_.view(), segments_.view(), wfpg::partitioner<Exec>::excluded});
   }
 
   path_queue sort_by_material() {
@@ -106,9 +133,20 @@ class path_tracer {
 
   void query(const wave_position& at, const path_queue& queue) {
     clock_.measure("lights", [&] {
-      exec_.for_each(count_,
-                     query_lights<Caster>{at, world_, caster_, queue, vertices_.view(), queries_.view()});
+      if constexpr (is_inline) {
+        query_with(at, queue, inline_answers<Caster>{caster_});
+      } else {
+        query_with(at, queue, batch_questions{rays_.view()});
+        caster_.occluded(exec_, wfpg::array_view<const wfpg::ray>(rays_.view()), hidden_.view());
+        exec_.for_each(count_, drop_hidden{hidden_.view(), queries_.view()});
+      }
     });
+  }
+
+  template <class Answers>
+  void query_with(const wave_position& at, const path_queue& queue, const Answers& answers) {
+    exec_.for_each(count_,
+                   query_lights<Answers>{at, world_, answers, queue, vertices_.view(), queries_.view()});
   }
 
   template <class Guider>
@@ -140,17 +178,20 @@ class path_tracer {
   path_lights world_;
   Caster caster_;
   std::size_t count_;
-  wfpg::buffer<path_state, Exec> paths_;
-  wfpg::buffer<path_vertex, Exec> vertices_;
-  wfpg::buffer<light_query, Exec> queries_;
+  tiled_array<path_state, Exec> paths_;
+  tiled_array<path_vertex, Exec> vertices_;
+  tiled_array<light_query, Exec> queries_;
   wfpg::buffer<float, Exec> densities_;
   wfpg::buffer<wfpg::sampled_direction, Exec> directions_;
   wfpg::buffer<std::uint32_t, Exec> keys_, segments_;
   wfpg::buffer<vec3, Exec> radiance_;
   wfpg::buffer<glm::dvec3, Exec> film_;
   wfpg::partitioner<Exec> partitioner_;
+  wfpg::buffer<wfpg::ray, Exec> rays_;  // for a batch caster
+  wfpg::buffer<triangle_hit, Exec> hits_;
+  wfpg::buffer<std::uint32_t, Exec> hidden_;
   double weight_ = 0.0;
-  stage_clock clock_;
+  policy_clock<Exec> clock_;
 };
 
 }  // namespace render

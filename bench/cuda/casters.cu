@@ -1,0 +1,137 @@
+// Rays a second of the renderer's own hierarchy: the cones of bins, each a whole sphere of directions from
+// one point in the order in which fields cast them, and the same rays shuffled; among small triangles that
+// fill the unit cube, and in an empty box. Their floor is OptiX's caster of the same rays in the same run,
+// where it was built; else a copy of rays and hits.
+#include "bvh_scene.hpp"
+#include "timing.hpp"
+#if defined(WFPG_BENCH_OPTIX)
+#include "optix_caster.hpp"
+#endif
+
+#include <wfpg/octahedral_map.hpp>
+#include <wfpg/radiance_field.hpp>
+
+#include <cmath>
+#include <vector>
+
+namespace bench {
+namespace {
+
+using wfpg::uvec3;
+using wfpg::vec2;
+using wfpg::vec3;
+using wfpg::detail::hash;
+using wfpg::detail::unit_vec2;
+
+constexpr std::uint32_t bin_count = 2048, resolution = 128, cells = resolution * resolution;
+constexpr std::uint32_t ray_count = bin_count * cells;  // a power of two, for `shuffled`
+
+WFPG_HD vec3 random_point(std::uint64_t stream, std::uint64_t i) {
+  const vec2 xy = unit_vec2(hash(hash(stream, 0), i));
+  return {xy.x, xy.y, unit_vec2(hash(hash(stream, 1), i)).x};
+}
+WFPG_HD vec3 random_direction(std::uint64_t stream, std::uint64_t i) {
+  return wfpg::square_to_sphere(unit_vec2(hash(hash(stream, 2), i)));
+}
+
+/// Equilateral triangles in the unit cube, of edge 0.02 where there are 100,000 and as much area in all where
+/// there are more; or the cube's faces.
+class triangles_of {
+ public:
+  triangles_of(const exec_policy& exec, std::size_t thousands) {
+    std::vector<vec3> positions;
+    if (thousands == 0) add_box(positions);
+    const float edge = 0.02f * std::sqrt(100.0f / static_cast<float>(thousands));
+    for (std::uint32_t i = 0; i < 1000 * thousands; ++i) {
+      const vec3 a = random_point(1, i), along = random_direction(1, i);
+      const vec3 aside = glm::normalize(glm::cross(along, random_direction(2, i)));
+      positions.insert(positions.end(),
+                       {a, a + edge * along, a + edge * (0.5f * along + 0.8660254f * aside)});
+    }
+    std::vector<uvec3> triangles;
+    for (std::uint32_t i = 0; i < positions.size(); i += 3) triangles.push_back({i, i + 1, i + 2});
+    positions_ = {exec, positions};
+    triangles_ = {exec, triangles};
+  }
+
+  wfpg::triangle_mesh_view view() const { return {positions_.view(), triangles_.view()}; }
+
+ private:
+  static void add_box(std::vector<vec3>& positions) {
+    for (int axis = 0; axis < 3; ++axis)
+      for (const float side : {0.0f, 1.0f}) {
+        vec3 corner(0.0f), u(0.0f), v(0.0f);
+        corner[axis] = side;
+        u[(axis + 1) % 3] = v[(axis + 2) % 3] = 1.0f;
+        positions.insert(positions.end(),
+                         {corner, corner + u, corner + u + v, corner, corner + u + v, corner + v});
+      }
+  }
+
+  wfpg::buffer<vec3, exec_policy> positions_;
+  wfpg::buffer<uvec3, exec_policy> triangles_;
+};
+
+/// A permutation of the rays' indices.
+WFPG_HD std::uint32_t shuffled(std::uint32_t i) {
+  for (int round = 0; round < 3; ++round) {
+    i = i * 0x9e3779b1u % ray_count;
+    i ^= i >> 13;
+  }
+  return i;
+}
+
+struct make_ray {
+  wfpg::ray* rays;
+  bool in_order;
+  WFPG_HD void operator()(std::size_t thread) const {
+    const auto written = static_cast<std::uint32_t>(thread);
+    const std::uint32_t i = in_order ? written : shuffled(written);
+    const wfpg::detail::field_cell cell = wfpg::detail::cell_in_order(i % cells, resolution);
+    const vec2 square = vec2(static_cast<float>(cell.x), static_cast<float>(cell.y)) + unit_vec2(hash(3, i));
+    rays[written] = {0.05f + 0.9f * random_point(4, i / cells), 0.0f,
+                     wfpg::square_to_sphere(square / static_cast<float>(resolution)), 3.0e38f};
+  }
+};
+
+struct cast_inline {
+  render::bvh_caster caster;
+  wfpg::array_view<const wfpg::ray> rays;
+  wfpg::array_view<wfpg::ray_hit> hits;
+  WFPG_HD void operator()(std::size_t i) const { hits[i] = caster(rays[i]); }
+};
+
+void casting(benchmark::State& state) {
+  const exec_policy exec;
+  const triangles_of mesh(exec, static_cast<std::size_t>(state.range(0)));
+  const wfpg::buffer<wfpg::ray, exec_policy> rays(exec, ray_count);
+  const wfpg::buffer<wfpg::ray_hit, exec_policy> hits(exec, ray_count);
+  exec.for_each(ray_count, make_ray{rays.data(), state.range(1) != 0});
+  const wfpg::array_view<const wfpg::ray> given(rays.view());
+  const render::bvh_scene<exec_policy> hierarchy(exec, mesh.view(), 0.0f);
+#if defined(WFPG_BENCH_OPTIX)
+  const render::optix_scene optix(exec, mesh.view().positions, mesh.view().triangles, 0.0f);
+  const auto floor = [&] { optix.caster().cast(exec, given, hits.view()); };
+#else
+  const copy_of floor(exec, rays.bytes() + hits.bytes());
+#endif
+  compare(
+      state, exec,
+      [&] {
+        exec.for_each(ray_count, cast_inline{hierarchy.caster(), given, hits.view()});
+      },
+      floor);
+  state.counters["Mrays_a_second"] = 1.0e-3 * ray_count / state.counters["median_ms"];
+}
+
+BENCHMARK(casting)
+    ->ArgNames({"thousands", "in_order"})
+    ->Args({100, 1})
+    ->Args({100, 0})
+    ->Args({1000, 1})
+    ->Args({1000, 0})
+    ->Args({0, 1})
+    ->Apply(as_stage);
+
+}  // namespace
+}  // namespace bench

@@ -1,0 +1,91 @@
+// Arrays of structures for kernels that read or write all of one. On a GPU they are laid out in tiles of a
+// warp's elements, whose pieces of 16 bytes lie side by side, first the tile's first pieces, then its second
+// ones, so that what a warp moves is contiguous. Elsewhere they are ordinary arrays.
+#pragma once
+
+#include <wfpg/buffer.hpp>
+
+#include <cstring>
+#include <new>
+#include <type_traits>
+
+namespace render {
+
+/// What kernels see of a tiled_array. Trivially copyable. Elements are written before they are read, and all
+/// in the same memory.
+template <class T>
+class tiled_view {
+ public:
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % 16 == 0);
+
+  tiled_view() = default;
+  tiled_view(T* data, std::size_t size) : data_(data), size_(size) {}
+
+  WFPG_HD bool empty() const { return size_ == 0; }
+
+#if defined(__CUDA_ARCH__)
+  WFPG_HD T operator[](std::size_t i) const {
+    piece copy[pieces];
+    for (std::size_t k = 0; k < pieces; ++k) copy[k] = at(i, k);
+    T element;
+    memcpy(static_cast<void*>(&element), copy, sizeof(T));
+    return element;
+  }
+  template <class... Arguments>
+  WFPG_HD void emplace(std::size_t i, const Arguments&... arguments) const {
+    const T element(arguments...);
+    piece copy[pieces];
+    memcpy(copy, &element, sizeof(T));
+    for (std::size_t k = 0; k < pieces; ++k) at(i, k) = copy[k];
+  }
+  template <class F>
+  WFPG_HD void update(std::size_t i, const F& f) const {
+    T element = (*this)[i];
+    f(element);
+    emplace(i, element);
+  }
+#else
+  const T& operator[](std::size_t i) const {
+    return data_[i];
+  }
+  /// Makes element i of arguments of its constructor.
+  template <class... Arguments>
+  void emplace(std::size_t i, const Arguments&... arguments) const {
+    new (data_ + i) T(arguments...);
+  }
+  /// f(T&) of element i.
+  template <class F>
+  void update(std::size_t i, const F& f) const {
+    f(data_[i]);
+  }
+#endif
+
+ private:
+  struct alignas(16) piece {
+    std::uint32_t words[4];
+  };
+  static constexpr std::size_t pieces = sizeof(T) / sizeof(piece);
+  static constexpr std::size_t tile = 32;
+
+  WFPG_HD piece& at(std::size_t i, std::size_t k) const {
+    return reinterpret_cast<piece*>(data_)[(i / tile * pieces + k) * tile + i % tile];
+  }
+
+  T* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+/// Owns `size` uninitialised elements in the memory of a policy.
+template <class T, class Exec>
+class tiled_array {
+ public:
+  tiled_array(const Exec& exec, std::size_t size) : elements_(exec, (size + 31) / 32 * 32), size_(size) {}
+
+  tiled_view<T> view() const { return {elements_.data(), size_}; }
+
+ private:
+  wfpg::buffer<T, Exec> elements_;
+  std::size_t size_ = 0;
+};
+
+}  // namespace render

@@ -1,0 +1,79 @@
+// Small renderings of the built-in scenes, and the means of their tiles over independent seeds.
+#pragma once
+
+#include "builtin_scenes.hpp"
+#include "render.hpp"
+#include "support/statistics.hpp"
+
+#include <wfpg/types.hpp>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace wfpg_test {
+
+inline constexpr int tiles = 8;        // along a side
+inline constexpr int tile_pixels = 4;  // along a tile's side
+inline constexpr int renderings = 24;  // independent, of each method
+
+/// What a rendering is of, and how.
+struct rendering {
+  std::string scene;
+  bool nee = true;
+  render::sampling_method method = render::sampling_method::wfpg;
+  render::fields lifetime = render::fields::kept;
+  render::guiding mode = render::guiding::oriented;
+  render::device where = render::device::cpu;
+
+  render::render_options options() const {
+    render::render_options options;
+    options.nee = nee;
+    options.method = method;
+    options.lifetime = lifetime;
+    options.mode = mode;
+    options.where = where;
+    options.width = options.height = tiles * tile_pixels;
+    options.max_depth = 6;
+    options.spp = 12;
+    options.octree_resolution = 32;
+    options.field_resolution = 8;
+    options.slot_resolution = 8;
+    options.product_resolution = 4;
+    options.recast = 4;
+    options.rays_per_bin = 128;
+    options.min_bin_level = 2;
+    return options;
+  }
+  std::string name() const {
+    return scene + (where == render::device::cuda ? " on cuda" : "") + ", next-event estimation " +
+           (nee ? "on" : "off") + ", " + (mode == render::guiding::plain ? "plain" : "oriented") + ", " +
+           (lifetime == render::fields::kept ? "kept" : "transient") + " fields" +
+           (method == render::sampling_method::wfpg_product ? ", products" : "");
+  }
+};
+
+inline std::vector<double> tiles_of(const render::image& picture) {
+  std::vector<double> result(tiles * tiles, 0.0);
+  for (int i = 0; i < picture.width * picture.height; ++i) {
+    const int x = i % picture.width / tile_pixels, y = i / picture.width / tile_pixels;
+    result[static_cast<std::size_t>(y * tiles + x)] +=
+        static_cast<double>(wfpg::luminance(picture.pixels[static_cast<std::size_t>(i)])) /
+        (tile_pixels * tile_pixels);
+  }
+  return result;
+}
+
+/// `first_seed`: renderings of other seeds are independent.
+inline tile_means render_tiles(const rendering& what, std::uint64_t first_seed) {
+  tile_means result(tiles * tiles);
+  const render::scene world = render::make_builtin_scene(what.scene);
+  render::render_options options = what.options();
+  for (int i = 0; i < renderings; ++i) {
+    options.seed = first_seed + static_cast<std::uint64_t>(i);
+    result.add(tiles_of(render::render(world, options, {}).picture));
+  }
+  return result;
+}
+
+}  // namespace wfpg_test

@@ -1,0 +1,84 @@
+// The renderer on a GPU: its pictures have the means of the CPU's, and one seed gives one picture. Needs a
+// GPU.
+#include "support/catch.hpp"
+#include "support/renderings.hpp"
+
+#include <cstring>
+#include <map>
+#include <string>
+#include <utility>
+
+namespace {
+
+using render::device;
+using render::fields;
+using render::guiding;
+using render::sampling_method;
+using wfpg_test::rendering;
+
+/// Of path tracing on the CPU, which guiding there agrees with (test_renderer_unbiased.cpp).
+const wfpg_test::tile_means& truth_of(const std::string& scene, bool nee) {
+  static std::map<std::pair<std::string, bool>, wfpg_test::tile_means> made;
+  const auto found = made.find({scene, nee});
+  if (found != made.end()) return found->second;
+  const rendering unguided{scene, nee, sampling_method::pt};
+  return made.emplace(std::make_pair(scene, nee), wfpg_test::render_tiles(unguided, 1000)).first->second;
+}
+
+void check_as_on_cpu(rendering what) {
+  what.where = device::cuda;
+  const auto report =
+      wfpg_test::check_unbiased(truth_of(what.scene, what.nee), wfpg_test::render_tiles(what, 0));
+  INFO(what.name() << ": " << report.message);
+  CHECK(report);
+}
+
+void check_all_scenes(sampling_method method) {
+  for (const char* scene : {"cornell-box", "cornell-enclosed", "ajar", "thin-wall", "furnace", "glossy-room"})
+    for (const bool nee : {false, true}) check_as_on_cpu({scene, nee, method});
+}
+
+bool same_bits(const render::image& a, const render::image& b) {
+  return a.pixels.size() == b.pixels.size() &&
+         std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(wfpg::vec3)) == 0;
+}
+
+}  // namespace
+
+TEST_CASE("unguided pictures of a GPU have the means of the CPU's", "[renderer][cuda]") {
+  check_all_scenes(sampling_method::pt);
+}
+
+TEST_CASE("pictures of a GPU guided by kept fields have the means of the CPU's", "[renderer][cuda]") {
+  check_all_scenes(sampling_method::wfpg);
+}
+
+TEST_CASE("pictures of a GPU guided by products have the means of the CPU's", "[renderer][cuda]") {
+  check_all_scenes(sampling_method::wfpg_product);
+}
+
+TEST_CASE("pictures of a GPU guided by transient fields have the means of the CPU's", "[renderer][cuda]") {
+  for (const sampling_method method : {sampling_method::wfpg, sampling_method::wfpg_product})
+    for (const char* scene : {"cornell-enclosed", "ajar", "thin-wall", "glossy-room"}) {
+      check_as_on_cpu({scene, true, method, fields::transient, guiding::oriented});
+      check_as_on_cpu({scene, false, method, fields::transient, guiding::plain});
+    }
+}
+
+TEST_CASE("one seed gives one picture on a GPU", "[renderer][cuda]") {
+  const render::scene world = render::make_builtin_scene("cornell-enclosed");
+  for (const sampling_method method :
+       {sampling_method::pt, sampling_method::wfpg, sampling_method::wfpg_product})
+    for (const fields lifetime : {fields::kept, fields::transient}) {
+      render::render_options options;
+      options.method = method;
+      options.lifetime = lifetime;
+      options.where = device::cuda;
+      options.width = options.height = 96;
+      options.spp = 8;
+      const render::image first = render::render(world, options, {}).picture;
+      const render::image second = render::render(world, options, {}).picture;
+      INFO(rendering({"cornell-enclosed", true, method, lifetime}).name());
+      CHECK(same_bits(first, second));
+    }
+}
