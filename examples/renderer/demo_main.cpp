@@ -14,6 +14,7 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -25,9 +26,17 @@ using render::render_options;
 using render::render_result;
 using render::sampling_method;
 
-constexpr int size = 128;    // pixels along a side
 constexpr int samples = 64;  // of the compared pictures
-constexpr int shown_at = 3;  // screen pixels along a pixel of the PNGs
+
+/// Where the demonstration renders.
+struct demo_device {
+  const char* name;
+  render::device where;
+  int size;      // pixels along a side
+  int shown_at;  // screen pixels along a pixel of the PNGs
+};
+constexpr demo_device demo_devices[] = {{"cpu", render::device::cpu, 128, 3},
+                                        {"cuda", render::device::cuda, 512, 1}};
 
 struct demo_scene {
   const char* name;
@@ -57,10 +66,12 @@ struct method_result {
   image_error error;  // the reference's own noise subtracted
 };
 
-render_result render_once(const demo_scene& demo, const char* what, render_options options) {
+render_result render_once(const demo_scene& demo, const demo_device& on, const char* what,
+                          render_options options) {
   std::fprintf(stderr, "%s, %s, %d samples\n", demo.name, what, options.spp);
   options.nee = demo.nee;
-  options.width = options.height = size;
+  options.width = options.height = on.size;
+  options.where = on.where;
   render::progress_bar bar;
   render_result result = render::render(render::make_builtin_scene(demo.name), options,
                                         [&bar](const render::render_progress& p) { bar.show(p); });
@@ -74,16 +85,16 @@ struct reference {
 };
 
 // Half by path tracing and half guided, so that the reference flatters neither.
-reference make_reference(const demo_scene& demo) {
+reference make_reference(const demo_scene& demo, const demo_device& on) {
   render_options options;
   options.method = sampling_method::pt;
   options.spp = demo.reference_pt;
   options.seed = 1001;
-  const image half_a = render_once(demo, "reference, first half", options).picture;
+  const image half_a = render_once(demo, on, "reference, first half", options).picture;
   options.method = sampling_method::wfpg;
   options.spp = demo.reference_wfpg;
   options.seed = 1002;
-  const image half_b = render_once(demo, "reference, second half", options).picture;
+  const image half_b = render_once(demo, on, "reference, second half", options).picture;
   reference result{half_a, render::noise_of_halves(half_a, half_b)};
   for (std::size_t i = 0; i < result.picture.pixels.size(); ++i)
     result.picture.pixels[i] = 0.5f * (half_a.pixels[i] + half_b.pixels[i]);
@@ -98,13 +109,14 @@ image_error without_noise(image_error error, const image_error& noise) {
   return error;
 }
 
-method_result run_method(const demo_scene& demo, const demo_method& method, const reference& truth) {
+method_result run_method(const demo_scene& demo, const demo_device& on, const demo_method& method,
+                         const reference& truth) {
   render_options options;
   options.method = method.method;
   options.lifetime = method.lifetime;
   options.spp = samples;
   options.checkpoints = true;
-  method_result result{method.name, render_once(demo, method.name, options), {}};
+  method_result result{method.name, render_once(demo, on, method.name, options), {}};
   result.error = without_noise(render::compare(result.rendering.picture, truth.picture), truth.noise);
   return result;
 }
@@ -120,7 +132,7 @@ render::curve error_over_time(const method_result& result, const reference& trut
   return curve;
 }
 
-image enlarged(const image& picture) {
+image enlarged(const image& picture, int shown_at) {
   image result = render::make_image(picture.width * shown_at, picture.height * shown_at);
   for (int y = 0; y < result.height; ++y)
     for (int x = 0; x < result.width; ++x)
@@ -167,9 +179,10 @@ void print_row(const char* scene, const nlohmann::ordered_json& row) {
               row["cones_per_segment"].get<double>());
 }
 
-nlohmann::ordered_json run_scene(const demo_scene& demo, const std::filesystem::path& directory) {
+nlohmann::ordered_json run_scene(const demo_scene& demo, const demo_device& on,
+                                 const std::filesystem::path& directory) {
   const auto path = [&](const std::string& what) { return (directory / (demo.name + what)).string(); };
-  const reference truth = make_reference(demo);
+  const reference truth = make_reference(demo, on);
   render::write_exr(path("-reference.exr"), truth.picture);
   std::vector<image> strip;
   image_error pt;
@@ -177,30 +190,31 @@ nlohmann::ordered_json run_scene(const demo_scene& demo, const std::filesystem::
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   render::plot plot{demo.name, "seconds", "mean squared error after c / (1 + c)", {}};
   for (const demo_method& method : demo_methods) {
-    const method_result result = run_method(demo, method, truth);
+    const method_result result = run_method(demo, on, method, truth);
     if (method.method == sampling_method::pt) {
       pt = result.error;
       pt_seconds = seconds_of(result);
     }
     render::write_exr(path(std::string("-") + method.name + ".exr"), result.rendering.picture);
-    strip.push_back(enlarged(result.rendering.picture));
+    strip.push_back(enlarged(result.rendering.picture, on.shown_at));
     rows.push_back(row(result, pt, pt_seconds));
     plot.curves.push_back(error_over_time(result, truth));
   }
-  strip.push_back(enlarged(truth.picture));
+  strip.push_back(enlarged(truth.picture, on.shown_at));
   render::write_png(path(".png"), render::side_by_side(strip, 4), demo.exposure);
   render::write_svg(path("-error.svg"), plot);
   return {{"scene", demo.name},
           {"nee", demo.nee},
-          {"size", size},
+          {"device", on.name},
+          {"size", on.size},
           {"reference_noise_mse_reinhard", truth.noise.mse_reinhard},
           {"methods", rows}};
 }
 
-void run(const std::filesystem::path& directory) {
+void run(const std::filesystem::path& directory, const demo_device& on) {
   std::filesystem::create_directories(directory);
   nlohmann::ordered_json summary = nlohmann::ordered_json::array();
-  for (const demo_scene& demo : demo_scenes) summary.push_back(run_scene(demo, directory));
+  for (const demo_scene& demo : demo_scenes) summary.push_back(run_scene(demo, on, directory));
 
   std::printf("\n%-17s %-12s %4s  %10s %6s  %10s %6s  %8s %8s  %7s %6s  %6s  %6s\n", "scene", "method", "spp",
               "error", "ratio", "relmse", "ratio", "held MiB", "temp MiB", "seconds", "equal", "bins",
@@ -223,12 +237,15 @@ void run(const std::filesystem::path& directory) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::fprintf(stderr, "usage: wfpg-demo DIRECTORY\n");
+  const std::string name = argc == 3 ? argv[2] : "cpu";
+  const auto* const on = std::find_if(std::begin(demo_devices), std::end(demo_devices),
+                                      [&](const demo_device& device) { return name == device.name; });
+  if (argc < 2 || argc > 3 || on == std::end(demo_devices)) {
+    std::fprintf(stderr, "usage: wfpg-demo DIRECTORY [cpu|cuda]\n");
     return 2;
   }
   try {
-    run(argv[1]);
+    run(argv[1], *on);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "wfpg-demo: %s\n", error.what());
     return 2;

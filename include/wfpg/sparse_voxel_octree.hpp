@@ -87,7 +87,10 @@ class sparse_voxel_octree_view {
   /// The node on the path from a leaf to the root whose face area is nearest, in ratio, to that of a cone's
   /// base at a distance: A = r² ω (paper, Eq. 6). `solid_angle` in steradians.
   WFPG_HD node_id node_for_cone(node_id leaf, float distance, float solid_angle) const {
-    return ancestor(leaf, level_for_cone(distance, solid_angle));
+    node_id node = leaf;
+    for (std::uint32_t level = level_for_cone(distance, solid_angle); level < depth_; ++level)
+      node = parents_[node];
+    return node;
   }
   WFPG_HD std::uint32_t level_for_cone(float distance, float solid_angle) const {
     const float area = distance * distance * solid_angle;
