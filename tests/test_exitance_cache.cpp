@@ -364,7 +364,7 @@ WFPG_TEST_CASE("an octree and its cache take at most 29 bytes a node", "[exitanc
       INFO(double(bytes) / double(nodes) << " bytes a node at resolution " << resolution);
       CHECK(bytes <= 29 * nodes);
       CHECK(scene.cache.persistent_bytes() == 26 * leaves + 11 * (nodes - leaves));
-      CHECK(scene.cache.transient_bytes() < 8 * 100 + 8 * leaves + 64);
+      CHECK(scene.cache.transient_bytes() < 8 * 100 + 32 * leaves + 64);
     }
 }
 

@@ -13,8 +13,9 @@ struct record_vertex {
   wfpg::path_recorder_view recorder;
   wfpg::array_view<const room_point> points;
   std::uint32_t depth;
+  std::uint32_t percent_in_one;
   WFPG_HD void operator()(std::size_t path) const {
-    const room_point& p = points[path];
+    const room_point& p = points[path % 100 < percent_in_one ? 0 : path];
     recorder.vertex(path, depth, p.position, p.outgoing, vec3(1.0f / static_cast<float>(depth + 1)));
     recorder.radiance(
         path, depth,
@@ -22,7 +23,7 @@ struct record_vertex {
   }
 };
 
-/// 1920 x 1080 paths of four vertices; the floor reads the vertices.
+/// 1920 x 1080 paths of four vertices, of some of which one leaf has all; the floor reads the vertices.
 void depositing(benchmark::State& state) {
   const exec_policy exec;
   guide_of_room guide(exec, static_cast<std::uint32_t>(state.range(0)), std::size_t(pixels) * path_length);
@@ -32,8 +33,9 @@ void depositing(benchmark::State& state) {
     points.push_back(points_after(exec, bounces));
   const auto record = [&] {
     for (std::uint32_t depth = 0; depth < path_length; ++depth)
-      exec.for_each(pixels, record_vertex{recorder.view(),
-                                          wfpg::array_view<const room_point>(points[depth].view()), depth});
+      exec.for_each(pixels,
+                    record_vertex{recorder.view(), wfpg::array_view<const room_point>(points[depth].view()),
+                                  depth, static_cast<std::uint32_t>(state.range(1))});
   };
   compare(
       state, exec,
@@ -45,7 +47,12 @@ void depositing(benchmark::State& state) {
   state.counters["leaves"] = guide.octree.leaf_count();
 }
 
-BENCHMARK(depositing)->ArgName("resolution")->Arg(128)->Arg(256)->Apply(as_stage);
+BENCHMARK(depositing)
+    ->ArgNames({"resolution", "percent_in_one"})
+    ->Args({128, 0})
+    ->Args({256, 0})
+    ->Args({128, 10})
+    ->Apply(as_stage);
 
 }  // namespace
 }  // namespace bench

@@ -3,7 +3,7 @@
 // update() sums exactly and folds into running means, so that any order of arrival gives the same bits;
 // averages bottom-up.
 //
-// Memory: 26 bytes a leaf, 11 an inner node; while samples are in flight 8 more a leaf, and 8 a deposit of
+// Memory: 26 bytes a leaf, 11 an inner node; while samples are in flight 32 more a leaf, and 8 a deposit of
 // the queue's capacity.
 #pragma once
 
@@ -30,13 +30,15 @@ struct dropped_deposits {
 
 namespace detail {
 
-/// No deposit of a leaf's side yet.
-inline constexpr std::uint32_t no_deposit = 0xffffffffu;
-/// With a leaf's side: its first deposit since the last update.
-inline constexpr std::uint32_t oldest_deposit = 0x80000000u;
-
 /// An entry of the queue that is nobody's.
-inline constexpr std::uint64_t dropped_deposit = 0x7fffffffull;
+inline constexpr std::uint64_t dropped_deposit = 0xffffffffull;
+
+/// What a leaf's side has received since the last update.
+struct pending_deposits {
+  std::uint64_t sum = 0;  ///< in units of exact_sum, while an update is made
+  std::uint32_t count = 0;
+  std::uint32_t largest = 0;  ///< bits of the largest radiance
+};
 
 /// What a leaf has received, by side; together, since they are read together.
 struct leaf_exitance {
@@ -93,15 +95,15 @@ class exitance_cache_view {
   WFPG_HD void deposit(vec3 position, vec3 direction, float radiance) const {
     const std::uint32_t entry = reserve(1);
     write(entry, position, direction, radiance);
-    link(entry);
+    count(entry);
   }
   WFPG_HD void deposit(vec3 position, vec3 direction, vec3 rgb) const {
     deposit(position, direction, luminance(rgb));
   }
 
   /// The same for several deposits of one thread: reserve() gives the first of n entries in a row; all are
-  /// written, then all are linked. Writing first lets a processor overlap look-ups, which the atomics of
-  /// linking would put in order.
+  /// written, then all are counted. Writing first lets a processor overlap look-ups, which the atomics of
+  /// counting would put in order.
   WFPG_HD std::uint32_t reserve(std::uint32_t n) const {
     return detail::atomic_add(counters_ + counter_queued, n);
   }
@@ -122,12 +124,12 @@ class exitance_cache_view {
     }
     if (fits) queue_[entry] = word;
   }
-  WFPG_HD void link(std::uint32_t entry) const {
+  WFPG_HD void count(std::uint32_t entry) const {
     if (entry >= capacity_ || queue_[entry] == detail::dropped_deposit) return;
-    const auto key = static_cast<std::uint32_t>(queue_[entry]);
-    const std::uint32_t before = detail::atomic_exchange(newest_ + key, entry);
-    const std::uint32_t to = before == detail::no_deposit ? detail::oldest_deposit | key : before;
-    queue_[entry] = (queue_[entry] & ~0xffffffffull) | to;
+    detail::pending_deposits& pending = pending_[static_cast<std::uint32_t>(queue_[entry])];
+    const auto bits = static_cast<std::uint32_t>(queue_[entry] >> 32);
+    detail::atomic_add(&pending.count, 1);
+    if (detail::atomic_load(&pending.largest) < bits) detail::atomic_max(&pending.largest, bits);
   }
 
  private:
@@ -139,9 +141,9 @@ class exitance_cache_view {
   const std::uint16_t* normals_ = nullptr;       // a node
   const std::uint8_t* swapped_sides_ = nullptr;  // an inner node: a bit a child
   const detail::leaf_exitance* leaves_ = nullptr;
-  const float* inner_radiance_ = nullptr;  // an inner node and side; negative: no data
-  std::uint64_t* queue_ = nullptr;   // bits of the radiance above, of the same side's deposit before below
-  std::uint32_t* newest_ = nullptr;  // a leaf and side: its last deposit
+  const float* inner_radiance_ = nullptr;        // an inner node and side; negative: no data
+  std::uint64_t* queue_ = nullptr;               // bits of the radiance above, the leaf and side below
+  detail::pending_deposits* pending_ = nullptr;  // a leaf and side
   std::uint32_t* counters_ = nullptr;
   std::uint32_t capacity_ = 0;
 };
@@ -161,20 +163,20 @@ WFPG_HD inline void add_to_mean(double& mean, std::uint32_t& count, double sum, 
 class exact_sum {
  public:
   /// `largest`: the bits of the largest value; n > 0 values follow.
-  WFPG_HD exact_sum(std::uint32_t largest, std::uint32_t n) : exponent_(exponent(largest)), shift_(39) {
-    while (shift_ > 0 && 1ull << (39 - shift_) < n) --shift_;
-  }
-  WFPG_HD void add(std::uint32_t bits) {
+  WFPG_HD exact_sum(std::uint32_t largest, std::uint32_t n)
+      : exponent_(exponent(largest)), shift_(39 - bits_of(n - 1)) {}
+  /// A value in these units.
+  WFPG_HD std::uint64_t term(std::uint32_t bits) const {
     const std::uint64_t mantissa = bits >> 23 ? (bits & 0x7fffffu) | 0x800000u : bits;
     const int left = shift_ + exponent(bits) - exponent_;
-    sum_ += left >= 0 ? mantissa << left : (left > -32 ? mantissa >> -left : 0);
+    return left >= 0 ? mantissa << left : (left > -32 ? mantissa >> -left : 0);
   }
-  WFPG_HD double value() const {
+  WFPG_HD double value(std::uint64_t sum) const {
     const std::uint64_t unit = static_cast<std::uint64_t>(1023 + exponent_ - 150 - shift_)
                                << 52;  // a power of 2
     double scale;
     memcpy(&scale, &unit, sizeof scale);
-    return static_cast<double>(sum_) * scale;
+    return static_cast<double>(sum) * scale;
   }
 
  private:
@@ -182,42 +184,32 @@ class exact_sum {
 
   int exponent_;
   int shift_;
-  std::uint64_t sum_ = 0;
 };
 
-/// The first deposit of each side adds all of them to the mean.
-struct fold_deposits {
+/// Adds each deposit to its side's sum.
+struct sum_deposits {
   array_view<const std::uint64_t> queue;
-  std::uint32_t* newest;
-  leaf_exitance* leaves;
+  pending_deposits* pending;
 
   WFPG_HD void operator()(std::size_t i) const {
-    if (!(queue[i] & oldest_deposit)) return;
-    const std::uint32_t key = static_cast<std::uint32_t>(queue[i]) & ~oldest_deposit;
-    leaf_exitance& leaf = leaves[key / 2];
-    double mean = leaf.means[key % 2];  // arrive while the deposits are summed
-    std::uint32_t count = leaf.counts[key % 2];
-    std::uint32_t n = 0, largest = 0;
-    for_each_deposit(key, [&](std::uint32_t bits) {
-      ++n;
-      largest = max(largest, bits);
-    });
-    exact_sum sum(largest, n);
-    for_each_deposit(key, [&](std::uint32_t bits) { sum.add(bits); });
-    newest[key] = no_deposit;
-    add_to_mean(mean, count, sum.value(), n);
-    leaf.means[key % 2] = mean;
-    leaf.counts[key % 2] = count;
+    if (queue[i] == dropped_deposit) return;
+    pending_deposits& to = pending[static_cast<std::uint32_t>(queue[i])];
+    atomic_add(&to.sum, exact_sum(to.largest, to.count).term(static_cast<std::uint32_t>(queue[i] >> 32)));
   }
+};
 
- private:
-  template <class F>
-  WFPG_HD void for_each_deposit(std::uint32_t key, const F& f) const {
-    for (std::uint32_t entry = newest[key];;) {
-      const std::uint64_t word = queue[entry];
-      f(static_cast<std::uint32_t>(word >> 32));
-      entry = static_cast<std::uint32_t>(word);
-      if (entry & oldest_deposit) return;
+/// Adds the sums of a leaf's sides to its means.
+struct fold_deposits {
+  pending_deposits* pending;
+  leaf_exitance* leaves;
+
+  WFPG_HD void operator()(std::size_t leaf) const {
+    for (std::uint32_t side = 0; side < 2; ++side) {
+      pending_deposits& from = pending[2 * leaf + side];
+      if (from.count == 0) continue;
+      const double sum = exact_sum(from.largest, from.count).value(from.sum);
+      add_to_mean(leaves[leaf].means[side], leaves[leaf].counts[side], sum, from.count);
+      from = {};
     }
   }
 };
@@ -259,7 +251,7 @@ class exitance_cache {
         leaves_(exec, tree.leaf_count()),
         inner_radiance_(exec, 2 * std::size_t(tree.node_count() - tree.leaf_count())),
         queue_(exec, checked(queue_capacity)),
-        newest_(exec, 2 * std::size_t(tree.leaf_count())),
+        pending_(exec, 2 * std::size_t(tree.leaf_count())),
         counters_(exec, exitance_cache_view::counters) {
     view_.tree_ = tree.view();
     view_.normals_ = normals_.data();
@@ -267,7 +259,7 @@ class exitance_cache {
     view_.inner_radiance_ = inner_radiance_.data();
     view_.swapped_sides_ = swapped_sides_.data();
     view_.queue_ = queue_.data();
-    view_.newest_ = newest_.data();
+    view_.pending_ = pending_.data();
     view_.counters_ = counters_.data();
     view_.capacity_ = static_cast<std::uint32_t>(queue_capacity);
     detail::build_voxel_normals(exec, tree, fragments, normals_.view(), swapped_sides_.view());
@@ -279,21 +271,23 @@ class exitance_cache {
   std::size_t persistent_bytes() const {
     return normals_.bytes() + swapped_sides_.bytes() + leaves_.bytes() + inner_radiance_.bytes();
   }
-  std::size_t transient_bytes() const { return queue_.bytes() + newest_.bytes() + counters_.bytes(); }
+  std::size_t transient_bytes() const { return queue_.bytes() + pending_.bytes() + counters_.bytes(); }
 
   /// Forgets all light, and what is queued.
   void clear(const Exec& exec) {
     exec.fill_bytes(leaves_.data(), 0, leaves_.bytes());  // means and counts of zero
     ::thrust::fill_n(exec.thrust(), inner_radiance_.data(), inner_radiance_.size(), -1.0f);
-    ::thrust::fill_n(exec.thrust(), newest_.data(), newest_.size(), detail::no_deposit);
+    exec.fill_bytes(pending_.data(), 0, pending_.bytes());
     ::thrust::fill_n(exec.thrust(), counters_.data() + exitance_cache_view::counter_queued, 1, 0u);
   }
 
-  /// Folds queued deposits into the leaves and averages bottom-up. O(deposits + nodes).
+  /// Folds queued deposits into the leaves and averages bottom-up. O(deposits + nodes), however many deposits
+  /// one leaf has.
   void update(const Exec& exec) {
     const std::uint32_t* const queued = counters_.data() + exitance_cache_view::counter_queued;
     exec.for_each(exec::device_count{queued, queue_.size()},
-                  detail::fold_deposits{queue_.view(), newest_.data(), leaves_.data()});
+                  detail::sum_deposits{queue_.view(), pending_.data()});
+    exec.for_each(leaves_.size(), detail::fold_deposits{pending_.data(), leaves_.data()});
     detail::for_each_bottom_up(exec, view_.tree_, 0, detail::average_children{view_, inner_radiance_.data()});
     ::thrust::fill_n(exec.thrust(), counters_.data() + exitance_cache_view::counter_queued, 1, 0u);
   }
@@ -308,12 +302,11 @@ class exitance_cache {
  private:
   // Before memory is asked for.
   static std::size_t checked(std::size_t queue_capacity) {
-    detail::require(queue_capacity <= detail::oldest_deposit, "deposit queue capacity", queue_capacity,
-                    "at most 2^31");
+    detail::require(queue_capacity <= (1u << 31), "deposit queue capacity", queue_capacity, "at most 2^31");
     return queue_capacity;
   }
   static std::uint32_t checked_leaves(std::uint32_t leaves) {
-    detail::require(leaves < detail::oldest_deposit / 2, "number of leaves", leaves, "less than 2^30");
+    detail::require(leaves < (1u << 30), "number of leaves", leaves, "less than 2^30");
     return leaves;
   }
 
@@ -322,7 +315,7 @@ class exitance_cache {
   buffer<detail::leaf_exitance, Exec> leaves_;
   buffer<float, Exec> inner_radiance_;
   buffer<std::uint64_t, Exec> queue_;
-  buffer<std::uint32_t, Exec> newest_;
+  buffer<detail::pending_deposits, Exec> pending_;
   buffer<std::uint32_t, Exec> counters_;
   exitance_cache_view view_;
 };

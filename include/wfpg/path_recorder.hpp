@@ -91,7 +91,7 @@ struct deposit_paths {
       const vec3 outgoing = unpack_direction(paths.outgoing_[slot]);
       cache.write(first + depth, paths.positions_[slot], outgoing, luminance(leaving));
     }
-    for (std::uint32_t depth = 0; depth < length; ++depth) cache.link(first + depth);
+    for (std::uint32_t depth = 0; depth < length; ++depth) cache.count(first + depth);
   }
 
  private:

@@ -17,6 +17,14 @@ WFPG_HD inline std::uint32_t atomic_add(std::uint32_t* target, std::uint32_t val
 #endif
 }
 
+WFPG_HD inline std::uint64_t atomic_add(std::uint64_t* target, std::uint64_t value) {
+#if defined(__CUDA_ARCH__)
+  return atomicAdd(reinterpret_cast<unsigned long long*>(target), static_cast<unsigned long long>(value));
+#else
+  return __atomic_fetch_add(target, value, __ATOMIC_RELAXED);
+#endif
+}
+
 /// *target as it is at some moment.
 template <class T>
 WFPG_HD T atomic_load(const T* target) {
@@ -33,15 +41,6 @@ WFPG_HD inline void atomic_store(std::uint32_t* target, std::uint32_t value) {
   *static_cast<volatile std::uint32_t*>(target) = value;
 #else
   __atomic_store_n(target, value, __ATOMIC_RELAXED);
-#endif
-}
-
-/// *target = value; returns the value before.
-WFPG_HD inline std::uint32_t atomic_exchange(std::uint32_t* target, std::uint32_t value) {
-#if defined(__CUDA_ARCH__)
-  return atomicExch(target, value);
-#else
-  return __atomic_exchange_n(target, value, __ATOMIC_RELAXED);
 #endif
 }
 
@@ -65,6 +64,18 @@ WFPG_HD void atomic_min(T* target, T value) {
 #else
   T before = atomic_load(target);
   while (value < before &&
+         !__atomic_compare_exchange_n(target, &before, value, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
+  }
+#endif
+}
+
+/// *target = the greater of itself and value.
+WFPG_HD inline void atomic_max(std::uint32_t* target, std::uint32_t value) {
+#if defined(__CUDA_ARCH__)
+  atomicMax(target, value);
+#else
+  std::uint32_t before = atomic_load(target);
+  while (value > before &&
          !__atomic_compare_exchange_n(target, &before, value, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
   }
 #endif
