@@ -152,12 +152,12 @@ void build(benchmark::State& state) {
 
 void sizes(benchmark::internal::Benchmark* b) {
   for (const int thousands : {100, 1000, 0})
-    for (const int leaf : {1, 2, 3, 4}) b->Args({thousands, leaf});
+    for (const int leaf : {1, 4}) b->Args({thousands, leaf});
 }
 
 BENCHMARK_TEMPLATE(cast, cone_of_bin)->Apply(sizes)->Unit(benchmark::kMillisecond)->UseManualTime();
 BENCHMARK_TEMPLATE(cast, any_ray)->Apply(sizes)->Unit(benchmark::kMillisecond)->UseManualTime();
-BENCHMARK(build)->Args({100, 3})->Args({1000, 3})->Unit(benchmark::kMillisecond)->UseManualTime();
+BENCHMARK(build)->Args({100, 1})->Args({1000, 1})->Unit(benchmark::kMillisecond)->UseManualTime();
 
 }  // namespace
 
