@@ -58,7 +58,10 @@ struct bvh_mesh {
     const vec3 a = mesh.positions[corners.x], b = mesh.positions[corners.y], c = mesh.positions[corners.z];
     if (!wfpg::detail::is_usable(a) || !wfpg::detail::is_usable(b) || !wfpg::detail::is_usable(c))
       return false;
-    return glm::cross(b - a, c - a) != vec3(0.0f);
+    const vec3 u = b - a, v = c - a;
+    return difference_of_products(u.y, v.z, u.z, v.y) != 0.0f ||
+           difference_of_products(u.z, v.x, u.x, v.z) != 0.0f ||
+           difference_of_products(u.x, v.y, u.y, v.x) != 0.0f;
   }
   WFPG_HD bounds3 box(std::size_t triangle) const {
     return box_around(corner(triangle, 0), corner(triangle, 1), corner(triangle, 2));
