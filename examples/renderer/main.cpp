@@ -55,10 +55,13 @@ void add_method_options(CLI::App& app, render::render_options& options) {
   add_choice<fields>(app, "--fields", options.lifetime,
                      {{"kept", fields::kept}, {"transient", fields::transient}},
                      "kept across depths and samples (default), or made anew each time");
-  add_choice<device>(
-      app, "--device", options.where,
-      {{"cpu", device::cpu}, {"omp", device::omp}, {"seq", device::seq}, {"cuda", device::cuda}},
-      "TBB (default), OpenMP, one thread, or a GPU");
+  add_choice<device>(app, "--device", options.where,
+                     {{"cpu", device::cpu},
+                      {"omp", device::omp},
+                      {"seq", device::seq},
+                      {"cuda", device::cuda},
+                      {"optix", device::optix}},
+                     "TBB (default), OpenMP, one thread, or a GPU");
   add_choice<bool>(app, "--nee", options.nee, {{"on", true}, {"off", false}},
                    "next-event estimation toward area lights (default: on)");
   add_choice<combine>(app, "--combine", options.combine,

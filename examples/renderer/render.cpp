@@ -51,6 +51,8 @@ render_result render_completed(const scene& scene, const render_options& options
       return render_on<embree_scene>(wfpg::exec::seq(), scene, options, progress);
     case device::cuda:
       return render_on_cuda(scene, options, progress);
+    case device::optix:
+      return render_on_optix(scene, options, progress);
     default:
       return render_on<embree_scene>(wfpg::exec::tbb(), scene, options, progress);
   }
@@ -64,10 +66,11 @@ render_result render(const scene& scene, const render_options& options, const pr
   result.report.method = options.method == sampling_method::pt     ? "pt"
                          : options.method == sampling_method::wfpg ? "wfpg"
                                                                    : "wfpg-product";
-  result.report.device = options.where == device::cpu   ? "cpu"
-                         : options.where == device::omp ? "omp"
-                         : options.where == device::seq ? "seq"
-                                                        : "cuda";
+  result.report.device = options.where == device::cpu    ? "cpu"
+                         : options.where == device::omp  ? "omp"
+                         : options.where == device::seq  ? "seq"
+                         : options.where == device::cuda ? "cuda"
+                                                         : "optix";
   return result;
 }
 

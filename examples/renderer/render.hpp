@@ -18,7 +18,7 @@ namespace render {
 enum class sampling_method { pt, wfpg, wfpg_product };
 enum class guiding { oriented, plain };
 enum class fields { kept, transient };
-enum class device { cpu, omp, seq, cuda };  ///< TBB, OpenMP, one thread, a GPU
+enum class device { cpu, omp, seq, cuda, optix };  ///< TBB, OpenMP, one thread, a GPU, and with OptiX
 
 struct render_options {
   sampling_method method = sampling_method::wfpg;
@@ -123,8 +123,11 @@ template <class Accelerated, class Exec>
 render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
                         const progress_callback& progress);
 
-/// The same on a GPU, which throws std::runtime_error where there is none.
+/// The same on a GPU, with rays cast by the renderer's own hierarchy or by OptiX. Throws std::runtime_error
+/// where there is none, or where this was built without.
 render_result render_on_cuda(const scene& scene, const render_options& options,
                              const progress_callback& progress);
+render_result render_on_optix(const scene& scene, const render_options& options,
+                              const progress_callback& progress);
 
 }  // namespace render

@@ -29,6 +29,8 @@ enum class material_kind : std::uint32_t {
   dielectric,        ///< smooth, reflects and refracts, what it refracts times base_color
   rough_dielectric,  ///< the same of GGX facets
 };
+/// Bits of a key that is a material's kind: all are below 2^bits - 1.
+inline constexpr int material_key_bits = 4;
 
 /// How a surface scatters and emits.
 struct material {

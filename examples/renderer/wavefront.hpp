@@ -127,7 +127,8 @@ class path_tracer {
 
   path_queue sort_by_material() {
     path_queue queue;
-    clock_.measure("sort", [&] { queue.by_material = partitioner_.partition(exec_, keys_.view()); });
+    clock_.measure(
+        "sort", [&] { queue.by_material = partitioner_.partition(exec_, keys_.view(), material_key_bits); });
     return queue;
   }
 

@@ -15,6 +15,22 @@
 
 namespace wfpg {
 
+namespace detail {
+
+/// Where a path's vertex is, in one store of a thread.
+struct alignas(16) recorded_place {
+  vec3 position;
+  std::uint32_t outgoing;  // pack_direction
+};
+
+/// What the path carries there, and what it brought to its origin from there.
+struct alignas(8) recorded_light {
+  vec3 throughput;
+  vec3 contribution;
+};
+
+}  // namespace detail
+
 /// What a kernel sees of the recorder. Calls for one path come from one thread at a time, vertices in order
 /// of depth. A path or depth beyond the capacity, a vertex that was not recorded, or a direction that is not
 /// finite is dropped and counted.
@@ -31,10 +47,8 @@ class path_recorder_view {
     if (path >= paths_ || depth >= max_depth_ || depth != lengths_[path]) return drop();
     if (!detail::is_finite(outgoing)) return drop();
     const std::size_t slot = depth * paths_ + path;
-    positions_[slot] = position;
-    outgoing_[slot] = pack_direction(outgoing);
-    throughputs_[slot] = throughput;
-    contributions_[slot] = vec3(0.0f);
+    places_[slot] = {position, pack_direction(outgoing)};
+    light_[slot] = {throughput, vec3(0.0f)};
     lengths_[path] = depth + 1;
   }
 
@@ -42,7 +56,7 @@ class path_recorder_view {
   /// and MIS weight included, linear RGB. Next-event estimation reports with this.
   WFPG_HD void radiance(std::size_t path, std::uint32_t depth, vec3 contribution) const {
     if (path >= paths_ || depth >= lengths_[path]) return drop();
-    contributions_[depth * paths_ + path] += contribution;
+    light_[depth * paths_ + path].contribution += contribution;
   }
 
   /// Radiance of an emitter that the path hit as vertex `depth`, or of the environment that it left for after
@@ -66,11 +80,9 @@ class path_recorder_view {
   std::size_t paths_ = 0;
   std::uint32_t max_depth_ = 0;
   bool include_emission_ = true;
-  std::uint32_t* lengths_ = nullptr;  // a path: vertices recorded
-  vec3* positions_ = nullptr;         // a vertex, all paths of a depth together
-  std::uint32_t* outgoing_ = nullptr;
-  vec3* throughputs_ = nullptr;
-  vec3* contributions_ = nullptr;
+  std::uint32_t* lengths_ = nullptr;          // a path: vertices recorded
+  detail::recorded_place* places_ = nullptr;  // a vertex, all paths of a depth together
+  detail::recorded_light* light_ = nullptr;
   std::uint32_t* dropped_ = nullptr;
 };
 
@@ -85,11 +97,12 @@ struct deposit_paths {
     vec3 arriving(0.0f);
     for (std::uint32_t depth = length; depth-- > 0;) {
       const std::size_t slot = depth * paths.paths_ + path;
-      arriving += paths.contributions_[slot];
-      const vec3 t = paths.throughputs_[slot];
+      const detail::recorded_light light = paths.light_[slot];
+      arriving += light.contribution;
+      const vec3 t = light.throughput;
       const vec3 leaving{divided(arriving.x, t.x), divided(arriving.y, t.y), divided(arriving.z, t.z)};
-      const vec3 outgoing = unpack_direction(paths.outgoing_[slot]);
-      cache.write(first + depth, paths.positions_[slot], outgoing, luminance(leaving));
+      const detail::recorded_place place = paths.places_[slot];
+      cache.write(first + depth, place.position, unpack_direction(place.outgoing), luminance(leaving));
     }
     for (std::uint32_t depth = 0; depth < length; ++depth) cache.count(first + depth);
   }
@@ -112,29 +125,22 @@ class path_recorder {
   /// next-event estimation does that. Throws out_of_memory.
   path_recorder(const Exec& exec, std::size_t paths, std::uint32_t max_depth, bool include_emission)
       : lengths_(exec, paths),
-        positions_(exec, paths * max_depth),
-        outgoing_(exec, paths * max_depth),
-        throughputs_(exec, paths * max_depth),
-        contributions_(exec, paths * max_depth),
+        places_(exec, paths * max_depth),
+        light_(exec, paths * max_depth),
         dropped_(exec, 1) {
     view_.paths_ = paths;
     view_.max_depth_ = max_depth;
     view_.include_emission_ = include_emission;
     view_.lengths_ = lengths_.data();
-    view_.positions_ = positions_.data();
-    view_.outgoing_ = outgoing_.data();
-    view_.throughputs_ = throughputs_.data();
-    view_.contributions_ = contributions_.data();
+    view_.places_ = places_.data();
+    view_.light_ = light_.data();
     view_.dropped_ = dropped_.data();
     ::thrust::fill_n(exec.thrust(), dropped_.data(), 1, 0u);
     clear(exec);
   }
 
   path_recorder_view view() const { return view_; }
-  std::size_t bytes() const {
-    return lengths_.bytes() + positions_.bytes() + outgoing_.bytes() + throughputs_.bytes() +
-           contributions_.bytes() + dropped_.bytes();
-  }
+  std::size_t bytes() const { return lengths_.bytes() + places_.bytes() + light_.bytes() + dropped_.bytes(); }
 
   /// Forgets all paths.
   void clear(const Exec& exec) { ::thrust::fill_n(exec.thrust(), lengths_.data(), lengths_.size(), 0u); }
@@ -150,10 +156,8 @@ class path_recorder {
 
  private:
   buffer<std::uint32_t, Exec> lengths_;
-  buffer<vec3, Exec> positions_;
-  buffer<std::uint32_t, Exec> outgoing_;
-  buffer<vec3, Exec> throughputs_;
-  buffer<vec3, Exec> contributions_;
+  buffer<detail::recorded_place, Exec> places_;
+  buffer<detail::recorded_light, Exec> light_;
   buffer<std::uint32_t, Exec> dropped_;
   path_recorder_view view_;
 };
