@@ -120,7 +120,8 @@ class field_filter {
       const float* const beyond =
           y < first_row ? aside + (y - first_row + radius) * size_ : aside + (y - end + radius) * size_;
       return warp.map([&](int lane) {
-        const int x = min(first_column + lane, last_column);
+        const int x = first_column + lane;
+        if (x > last_column) return 0.0f;  // nobody's: the last column's lane may have changed it by now
         return y >= first_row && y < end ? cells_.get(y * size_ + x) : beyond[x];
       });
     };
