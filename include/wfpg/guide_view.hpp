@@ -1,6 +1,7 @@
 // The fields of one depth of a wave, as the renderer's own kernels see them: for renderers whose BSDFs exist
 // only inside their material kernels. Made by path_guider::prepare, from kept fields or from transient ones
-// that were made resident; the fused form draws the same directions from the same random numbers.
+// that were made resident; the fused form draws the same directions from the same random numbers, but for
+// rounding where a compiler contracts the arithmetic of two kernels differently, as nvcc does.
 #pragma once
 
 #include <wfpg/mis.hpp>

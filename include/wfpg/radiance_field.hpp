@@ -4,8 +4,8 @@
 // scratch while their bin's rays are served, or in memory that the caller gives; the work on cells does not
 // know which.
 //
-// Cost: F² cones and O(F²) a bin; 4 F² bytes of scratch a block, and the more of a few rows for the filter
-// and 2 KiB a warp for products: at 128² and 16 warps less than the 99 KiB that small devices have.
+// Cost: F² cones and O(F²) a bin; 4 F² bytes of scratch a block and a few rows for the filter: at 128² and 16
+// warps 81 KiB, which small devices have and large ones twice.
 #pragma once
 
 #include <wfpg/bsdf.hpp>

@@ -4,7 +4,7 @@
 // exitance_cache.hpp's.
 //
 // Memory: 4 bytes a leaf, 9 an inner node, and at most one a node where descents begin. Build: a sort of the
-// fragments and O(nodes).
+// fragments and O(leaves · depth), with 4 bytes for each of those.
 #pragma once
 
 #include <wfpg/buffer.hpp>

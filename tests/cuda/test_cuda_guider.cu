@@ -1,6 +1,7 @@
 // The guider on the CUDA policy: its integer stages against the serial policy's, its directions but for
 // rounding, and one seed twice.
 #include "cuda/walls.hpp"
+#include "support/guiding.hpp"
 #include "support/scenes.hpp"
 
 #include <wfpg/exec/cuda.hpp>
@@ -10,6 +11,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <string>
 #include <vector>
 
 using namespace wfpg_test;
@@ -99,5 +101,17 @@ TEST_CASE("the CUDA policy tells of errors", "[cuda]") {
   CHECK_THROWS_AS((wfpg::buffer<char, cuda_policy>(exec, std::size_t(1) << 50)), wfpg::out_of_memory);
   const wfpg::buffer<std::uint32_t, cuda_policy> works_after(exec, std::vector<std::uint32_t>{1, 2, 3});
   CHECK((works_after.to_host(exec) == std::vector<std::uint32_t>{1, 2, 3}));
-  CHECK_THROWS_AS(exec.for_each_block(std::size_t(1), std::size_t(1) << 20, do_nothing{}), wfpg::cuda_error);
+  const std::string refused = refusal([&] { exec.for_each_block(1, std::size_t(1) << 20, do_nothing{}); });
+  INFO(refused);
+  CHECK(refused.find("is 1048576, expected at most ") != std::string::npos);
+}
+
+TEST_CASE("fields of 128 x 128 fit the shared memory of small devices, and twice that of large ones",
+          "[cuda]") {
+  constexpr std::size_t small = 99 * 1024, large = 228 * 1024;  // of compute capabilities 8.6 and 9.0
+  constexpr std::size_t reserved = 1024;                        // of each block
+  const std::size_t bytes = sizeof(std::uint32_t) * 128 * 128 + 16 +
+                            wfpg::detail::field_scratch_bytes(128, cuda_policy::warps_per_block) + reserved;
+  CHECK(bytes <= small);
+  CHECK(2 * bytes <= large);
 }

@@ -213,11 +213,27 @@ class cuda {
     void (*const kernel)(Count, std::size_t, F) = wfpg::detail::for_each_block_kernel<block, Count, F>;
     constexpr std::size_t without_asking = 32 * 1024;  // of 48 KiB, in which static arrays lie too
     if (scratch_bytes > without_asking)
-      wfpg::detail::check_cuda(
-          cudaFuncSetAttribute(reinterpret_cast<const void*>(kernel),
-                               cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(scratch_bytes)),
-          "cudaFuncSetAttribute for shared memory");
+      allow_shared_memory(reinterpret_cast<const void*>(kernel), scratch_bytes);
     launch(kernel, at_most_resident(most), scratch_bytes, n, scratch_bytes, f);
+  }
+
+  /// Asks for more shared memory than a kernel has without. Throws std::invalid_argument where the device has
+  /// less.
+  static void allow_shared_memory(const void* kernel, std::size_t bytes) {
+    using wfpg::detail::check_cuda;
+    int device = 0, most = 0;
+    cudaFuncAttributes attributes{};
+    check_cuda(cudaGetDevice(&device), "cudaGetDevice");
+    check_cuda(cudaDeviceGetAttribute(&most, cudaDevAttrMaxSharedMemoryPerBlockOptin, device),
+               "cudaDeviceGetAttribute");
+    check_cuda(cudaFuncGetAttributes(&attributes, kernel), "cudaFuncGetAttributes");
+    const std::size_t left = static_cast<std::size_t>(most) - attributes.sharedSizeBytes;
+    wfpg::detail::require(
+        bytes <= left, "shared memory of a block, bytes,", bytes,
+        ("at most " + std::to_string(left) + " on this device: lower the fields' resolution").c_str());
+    check_cuda(
+        cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes)),
+        "cudaFuncSetAttribute for shared memory");
   }
 
   template <class... Parameters, class... Arguments>
