@@ -226,11 +226,12 @@ WFPG_HD grid_distribution build_distribution(const Block& block, const cell_word
   block.sync();
   constexpr int width = Block::warp::width;
   block.for_each_warp((resolution + width - 1) / width, [&](const auto& warp, int strip) {
+    const int first = strip * width, columns = min(width, resolution - first);
     auto sums = warp.map([](int) { return 0u; });
     for (int y = 0; y < resolution; ++y)
-      warp.for_each_lane([&](int lane) {
-        const int x = strip * width + lane;
-        if (x < resolution) cells.words[y * resolution + x] = sums[lane] += cells.words[y * resolution + x];
+      warp.for_each(columns, [&](int lane) {
+        std::uint32_t& cell = cells.words[y * resolution + first + lane];
+        cell = sums[lane] += cell;
       });
   });
   block.sync();

@@ -115,23 +115,26 @@ class field_filter {
 
   template <class Warp>
   WFPG_HD void filter_segment(const Warp& warp, int first_column, int first_row, const float* aside) const {
-    const int end = min(first_row + segment, size_), last_column = size_ - 1;
-    const auto row = [&](int y) {
+    const int end = min(first_row + segment, size_), columns = min(Warp::width, size_ - first_column);
+    const auto read = [&](auto& row, int y) {
+      const bool is_own = y >= first_row && y < end;
       const float* const beyond =
           y < first_row ? aside + (y - first_row + radius) * size_ : aside + (y - end + radius) * size_;
-      return warp.map([&](int lane) {
+      warp.for_each(columns, [&](int lane) {
         const int x = first_column + lane;
-        if (x > last_column) return 0.0f;  // nobody's: the last column's lane may have changed it by now
-        return y >= first_row && y < end ? cells_.get(y * size_ + x) : beyond[x];
+        row[lane] = is_own ? cells_.get(y * size_ + x) : beyond[x];
       });
     };
-    auto a = row(first_row - 2), b = row(first_row - 1), middle = row(first_row), c = row(first_row + 1);
+    auto a = warp.map([](int) { return 0.0f; });
+    auto b = a, middle = a, c = a, d = a;
+    read(a, first_row - 2);
+    read(b, first_row - 1);
+    read(middle, first_row);
+    read(c, first_row + 1);
     for (int y = first_row; y < end; ++y) {
-      const auto d = row(y + 2);
-      warp.for_each_lane([&](int lane) {
-        const int x = first_column + lane;
-        if (x <= last_column)
-          cells_.set(y * size_ + x, taps_(a[lane], b[lane], middle[lane], c[lane], d[lane]));
+      read(d, y + 2);
+      warp.for_each(columns, [&](int lane) {
+        cells_.set(y * size_ + first_column + lane, taps_(a[lane], b[lane], middle[lane], c[lane], d[lane]));
       });
       a = b;
       b = middle;
