@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Prints the results of bench_cuda, a JSON file, as the table of docs/performance.md.
+"""Prints results of the GPU as a table of docs/performance.md.
 
-usage: bench/table.py bench/results/cuda-stages.json
+usage: bench/table.py bench/results/cuda-stages.json | bench/results/cuda-equal-time.json
 """
 import json
 import sys
@@ -18,15 +18,39 @@ FLOORS = {
     "depositing": "reading the vertices",
     "casting": "OptiX, the same rays",
 }
+STAGES = ("trace", "sort", "lights", "directions", "shade", "update")
+
+
+def print_stages(benchmarks):
+    print("| stage | floor | floor, ms | measured, ms | ratio |")
+    print("| --- | --- | --- | --- | --- |")
+    for b in benchmarks:
+        stage, *arguments = b["name"].split("/iterations")[0].split("/")
+        name = f"`{stage}` {', '.join(a.replace(':', ' ') for a in arguments)}".strip()
+        print(f"| {name} | {FLOORS[stage]} | {b['floor_ms']:.3g} | {b['median_ms']:.3g} | {b['ratio']:.2f} |")
+
+
+def print_equal_time(scenes):
+    print("| scene | method | samples | MSE after c / (1 + c) | pt's over it | relative MSE, trimmed | pt's over it |", end="")
+    print(" million segments | ms a sample |", " | ".join(STAGES), "| MiB kept | MiB in flight |")
+    print("| --- " * (11 + len(STAGES)) + "|")
+    for scene in scenes:
+        for name, m in scene["methods"].items():
+            ms = m["milliseconds_a_sample"]
+            stages = " | ".join(f"{ms.get(stage, 0.0):.2f}" for stage in STAGES)
+            print(
+                f"| {scene['scene']} | {name} | {m['spp']} | {m['mse_reinhard']:.2e} | {m['ratios']['mse_reinhard']:.2f} "
+                f"| {m['relmse_trimmed']:.2e} | {m['ratios']['relmse_trimmed']:.2f} | {m['segments_a_sample'] * 1e-6:.2f} "
+                f"| {ms['total']:.2f} | {stages} | {m['persistent_bytes'] / 2**20:.1f} | {m['transient_bytes'] / 2**20:.0f} |"
+            )
 
 
 def main(path):
-    print("| stage | floor | floor, ms | measured, ms | ratio |")
-    print("| --- | --- | --- | --- | --- |")
-    for b in json.load(open(path))["benchmarks"]:
-        stage, *arguments = b["name"].split("/iterations")[0].split("/")
-        name = f"`{stage}` {' '.join(a.replace(':', ' ') for a in arguments)}".strip()
-        print(f"| {name} | {FLOORS[stage]} | {b['floor_ms']:.3g} | {b['median_ms']:.3g} | {b['ratio']:.2f} |")
+    results = json.load(open(path))
+    if "benchmarks" in results:
+        print_stages(results["benchmarks"])
+    else:
+        print_equal_time(results["scenes"])
 
 
 if __name__ == "__main__":

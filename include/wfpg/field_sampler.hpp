@@ -229,7 +229,7 @@ WFPG_HD grid_distribution build_distribution(const Block& block, const cell_word
     const int first = strip * width, columns = min(width, resolution - first);
     auto sums = warp.map([](int) { return 0u; });
     for (int y = 0; y < resolution; ++y)
-      warp.for_each(columns, [&](int lane) {
+      warp.for_lanes_below(columns, [&](int lane) {
         std::uint32_t& cell = cells.words[y * resolution + first + lane];
         cell = sums[lane] += cell;
       });

@@ -35,6 +35,10 @@ class cuda_warp {
     f(lane());
   }
   template <class F>
+  __device__ void for_lanes_below(int n, F f) const {
+    if (lane() < n) f(lane());
+  }
+  template <class F>
   __device__ void for_each(int n, F f) const {
     for (int i = lane(); i < n; i += width) f(i);
   }

@@ -120,7 +120,7 @@ class field_filter {
       const bool is_own = y >= first_row && y < end;
       const float* const beyond =
           y < first_row ? aside + (y - first_row + radius) * size_ : aside + (y - end + radius) * size_;
-      warp.for_each(columns, [&](int lane) {
+      warp.for_lanes_below(columns, [&](int lane) {
         const int x = first_column + lane;
         row[lane] = is_own ? cells_.get(y * size_ + x) : beyond[x];
       });
@@ -133,7 +133,7 @@ class field_filter {
     read(c, first_row + 1);
     for (int y = first_row; y < end; ++y) {
       read(d, y + 2);
-      warp.for_each(columns, [&](int lane) {
+      warp.for_lanes_below(columns, [&](int lane) {
         cells_.set(y * size_ + first_column + lane, taps_(a[lane], b[lane], middle[lane], c[lane], d[lane]));
       });
       a = b;

@@ -46,6 +46,12 @@ class emulated_warp {
     for (int lane = 0; lane < W; ++lane) f(lane);
   }
 
+  /// f(lane) for the lanes below n, n <= W.
+  template <class F>
+  WFPG_HD void for_lanes_below(int n, F f) const {
+    for (int lane = 0; lane < n; ++lane) f(lane);
+  }
+
   /// f(i) for i in [0, n), lane i mod W each. f may call the host's code, which nobody asked to vectorise.
   template <class F>
   WFPG_HD void for_each(int n, F f) const {
