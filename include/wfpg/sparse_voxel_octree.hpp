@@ -93,11 +93,12 @@ class sparse_voxel_octree_view {
     return node;
   }
   WFPG_HD std::uint32_t level_for_cone(float distance, float solid_angle) const {
-    const float area = distance * distance * solid_angle;
-    std::uint32_t level = depth_;
-    float face = grid_.voxel_size() * grid_.voxel_size();
-    for (; level > 0 && area > 2.0f * face; --level) face *= 4.0f;  // 2: halfway to 4, in ratio
-    return level;
+    const float face = grid_.voxel_size() * grid_.voxel_size();
+    const float ratio = distance * distance * solid_angle * (0.5f / face);  // 2: halfway to 4, in ratio
+    if (!(ratio > 1.0f)) return depth_;
+    // A level up for each power of 4 below the ratio, by its exponent.
+    const std::uint32_t exponent = ((detail::float_bits(ratio) - 1u) >> 23) - 127u;
+    return depth_ - detail::min(exponent / 2 + 1, depth_);
   }
 
   /// Voxel coordinates of a node at its own level. O(level).
