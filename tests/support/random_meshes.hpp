@@ -17,7 +17,7 @@ struct test_mesh {
 
   void add(wfpg::vec3 a, wfpg::vec3 b, wfpg::vec3 c) {
     const auto first = static_cast<std::uint32_t>(positions.size());
-    positions.insert(positions.end(), {a, b, c});
+    for (const wfpg::vec3 corner : {a, b, c}) positions.push_back(corner);
     triangles.push_back({first, first + 1, first + 2});
   }
   /// Two triangles; the corners are a, a + u, a + u + v, a + v, and the normal is along u x v.
