@@ -145,10 +145,10 @@ class field_filter {
 
   /// The cell at (x, y), y at most `radius` rows off the square.
   WFPG_HD float at(int x, int y) const {
-    if (y < 0 || y >= size_) {
+    if (!hemisphere_)
+      wrap_octahedral(x, y, size_);
+    else if (y < 0 || y >= size_)
       y = y < 0 ? -1 - y : 2 * size_ - 1 - y;
-      x = hemisphere_ ? x : size_ - 1 - x;
-    }
     return cells_.get(y * size_ + x);
   }
 

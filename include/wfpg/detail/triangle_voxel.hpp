@@ -112,6 +112,12 @@ struct bounding_plane {
   }
 };
 
+/// The axis along which a vector is longest.
+WFPG_HD inline int largest_axis(vec3 v) {
+  const float x = fabsf(v.x), y = fabsf(v.y), z = fabsf(v.z);
+  return x > y ? (x > z ? 0 : 2) : (y > z ? 1 : 2);
+}
+
 /// The area of a triangle, relative to a voxel's centre, inside the voxel; in square voxels. Of its
 /// projection along the dominant axis: the triangle is cut to the voxel's height, and what is left to its
 /// square.
@@ -119,9 +125,8 @@ WFPG_HD inline float area_inside(const grid_triangle& t) {
   const vec3 n = glm::cross(t.b - t.a, t.c - t.a);
   const vec3 farthest = glm::max(glm::abs(t.a), glm::max(glm::abs(t.b), glm::abs(t.c)));
   if (max(farthest.x, max(farthest.y, farthest.z)) <= 0.5f) return 0.5f * glm::length(n);
-  const vec3 size = glm::abs(n);
-  const int w = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
-  if (!(size[w] > 0.0f)) return 0.0f;
+  const int w = largest_axis(n);
+  if (!(fabsf(n[w]) > 0.0f)) return 0.0f;
   const auto turned = [w](vec3 v) { return w == 0 ? vec3(v.y, v.z, v.x) : w == 1 ? vec3(v.z, v.x, v.y) : v; };
   const vec3 corners[3] = {turned(t.a), turned(t.b), turned(t.c)};
   area_in_square area{clamp(corners[0].y, -0.5f, 0.5f)};
@@ -137,7 +142,7 @@ WFPG_HD inline float area_inside(const grid_triangle& t) {
   }
   if (upper.crossed) area.edge(upper.leave, upper.enter);
   if (lower.crossed) area.edge(lower.leave, lower.enter);
-  return fabsf(area.sum) * glm::length(n) / size[w];
+  return fabsf(area.sum) * glm::length(n) / fabsf(n[w]);
 }
 
 /// The unit normal of the counter-clockwise side, or zero where the triangle has no area.
@@ -159,7 +164,7 @@ class triangle_columns {
   WFPG_HD triangle_columns(const grid_triangle& t, std::uint32_t resolution)
       : triangle_(t), normal_(accurate_cross(t.b - t.a, t.c - t.b)) {
     const vec3 n = glm::cross(t.b - t.a, t.c - t.a);
-    w_ = fabsf(n.x) > fabsf(n.y) ? (fabsf(n.x) > fabsf(n.z) ? 0 : 2) : (fabsf(n.y) > fabsf(n.z) ? 1 : 2);
+    w_ = largest_axis(n);
     u_ = (w_ + 1) % 3;
     v_ = (w_ + 2) % 3;
     for (int axis = 0; axis < 3; ++axis) {

@@ -198,13 +198,17 @@ class cuda {
     if (bytes) wfpg::detail::check_cuda(cudaMemcpyAsync(to, from, bytes, kind, stream_), "cudaMemcpyAsync");
   }
 
+  /// Of the current device.
+  static std::size_t device_attribute(cudaDeviceAttr attribute) {
+    int device = 0, value = 0;
+    wfpg::detail::check_cuda(cudaGetDevice(&device), "cudaGetDevice");
+    wfpg::detail::check_cuda(cudaDeviceGetAttribute(&value, attribute, device), "cudaDeviceGetAttribute");
+    return static_cast<std::size_t>(value);
+  }
+
   /// So many blocks, or more than the device runs at once.
   static std::size_t at_most_resident(std::size_t blocks) {
-    int device = 0, processors = 0;
-    wfpg::detail::check_cuda(cudaGetDevice(&device), "cudaGetDevice");
-    wfpg::detail::check_cuda(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device),
-                             "cudaDeviceGetAttribute");
-    const std::size_t most = 16 * static_cast<std::size_t>(processors);
+    const std::size_t most = 16 * device_attribute(cudaDevAttrMultiProcessorCount);
     return blocks < most ? blocks : most;
   }
 
@@ -221,13 +225,10 @@ class cuda {
   /// less.
   static void allow_shared_memory(const void* kernel, std::size_t bytes) {
     using wfpg::detail::check_cuda;
-    int device = 0, most = 0;
     cudaFuncAttributes attributes{};
-    check_cuda(cudaGetDevice(&device), "cudaGetDevice");
-    check_cuda(cudaDeviceGetAttribute(&most, cudaDevAttrMaxSharedMemoryPerBlockOptin, device),
-               "cudaDeviceGetAttribute");
     check_cuda(cudaFuncGetAttributes(&attributes, kernel), "cudaFuncGetAttributes");
-    const std::size_t left = static_cast<std::size_t>(most) - attributes.sharedSizeBytes;
+    const std::size_t left =
+        device_attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin) - attributes.sharedSizeBytes;
     wfpg::detail::require(
         bytes <= left, "shared memory of a block, bytes,", bytes,
         ("at most " + std::to_string(left) + " on this device: lower the fields' resolution").c_str());
