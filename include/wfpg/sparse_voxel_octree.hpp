@@ -3,8 +3,9 @@
 // Construction of BVHs, Octrees, and k-d Trees"). Structure only; what light leaves a node is
 // exitance_cache.hpp's.
 //
-// Memory: 4 bytes a leaf, 9 an inner node, and at most one a node where descents begin. Build: a sort of the
-// fragments and O(leaves · depth), with 4 bytes for each of those.
+// Memory: 4 bytes a leaf, 9 an inner node, and for descents 16 for each node of every other level and at most
+// 1 a node where they begin. Build: a sort of the fragments and O(leaves · depth), with 4 bytes for each of
+// those.
 #pragma once
 
 #include <wfpg/buffer.hpp>
@@ -24,6 +25,27 @@
 #include <vector>
 
 namespace wfpg {
+
+namespace detail {
+
+/// A step of a descent over two levels at once: what of the 4 x 4 x 4 nodes below a node is there, in Morton
+/// order.
+struct alignas(16) two_levels {
+  std::uint64_t present = 0;
+  std::uint32_t first = 0;  ///< of those: its own two_levels, or the leaf it is
+
+  /// That of a node by its coordinates' two last bits, or invalid_node.
+  WFPG_HD std::uint32_t at(uvec3 p) const {
+    const std::uint32_t i = spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2;
+    if (!(present >> i & 1u)) return invalid_node;
+    return first + popcount64(present & ((std::uint64_t(1) << i) - 1u));
+  }
+
+ private:
+  WFPG_HD static std::uint32_t spread(std::uint32_t x) { return (x & 1u) | (x & 2u) << 2; }
+};
+
+}  // namespace detail
 
 /// What a kernel sees of an octree. Level 0 is the root, level depth() the leaves; ids grow with the level,
 /// and in a level with the Morton code.
@@ -51,6 +73,8 @@ class sparse_voxel_octree_view {
   /// The children of an inner node are `child_count` nodes from `first_child`, in the order of their octants.
   WFPG_HD node_id first_child(node_id node) const { return first_children_[node]; }
   WFPG_HD std::uint32_t child_count(node_id node) const { return detail::popcount8(child_masks_[node]); }
+  /// The octants that an inner node has children in, a bit each.
+  WFPG_HD std::uint32_t child_mask(node_id node) const { return child_masks_[node]; }
   /// The child of an inner node in an octant (bit 0: upper x, 1: y, 2: z), or invalid_node.
   WFPG_HD node_id child(node_id node, std::uint32_t octant) const {
     const std::uint32_t mask = child_masks_[node];
@@ -67,10 +91,10 @@ class sparse_voxel_octree_view {
   /// The leaf at voxel coordinates below resolution, or invalid_node. O(depth).
   WFPG_HD node_id leaf_at(uvec3 voxel) const {
     if (empty()) return invalid_node;
-    std::uint32_t level = depth_ - top_level_;
-    node_id node = top_[top_index(voxel >> level, top_level_)];
-    for (; level > 0 && node != invalid_node; --level) node = child(node, octant(voxel, level - 1));
-    return node;
+    std::uint32_t below = depth_ - top_level_;  // an even number of levels
+    std::uint32_t at = top_[top_index(voxel >> below, top_level_)];
+    for (; below > 0 && at != invalid_node; below -= 2) at = steps_[at].at(voxel >> (below - 2));
+    return at;
   }
   /// The leaf that holds a point, or invalid_node. O(depth).
   WFPG_HD node_id leaf_at(vec3 p) const {
@@ -130,9 +154,6 @@ class sparse_voxel_octree_view {
     return p.x | p.y << level | p.z << 2 * level;
   }
 
-  WFPG_HD static std::uint32_t octant(uvec3 voxel, std::uint32_t bit) {
-    return (voxel.x >> bit & 1u) | (voxel.y >> bit & 1u) << 1 | (voxel.z >> bit & 1u) << 2;
-  }
   WFPG_HD std::uint32_t octant_of(node_id node, node_id up) const {
     std::uint32_t mask = child_masks_[up];
     for (node_id before = first_children_[up]; before < node; ++before) mask &= mask - 1u;
@@ -169,10 +190,11 @@ class sparse_voxel_octree_view {
   const node_id* parents_ = nullptr;         // a node
   const node_id* first_children_ = nullptr;  // an inner node
   const std::uint8_t* child_masks_ = nullptr;
-  // Descents begin in a table of the nodes of one level by their coordinates, invalid_node where there is
-  // none.
+  // Descents begin in a table of one level's nodes by their coordinates: each node's first step, or the leaf
+  // that it is; invalid_node where there is none.
   std::uint32_t top_level_ = 0;
-  const node_id* top_ = nullptr;
+  const std::uint32_t* top_ = nullptr;
+  const detail::two_levels* steps_ = nullptr;
 };
 
 namespace detail {
@@ -281,17 +303,36 @@ struct find_child_masks {
   }
 };
 
-/// A level's nodes by their coordinates.
+/// A level's nodes by their coordinates, each as the step that it has; leaves as themselves.
 struct fill_top {
   array_view<const morton_code> leaf_codes;
   const std::uint32_t* first_leaf_of;
   node_id level_begin;
   std::uint32_t level, depth;
-  node_id* top;
+  std::uint32_t* top;
   WFPG_HD void operator()(std::size_t i) const {
     const node_id node = level_begin + static_cast<node_id>(i);
     const uvec3 p = morton_decode(leaf_codes[first_leaf_of[node]] >> 3 * (depth - level));
-    top[p.x | p.y << level | p.z << 2 * level] = node;
+    top[p.x | p.y << level | p.z << 2 * level] = level == depth ? node : static_cast<std::uint32_t>(i);
+  }
+};
+
+/// The steps that descents take from the nodes of a level.
+struct fill_steps {
+  sparse_voxel_octree_view tree;
+  std::uint32_t level;
+  std::uint32_t next_steps;  // where those of level + 2 begin
+  two_levels* steps;         // of this level
+  WFPG_HD void operator()(std::size_t i) const {
+    const node_id node = tree.level_begin(level) + static_cast<node_id>(i);
+    two_levels step;
+    for (std::uint32_t octant = 0; octant < 8; ++octant) {
+      const node_id child = tree.child(node, octant);
+      if (child != invalid_node) step.present |= std::uint64_t(tree.child_mask(child)) << 8 * octant;
+    }
+    step.first = tree.first_child(tree.first_child(node));
+    if (level + 2 < tree.depth()) step.first += next_steps - tree.level_begin(level + 2);
+    steps[i] = step;
   }
 };
 
@@ -330,7 +371,7 @@ class sparse_voxel_octree {
   std::uint32_t node_count() const { return view_.node_count(); }
   std::uint32_t leaf_count() const { return view_.leaf_count(); }
   std::size_t bytes() const {
-    return parents_.bytes() + first_children_.bytes() + child_masks_.bytes() + top_.bytes();
+    return parents_.bytes() + first_children_.bytes() + child_masks_.bytes() + top_.bytes() + steps_.bytes();
   }
 
   /// Where each leaf's fragments begin in the sorted order, until release_build_data(); a leaf's index counts
@@ -385,9 +426,18 @@ class sparse_voxel_octree {
                                            view_.node_count(), view_, child_masks_.data()});
     const std::uint32_t top = view_.top_level_;
     ::thrust::fill_n(exec.thrust(), top_.data(), top_.size(), invalid_node);
-    exec.for_each(view_.level_begin_[top + 1] - view_.level_begin_[top],
-                  detail::fill_top{leaves.codes.view(), first_leaf_of.data(), view_.level_begin_[top], top,
-                                   view_.depth_, top_.data()});
+    exec.for_each(level_size(top), detail::fill_top{leaves.codes.view(), first_leaf_of.data(),
+                                                    view_.level_begin_[top], top, view_.depth_, top_.data()});
+    std::uint32_t begin = 0;
+    for (std::uint32_t level = top; level < view_.depth_; level += 2) {
+      const std::uint32_t end = begin + level_size(level);
+      exec.for_each(end - begin, detail::fill_steps{view_, level, end, steps_.data() + begin});
+      begin = end;
+    }
+  }
+
+  std::uint32_t level_size(std::uint32_t level) const {
+    return view_.level_begin_[level + 1] - view_.level_begin_[level];
   }
 
   void find_level_ends(const Exec& exec, const buffer<std::uint32_t, Exec>& through, std::size_t leaves) {
@@ -413,17 +463,22 @@ class sparse_voxel_octree {
     view_.first_children_ = first_children_.data();
     view_.child_masks_ = child_masks_.data();
     if (view_.node_count() == 0) return;
-    // Two levels above the leaves at the deepest, and no larger than a byte a node.
-    view_.top_level_ = view_.depth_ > 2 ? view_.depth_ - 2 : 0;
-    while (view_.top_level_ > 0 && (4ull << 3 * view_.top_level_) > view_.node_count()) --view_.top_level_;
-    top_ = buffer<node_id, Exec>(exec, std::size_t(1) << 3 * view_.top_level_);
+    // An even number of levels above the leaves, and no larger than a byte a node.
+    std::uint32_t& top = view_.top_level_ = view_.depth_ % 2;
+    while (top + 2 < view_.depth_ && (4ull << 3 * (top + 2)) <= view_.node_count()) top += 2;
+    std::uint32_t steps = 0;
+    for (std::uint32_t level = top; level < view_.depth_; level += 2) steps += level_size(level);
+    top_ = buffer<std::uint32_t, Exec>(exec, std::size_t(1) << 3 * top);
+    steps_ = buffer<detail::two_levels, Exec>(exec, steps);
     view_.top_ = top_.data();
+    view_.steps_ = steps_.data();
   }
 
   buffer<node_id, Exec> parents_;
   buffer<node_id, Exec> first_children_;
   buffer<std::uint8_t, Exec> child_masks_;
-  buffer<node_id, Exec> top_;
+  buffer<std::uint32_t, Exec> top_;
+  buffer<detail::two_levels, Exec> steps_;
   buffer<std::uint32_t, Exec> leaf_fragment_begin_;
   sparse_voxel_octree_view view_;
 };

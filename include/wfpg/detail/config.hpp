@@ -36,4 +36,16 @@ WFPG_HD inline std::uint32_t popcount8(std::uint32_t bits) {
 #endif
 }
 
+/// Bits set among 64.
+WFPG_HD inline std::uint32_t popcount64(std::uint64_t bits) {
+#if defined(__CUDA_ARCH__)
+  return static_cast<std::uint32_t>(__popcll(bits));
+#else
+  bits = bits - (bits >> 1 & 0x5555555555555555u);
+  bits = (bits & 0x3333333333333333u) + (bits >> 2 & 0x3333333333333333u);
+  bits = (bits + (bits >> 4)) & 0x0f0f0f0f0f0f0f0fu;
+  return static_cast<std::uint32_t>(bits * 0x0101010101010101u >> 56);
+#endif
+}
+
 }  // namespace wfpg::detail
