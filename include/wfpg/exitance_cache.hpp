@@ -3,8 +3,7 @@
 // update() sums exactly and folds into running means, so that any order of arrival gives the same bits;
 // averages bottom-up.
 //
-// Memory: 26 bytes a leaf, 11 an inner node; while samples are in flight 32 more a leaf, and 8 a deposit of
-// the queue's capacity.
+// Memory: 26 bytes a leaf, 11 an inner node; with a queue 32 more a leaf, and 8 a deposit of its capacity.
 #pragma once
 
 #include <wfpg/buffer.hpp>
@@ -251,7 +250,7 @@ class exitance_cache {
         leaves_(exec, tree.leaf_count()),
         inner_radiance_(exec, 2 * std::size_t(tree.node_count() - tree.leaf_count())),
         queue_(exec, checked(queue_capacity)),
-        pending_(exec, 2 * std::size_t(tree.leaf_count())),
+        pending_(exec, queue_capacity > 0 ? 2 * std::size_t(tree.leaf_count()) : 0),
         counters_(exec, exitance_cache_view::counters) {
     view_.tree_ = tree.view();
     view_.normals_ = normals_.data();
@@ -282,8 +281,9 @@ class exitance_cache {
   }
 
   /// Folds queued deposits into the leaves and averages bottom-up. O(deposits + nodes), however many deposits
-  /// one leaf has.
+  /// one leaf has. Nothing to do without a queue.
   void update(const Exec& exec) {
+    if (queue_.size() == 0) return;
     const std::uint32_t* const queued = counters_.data() + exitance_cache_view::counter_queued;
     exec.for_each(exec::device_count{queued, queue_.size()},
                   detail::sum_deposits{queue_.view(), pending_.data()});

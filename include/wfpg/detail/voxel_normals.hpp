@@ -60,26 +60,31 @@ struct normal_cluster {
 };
 
 /// Clusters normals around the first one and its opposite, by area, in at most 8 rounds; the mean of the
-/// larger cluster. `members(i)` gives the i-th of n > 0 weighted normals.
+/// larger cluster, and the area of both. `members(i)` gives the i-th of n > 0 weighted normals.
 template <class Members>
-WFPG_HD vec3 dominant_normal(const Members& members, std::uint32_t n) {
+WFPG_HD weighted_normal dominant_normal(const Members& members, std::uint32_t n) {
   constexpr int rounds = 8;
-  normal_cluster ahead{members(0).normal}, behind{-members(0).normal};
+  const vec3 first = members(0).normal;
+  normal_cluster ahead{first}, behind{-first};
   for (int round = 0; round < rounds; ++round) {
+    float least_turn = 1.0f;
     ahead.begin();
     behind.begin();
     for (std::uint32_t i = 0; i < n; ++i) {
       const weighted_normal m = members(i);
       const bool is_ahead = glm::dot(m.normal, ahead.mean) >= glm::dot(m.normal, behind.mean);
+      least_turn = min(least_turn, fabsf(glm::dot(m.normal, first)));
       // A voxel that surfaces only touch has no area, but normals.
       const float weight = max(m.area, 1.0e-30f);
       ahead.add(m.normal, is_ahead ? weight : 0.0f);
       behind.add(m.normal, is_ahead ? 0.0f : weight);
     }
     const float moved = max(ahead.move(), behind.move());
-    if (moved < 1.0e-6f) break;
+    // Where all lie within 45 degrees of the line that the first one is on, so do the means, and no other
+    // round sorts them otherwise.
+    if (moved < 1.0e-6f || least_turn > 0.7072f) break;
   }
-  return behind.area > ahead.area ? behind.mean : ahead.mean;
+  return {behind.area > ahead.area ? behind.mean : ahead.mean, ahead.area + behind.area};
 }
 
 struct leaf_normals {
@@ -96,11 +101,9 @@ struct leaf_normals {
       const fragment_surface f = fragments[begin + i];
       return weighted_normal{unpack_direction(f.normal), f.area};
     };
-    float area = 0.0f;
-    for (std::size_t i = begin; i < end; ++i) area += fragments[i].area;
-    normals[first_leaf + leaf] =
-        pack_voxel_normal(dominant_normal(member, static_cast<std::uint32_t>(end - begin)));
-    areas[first_leaf + leaf] = area;
+    const weighted_normal dominant = dominant_normal(member, static_cast<std::uint32_t>(end - begin));
+    normals[first_leaf + leaf] = pack_voxel_normal(dominant.normal);
+    areas[first_leaf + leaf] = dominant.area;
   }
 };
 
@@ -117,16 +120,14 @@ struct inner_normals {
     const auto member = [&](std::uint32_t c) {
       return weighted_normal{unpack_voxel_normal(normals[first + c]), areas[first + c]};
     };
-    const std::uint16_t packed = pack_voxel_normal(dominant_normal(member, n));
+    const weighted_normal dominant = dominant_normal(member, n);
+    const std::uint16_t packed = pack_voxel_normal(dominant.normal);
     const vec3 normal = unpack_voxel_direction(packed);
-    float area = 0.0f;
     std::uint32_t bits = 0;
-    for (std::uint32_t c = 0; c < n; ++c) {
-      area += areas[first + c];
+    for (std::uint32_t c = 0; c < n; ++c)
       if (glm::dot(normal, unpack_voxel_direction(normals[first + c])) < 0.0f) bits |= 1u << c;
-    }
     normals[node] = packed;
-    areas[node] = area;
+    areas[node] = dominant.area;
     swapped[node] = static_cast<std::uint8_t>(bits);
   }
 };
