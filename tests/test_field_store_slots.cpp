@@ -76,7 +76,7 @@ WFPG_TEST_CASE("field store: budgets of nothing, less than a slot, one slot, and
     kept_box<Exec> box(options);
     INFO("budget " << budget);
     CHECK(box.counts().capacity == budget / a_slot);
-    CHECK(box.store.slot_bytes() <= std::max(budget, std::size_t(24)));
+    CHECK(box.store.slot_bytes() <= std::max(budget, std::size_t(32)));
     for (int sample = 0; sample < 3; ++sample) {
       const guide_view view = box.whole_sample(wave);
       CHECK(consistent(box));
@@ -230,7 +230,7 @@ WFPG_TEST_CASE("field store: levels are chosen anew after samples 1, 2, 4, 8, ..
 struct count_at {
   wfpg::detail::bin_marks_view marks;
   wfpg::array_view<const wfpg::node_id> leaves;
-  WFPG_HD void operator()(std::size_t i) const { marks.count(leaves[i]); }
+  WFPG_HD void operator()(std::size_t i) const { marks.count(leaves[i], 1); }
 };
 
 /// The deepest ancestor of enough rays, or that of the least level. Half of c_ray a sample is enough.

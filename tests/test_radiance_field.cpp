@@ -228,10 +228,10 @@ WFPG_TEST_CASE("radiance field: every ray gets a field, above its own horizon wh
     for (std::size_t ray = 0; ray < wave.size(); ++ray) {
       REQUIRE(made.field_of_ray[ray] < made.fields.size());
       const wfpg::resident_field& f = made.fields[made.field_of_ray[ray]];
-      hemispheres += f.hemisphere;
-      CHECK(f.hemisphere == (mode == guiding_mode::oriented && !wave[ray].bsdf.transmits()));
+      hemispheres += f.hemisphere();
+      CHECK(f.hemisphere() == (mode == guiding_mode::oriented && !wave[ray].bsdf.transmits()));
       const wfpg::grid_distribution grid(made.words.data() + made.field_of_ray[ray] * 8 * 8, 8);
-      if (!f.hemisphere) continue;
+      if (!f.hemisphere()) continue;
       const directional_field field(grid, f.normal);
       for (std::uint32_t i = 0; i < 20; ++i) {
         const vec3 d = field.sample(hashed_numbers{ray}(i, 0));

@@ -18,7 +18,7 @@ struct make_slots {
     slots[i].key = static_cast<std::uint32_t>(i) * wfpg::orientations;
     slots[i].builds = 1;
     slots[i].origin = ray;
-    fields[i] = {points[ray].normal, 0.7f, true};
+    fields[i] = {points[ray].normal, 0.7f};
   }
 };
 

@@ -28,8 +28,9 @@ struct kept_field_options {
   std::uint32_t resolution = 24;  ///< cells along a field's side, in [2, 128]
   std::uint32_t recast = 8;       ///< R: a refresh casts one cone in so many again, at least 1
   std::size_t budget_bytes = std::size_t(16) << 20;  ///< of the slots; one takes about 8 F² bytes
-  std::uint64_t max_wave_cones = ~0ull;  ///< cones of a wave; what would need more waits, or goes unguided
-  std::uint32_t idle_samples = 16;       ///< a slot that no ray used for so many is freed, at least 1
+  std::uint64_t max_wave_cones =
+      detail::build_limits::none;   ///< cones of a wave; what would need more waits, or goes unguided
+  std::uint32_t idle_samples = 16;  ///< a slot that no ray used for so many is freed, at least 1
 };
 
 /// What a field store tells of itself, since it was made.
@@ -74,8 +75,7 @@ class field_store {
   /// Counts a wave's rays and guides none. `Rays`: (std::size_t) -> ray_to_bin.
   template <class Rays>
   void count(const Exec& exec, std::size_t n, const Rays& rays) {
-    if (!counts_rays()) return;
-    exec.for_each(n, detail::count_rays<Rays>{rays, tree_, marks_.view()});
+    if (counts_rays()) exec.for_each(n, detail::count_rays<Rays>{rays, tree_, marks_.view(), counted()});
   }
 
   /// Finds or makes the fields of a wave's rays, and refreshes those that are due; what kernels sample from,
@@ -119,20 +119,24 @@ class field_store {
   }
 
  private:
-  // Through-counts (2), list of builds (2), free list, and at most 4 entries each of the table and of wanted
-  // keys with their own through-counts.
-  static constexpr std::size_t words_a_slot = 2 + 2 + 1 + 4 + 4 + 4;
+  // Through-counts (2), list of builds (2), free list, what is settled, and at most 4 entries each of the
+  // table (2) and of wanted keys with their own through-counts.
+  static constexpr std::size_t words_a_slot = 2 + 2 + 1 + 1 + 8 + 4 + 4;
 
   static const kept_field_options& checked(const kept_field_options& options, std::uint32_t nodes);
-  detail::field_slots_view view() const { return {slots_.view(), table_.data(), mask()}; }
+  detail::field_slots_view view() const { return {slots_.view(), table_.data(), mask(), settled_.data()}; }
   detail::wanted_keys wanted() const { return {wanted_.data(), mask()}; }
-  // Counts settle soon, and each costs an atomic.
+  // Counts settle soon, and sooner where a leaf has many rays of a wave.
   bool counts_rays() const { return sample_ <= 8 || sample_ % 4 == 0; }
+  detail::counted_rays counted() const {
+    if (!counts_rays()) return {0, 0};
+    return {stride_, sample_ % stride_};
+  }
   std::uint32_t mask() const { return static_cast<std::uint32_t>(table_.size() - 1); }
 
   template <class Surfaces>
   void find(const Exec& exec, const kept_field_wave<Surfaces>& wave);
-  void bear(const Exec& exec);
+  detail::count_births bear(const Exec& exec);
   void list(const Exec& exec, std::uint64_t seed);
   template <class Builder, class Caster>
   void build(const Exec& exec, const Builder& builder, const Caster& caster, std::size_t buffer_bytes);
@@ -146,12 +150,15 @@ class field_store {
   std::size_t capacity_ = 0;  // slots
   std::uint32_t sample_ = 0;
   std::uint32_t counted_samples_ = 0;
+  std::uint32_t stride_ = 1;  // of the rays that are counted
   detail::bin_marks<Exec> marks_;
   buffer<detail::field_slot, Exec> slots_;
   buffer<resident_field, Exec> fields_;  // a slot
   buffer<std::uint32_t, Exec> words_;    // a slot: its distribution
   buffer<detail::cone_hit, Exec> hits_;  // a slot: its cells
-  buffer<std::uint32_t, Exec> table_, wanted_, wanted_through_;
+  buffer<std::uint64_t, Exec> table_;
+  buffer<std::uint8_t, Exec> settled_;
+  buffer<std::uint32_t, Exec> wanted_, wanted_through_;
   buffer<std::uint32_t, Exec> free_slots_, list_;  // list: to cast whole, then to refresh
   buffer<std::uint64_t, Exec> through_;            // a slot: scans
   buffer<std::uint32_t, Exec> field_of_ray_, missing_keys_;

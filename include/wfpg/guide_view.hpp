@@ -10,11 +10,12 @@
 
 namespace wfpg {
 
-/// What a field in memory is, beside its distribution.
-struct resident_field {
-  vec3 normal{0.0f};
+/// What a field in memory is, beside its distribution. One load.
+struct alignas(16) resident_field {
+  vec3 normal{0.0f};      ///< of the hemisphere that it covers, unit length; zero: it covers the sphere
   float fraction = 0.0f;  ///< of guided samples in the mixture; 0: not there yet, and guides nothing
-  bool hemisphere = false;
+
+  WFPG_HD bool hemisphere() const { return normal.x != 0.0f || normal.y != 0.0f || normal.z != 0.0f; }
 };
 
 /// Fields in memory: what each is, and its distribution.
@@ -24,9 +25,10 @@ struct resident_fields {
   std::uint32_t resolution = 0;          ///< F
   product_points points;                 ///< of this wave
 
-  WFPG_HD directional_field field(std::uint32_t i) const {
+  /// fields[i] and its distribution.
+  WFPG_HD directional_field field(std::uint32_t i, const resident_field& info) const {
     const grid_distribution grid(words + std::size_t(i) * resolution * resolution, resolution);
-    return fields[i].hemisphere ? directional_field(grid, fields[i].normal) : directional_field(grid);
+    return info.hemisphere() ? directional_field(grid, info.normal) : directional_field(grid);
   }
 };
 
@@ -41,27 +43,25 @@ class guide_view {
       : field_of_ray_(field_of_ray), fields_(fields) {}
 
   /// Whether the ray has a field; without one it is its BSDF's.
-  WFPG_HD bool guides(std::uint32_t ray) const {
-    return ray < field_of_ray_.size() && field_of_ray_[ray] != no_field &&
-           fields_.fields[field_of_ray_[ray]].fraction > 0.0f;
-  }
+  WFPG_HD bool guides(std::uint32_t ray) const { return info(ray).fraction > 0.0f; }
 
   /// P, or 0 without products.
   WFPG_HD std::uint32_t product_resolution() const { return fields_.points.resolution; }
 
   /// The ray's mixture of field and BSDF, without products; of a ray without field, the BSDF alone.
   WFPG_HD guide_mixture mixture(std::uint32_t ray) const {
-    if (!guides(ray)) return {};
-    const std::uint32_t field = field_of_ray_[ray];
-    return {fields_.field(field), fields_.fields[field].fraction};
+    const resident_field found = info(ray);
+    if (!(found.fraction > 0.0f)) return {};
+    return {fields_.field(field_of_ray_[ray], found), found.fraction};
   }
   /// The ray's mixture of product and BSDF: P² to 2 P² evaluations of the BSDF into `words`, P² of them,
   /// which it reads as long as it lives. Precondition: product_resolution() > 0.
   template <class Bsdf>
   WFPG_HD product_mixture product(std::uint32_t ray, const surface<Bsdf>& s, std::uint32_t* words) const {
-    if (!guides(ray)) return {};
-    const std::uint32_t field = field_of_ray_[ray];
-    return {detail::multiply(fields_.field(field), fields_.points, s, words), fields_.fields[field].fraction};
+    const resident_field found = info(ray);
+    if (!(found.fraction > 0.0f)) return {};
+    return {detail::multiply(fields_.field(field_of_ray_[ray], found), fields_.points, s, words),
+            found.fraction};
   }
 
   /// A direction and its density from the field alone. Precondition: guides(ray).
@@ -88,6 +88,12 @@ class guide_view {
   }
 
  private:
+  /// Of the ray's field; one that guides nothing where it has none.
+  WFPG_HD resident_field info(std::uint32_t ray) const {
+    if (ray >= field_of_ray_.size() || field_of_ray_[ray] == no_field) return {};
+    return fields_.fields[field_of_ray_[ray]];
+  }
+
   template <class Bsdf, class F>
   WFPG_HD auto with_mixture(std::uint32_t ray, const surface<Bsdf>& s, const F& f) const {
     if (product_resolution() == 0) return f(mixture(ray));

@@ -35,7 +35,7 @@ struct field_origin {
   vec3 normal{0.0f};        ///< shading normal on the outgoing side, unit length
   bool cosine = false;      ///< cells carry the clamped cosine at `normal`
   bool hemisphere = false;  ///< over the hemisphere above `normal`; else over the sphere
-  std::uint64_t seed = 0;   ///< of the jitter inside cells
+  std::uint32_t seed = 0;   ///< of the jitter inside cells
 };
 
 namespace detail {
@@ -97,7 +97,7 @@ struct field_cells {
   }
 
   WFPG_HD ray cone(field_cell cell) const {
-    const vec2 jitter = unit_vec2(hash(origin.seed, cell.index(resolution)));
+    const vec2 jitter = coarse_vec2(hash32(origin.seed, cell.index(resolution)));
     const vec2 corner(static_cast<float>(cell.x), static_cast<float>(cell.y));
     ray result;
     result.origin = origin.position;
@@ -177,7 +177,7 @@ struct bin_fields {
     result.normal = facing_normal(s);
     result.hemisphere = mode == guiding_mode::oriented && bins.orientation(bin) < orientation_transmits;
     result.cosine = result.hemisphere;
-    result.seed = hash(bits, 1);
+    result.seed = static_cast<std::uint32_t>(hash(bits, 1));
     return result;
   }
 

@@ -111,11 +111,12 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   const d::field_slots_view slots;
   const d::use_slot use{slots, nullptr, 1, 0};
   d::field_store_state* const state = nullptr;
-  launch(d::find_fields<d::wave_rays<surfaces>>{{}, tree, {}, use, {}, nullptr, state, 32, true});
-  launch(d::count_rays<d::wave_rays<surfaces>>{{}, tree, {}});
+  launch(d::find_fields<d::wave_rays<surfaces>>{{}, tree, {}, use, {}, nullptr, state, 32, {}});
+  launch(d::count_rays<d::wave_rays<surfaces>>{{}, tree, {}, {}});
   launch(d::bear_fields{slots, {}, nullptr, nullptr, state, 1});
-  launch(d::count_births{{slots, {}, nullptr, nullptr, state, 1}, state});
-  launch(d::find_missing_fields{tree, use, nullptr, state});
+  launch(d::begin_store_wave{});
+  launch(d::find_missing_fields{tree, use, nullptr, state, {{slots, {}, nullptr, nullptr, state, 1}, state}});
+  launch(d::list_all_builds{{}, nullptr, state});
   launch(d::list_builds{{}, nullptr, {}, nullptr, state, 0});
   launch(d::evict_fields{{}, nullptr, state, 1, 16});
   launch(d::index_slots{slots, nullptr, nullptr, state});
@@ -123,6 +124,7 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(d::mark_leaves{tree, {}, 3, {}});
   launch(d::sum_counts{tree, {}});
   launch(d::fill_top{});
+  launch(d::fill_steps{});
   launch(d::adapt_pressure{state});
 
   // Checks for hosts.

@@ -36,19 +36,21 @@ WFPG_HD T atomic_load(const T* target) {
 }
 
 /// *target = value.
-WFPG_HD inline void atomic_store(std::uint32_t* target, std::uint32_t value) {
+template <class T>
+WFPG_HD void atomic_store(T* target, T value) {
 #if defined(__CUDA_ARCH__)
-  *static_cast<volatile std::uint32_t*>(target) = value;
+  *static_cast<volatile T*>(target) = value;
 #else
   __atomic_store_n(target, value, __ATOMIC_RELAXED);
 #endif
 }
 
 /// *target = value where it was `expected`; returns the value before.
-WFPG_HD inline std::uint32_t atomic_compare_exchange(std::uint32_t* target, std::uint32_t expected,
-                                                     std::uint32_t value) {
+WFPG_HD inline std::uint64_t atomic_compare_exchange(std::uint64_t* target, std::uint64_t expected,
+                                                     std::uint64_t value) {
 #if defined(__CUDA_ARCH__)
-  return atomicCAS(target, expected, value);
+  return atomicCAS(reinterpret_cast<unsigned long long*>(target), static_cast<unsigned long long>(expected),
+                   static_cast<unsigned long long>(value));
 #else
   __atomic_compare_exchange_n(target, &expected, value, false, __ATOMIC_RELAXED, __ATOMIC_RELAXED);
   return expected;

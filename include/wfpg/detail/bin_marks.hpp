@@ -35,10 +35,19 @@ struct bin_marks_view {
   WFPG_HD std::uint32_t rays(node_id node) const {
     return node < first_leaf ? inner[node] : leaves[node - first_leaf].rays;
   }
-  WFPG_HD void count(node_id leaf) const {
+  WFPG_HD void count(node_id leaf, std::uint32_t n) const {
     std::uint32_t* const rays = &leaves[leaf - first_leaf].rays;
-    if (atomic_load(rays) < most) atomic_add(rays, 1);
+    if (atomic_load(rays) < most) atomic_add(rays, n);
   }
+};
+
+/// Which rays of a wave are counted: all, or one in a stride for as many; none where it is 0. Each costs an
+/// atomic.
+struct counted_rays {
+  std::uint32_t stride = 1;
+  std::uint32_t first = 0;  // below the stride
+
+  WFPG_HD bool includes(std::size_t ray) const { return stride > 0 && ray % stride == first; }
 };
 
 struct sum_counts {

@@ -25,18 +25,25 @@ struct field_slot {
   std::uint32_t builds = 0;         ///< 0: all of its cells are to be cast
   std::uint64_t origin = unpicked;  ///< the ray that its next build starts from, below a random number
 
-  /// Fields settle as samples accumulate: an eighth of them may pass between two builds.
+  /// Fields settle as samples accumulate: an eighth of them may pass between two builds, and a quarter once
+  /// there are many.
   WFPG_HD bool is_due(std::uint32_t sample) const {
     const std::uint64_t passed = sample - last_built;
-    return builds == 0 || (passed >= 1 && 8 * passed >= sample);
+    return builds == 0 || (passed >= 1 && (sample <= 32 ? 8 : 4) * passed >= sample);
   }
 };
 
 /// Slots and the table that finds them.
 struct field_slots_view {
+  static constexpr std::uint64_t no_entry = ~0ull;
+
   array_view<field_slot> slots;
-  std::uint32_t* table = nullptr;  // slots by the hash of their keys, linear probing, at most half full
+  // Keys above their slots, by the keys' hashes, linear probing, at most half full.
+  std::uint64_t* table = nullptr;
   std::uint32_t table_mask = 0;
+  // A slot: 1 where the waves before have left nothing to note of it in this sample. Most rays need to read
+  // no more of their slot than this, and what all of them read is few cache lines.
+  const std::uint8_t* settled = nullptr;
 
   WFPG_HD static std::uint32_t hash_key(std::uint32_t key) {
     return static_cast<std::uint32_t>(key * 0x9e3779b97f4a7c15ull >> 32);
@@ -44,13 +51,15 @@ struct field_slots_view {
 
   WFPG_HD std::uint32_t find(std::uint32_t key) const {
     for (std::uint32_t i = hash_key(key);; ++i) {
-      const std::uint32_t slot = table[i & table_mask];
-      if (slot == no_slot || slots[slot].key == key) return slot;
+      const std::uint64_t entry = table[i & table_mask];
+      if (entry == no_entry || entry >> 32 == key) return static_cast<std::uint32_t>(entry);
     }
   }
   WFPG_HD void insert(std::uint32_t slot) const {
-    std::uint32_t i = hash_key(slots[slot].key);
-    while (atomic_compare_exchange(table + (i & table_mask), no_slot, slot) != no_slot) ++i;
+    const std::uint32_t key = slots[slot].key;
+    const std::uint64_t entry = std::uint64_t(key) << 32 | slot;
+    std::uint32_t i = hash_key(key);
+    while (atomic_compare_exchange(table + (i & table_mask), no_entry, entry) != no_entry) ++i;
   }
 };
 
@@ -70,6 +79,7 @@ struct field_store_state {
   std::uint32_t served = 0;    ///< rays whose field was there
   std::uint32_t all = 0;       ///< builds that cast all cells
   std::uint32_t part = 0;      ///< builds that cast a part of them
+  std::uint32_t builds = 0;    ///< both
   // Since the beginning:
   std::uint64_t born = 0, refreshed = 0;
 };
@@ -82,12 +92,14 @@ struct use_slot {
   std::uint64_t seed;
 
   WFPG_HD void operator()(std::uint32_t slot, std::size_t ray) const {
+    field_of_ray[ray] = slot;
+    if (slots.settled[slot] != 0) return;
     field_slot& s = slots.slots[slot];
     if (atomic_load(&s.last_used) != sample) atomic_store(&s.last_used, sample);
+    if (!s.is_due(sample)) return;
     // The least random number picks the origin, whichever ray comes first.
     const std::uint64_t candidate = (hash(seed, ray) & ~0xffffffffull) | ray;
-    if (s.is_due(sample)) atomic_min(&s.origin, candidate);
-    field_of_ray[ray] = slot;
+    if (candidate < atomic_load(&s.origin)) atomic_min(&s.origin, candidate);
   }
 };
 
@@ -113,7 +125,7 @@ struct find_fields {
   std::uint32_t* missing_keys;
   field_store_state* state;
   std::uint32_t wave_size;
-  bool counted;
+  counted_rays counted;
 
   WFPG_HD void operator()(std::size_t i) const {
     use.field_of_ray[i] = no_slot;
@@ -125,7 +137,7 @@ struct find_fields {
       atomic_add(&state->unbinned, 1);
       return;
     }
-    if (counted) marks.count(leaf);
+    if (counted.includes(i)) marks.count(leaf, counted.stride);
     const std::uint32_t key = marks.bin(leaf) * orientations + ray.orientation;
     const std::uint32_t slot = use.slots.find(key);
     if (slot != no_slot) {
@@ -144,11 +156,13 @@ struct count_rays {
   Rays rays;
   sparse_voxel_octree_view tree;
   bin_marks_view marks;
+  counted_rays counted;
   WFPG_HD void operator()(std::size_t i) const {
+    if (!counted.includes(i)) return;
     const ray_to_bin ray = rays(i);
     if (!ray.active) return;
     const node_id leaf = leaf_of(tree, ray);
-    if (leaf != invalid_node) marks.count(leaf);
+    if (leaf != invalid_node) marks.count(leaf, counted.stride);
   }
 };
 
@@ -184,7 +198,7 @@ struct bear_fields {
 struct count_births {
   bear_fields births;
   field_store_state* state;
-  WFPG_HD void operator()(std::size_t) const {
+  WFPG_HD void operator()() const {
     const std::uint32_t wanted = births.wanted_through[births.wanted.mask];
     const std::uint32_t room = state->free - state->taken;
     const std::uint32_t refused = wanted > room ? wanted - room : 0;
@@ -197,14 +211,17 @@ struct count_births {
   }
 };
 
-/// Rays whose own field was missing: it has been born, or an ancestor's serves, or none does.
+/// Rays whose own field was missing: it has been born, or an ancestor's serves, or none does. Counts the
+/// births: there were none where no field was missing.
 struct find_missing_fields {
   sparse_voxel_octree_view tree;
   use_slot use;
   const std::uint32_t* missing_keys;
   field_store_state* state;
+  count_births births;
 
   WFPG_HD void operator()(std::size_t i) const {
+    if (i == 0) births();
     if (missing_keys[i] == no_key) return;
     const std::uint32_t orientation = missing_keys[i] % orientations;
     std::uint32_t slot = no_slot;
@@ -220,6 +237,8 @@ struct find_missing_fields {
 
 /// What one wave may cast.
 struct build_limits {
+  static constexpr std::uint64_t none = ~0ull;
+
   std::uint64_t most_cones;
   std::uint32_t cells;  // of a whole field
   std::uint32_t part;   // cones of a refresh
@@ -241,8 +260,24 @@ struct is_to_build {
   }
 };
 
-/// The slots to build in this wave: first those to cast whole, from the number of slots on those to refresh.
-/// Where a limit passes over some, others are the first in the next wave.
+/// The slots to build in this wave, where nothing limits them: those to cast whole, from the number of slots
+/// on those to refresh. In any order: fields do not depend on each other.
+struct list_all_builds {
+  array_view<field_slot> slots;
+  std::uint32_t* list;
+  field_store_state* state;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    if (slots[i].origin == field_slot::unpicked) return;
+    const bool whole = slots[i].builds == 0;
+    const std::uint32_t rank = atomic_add(whole ? &state->all : &state->part, 1);
+    list[(whole ? 0 : slots.size()) + rank] = static_cast<std::uint32_t>(i);
+    atomic_add(&state->builds, 1);
+    if (!whole) atomic_add(&state->refreshed, 1);
+  }
+};
+
+/// The same under a limit. Where it passes over some, others are the first in the next wave.
 struct list_builds {
   array_view<field_slot> slots;
   const std::uint64_t* through;  // a slot: slots to build up to and with it
@@ -260,6 +295,7 @@ struct list_builds {
     if (i == 0) {
       state->all = most_wholes;
       state->part = most_parts;
+      state->builds = most_wholes + most_parts;
       state->refreshed += most_parts;
     }
     if (s.origin == field_slot::unpicked) return;

@@ -19,11 +19,17 @@ struct begin_store_sample {
 /// The state as a wave begins; origins that a wave before left behind, where its caster threw, are void.
 struct begin_store_wave {
   array_view<field_slot> slots;
+  array_view<std::uint8_t> settled;
   field_store_state* state;
+  std::uint32_t sample;
   WFPG_HD void operator()(std::size_t i) const {
-    if (i < slots.size()) slots[i].origin = field_slot::unpicked;
+    if (i < slots.size()) {
+      slots[i].origin = field_slot::unpicked;
+      settled[i] = slots[i].last_used == sample && !slots[i].is_due(sample);
+    }
     if (i > 0) return;
-    state->missing = state->unbinned = state->unserved = state->served = state->all = state->part = 0;
+    state->missing = state->unbinned = state->unserved = state->served = state->all = state->part =
+        state->builds = 0;
   }
 };
 
@@ -38,19 +44,20 @@ struct adapt_pressure {
 
 /// Counts a run of rays with fields.
 struct count_served {
-  static constexpr std::size_t run = 64;
+  static constexpr std::size_t run = 2048;
   array_view<const std::uint32_t> field_of_ray;
   const resident_field* fields;
   field_store_state* state;
 
-  WFPG_HD void operator()(std::size_t i) const {
-    const std::size_t end = min((i + 1) * run, field_of_ray.size());
-    std::uint32_t served = 0;
-    for (std::size_t ray = i * run; ray < end; ++ray) {
-      const std::uint32_t field = field_of_ray[ray];
-      if (field != no_slot && fields[field].fraction > 0.0f) ++served;
-    }
-    if (served > 0) atomic_add(&state->served, served);
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t i) const {
+    const std::size_t first = i * run;
+    const auto n = static_cast<int>(min(run, field_of_ray.size() - first));
+    const std::uint32_t served = block.sum(n, [&](int ray) {
+      const std::uint32_t field = field_of_ray[first + static_cast<std::size_t>(ray)];
+      return field != no_slot && fields[field].fraction > 0.0f ? 1u : 0u;
+    });
+    block.for_each(1, [&](int) { atomic_add(&state->served, served); });
   }
 };
 
@@ -89,10 +96,12 @@ field_store<Exec>::field_store(const Exec& exec, const sparse_voxel_octree_view&
   options_.recast = detail::min(options.recast, options.resolution * options.resolution);
   std::size_t entries = 2;
   while (entries < 2 * capacity_) entries *= 2;
-  table_ = buffer<std::uint32_t, Exec>(exec, entries);
+  table_ = buffer<std::uint64_t, Exec>(exec, entries);
+  settled_ = buffer<std::uint8_t, Exec>(exec, capacity_);
+  while (max_rays / stride_ > 8 * std::size_t(tree.leaf_count()) && stride_ < 32) stride_ *= 2;
   wanted_ = buffer<std::uint32_t, Exec>(exec, entries);
   wanted_through_ = buffer<std::uint32_t, Exec>(exec, entries);
-  ::thrust::fill_n(exec.thrust(), table_.data(), entries, detail::no_slot);
+  exec.fill_bytes(table_.data(), 0xff, table_.bytes());
   ::thrust::fill_n(exec.thrust(), wanted_.data(), entries, detail::no_key);
 }
 
@@ -103,7 +112,7 @@ void field_store<Exec>::begin_sample(const Exec& exec, std::uint32_t sample) {
   exec.for_each(1, detail::begin_store_sample{state_.data()});
   exec.for_each(capacity_, detail::evict_fields{slots_.view(), fields_.data(), state_.data(), sample,
                                                 options_.idle_samples});
-  ::thrust::fill_n(exec.thrust(), table_.data(), table_.size(), detail::no_slot);
+  exec.fill_bytes(table_.data(), 0xff, table_.bytes());  // no_entry
   const array_view<std::uint32_t> free_through(list_.data(), capacity_);
   ::thrust::transform_inclusive_scan(exec.thrust(), slots_.data(), slots_.data() + capacity_,
                                      free_through.data(), detail::is_free{}, ::thrust::plus<std::uint32_t>());
@@ -134,8 +143,8 @@ guide_view field_store<Exec>::prepare(const Exec& exec, const kept_field_wave<Su
   build(exec, detail::kept_field_builder<kept_field_wave<Surfaces>>{wave, kept}, caster, caster_buffer_bytes);
   const array_view<const std::uint32_t> field_of_ray(field_of_ray_.data(), wave.ray_count);
   const std::size_t run = detail::count_served::run;
-  exec.for_each((wave.ray_count + run - 1) / run,
-                detail::count_served{field_of_ray, fields_.data(), state_.data()});
+  exec.for_each_block((wave.ray_count + run - 1) / run, 0,
+                      detail::count_served{field_of_ray, fields_.data(), state_.data()});
   return {field_of_ray, {fields_.data(), words_.data(), options_.resolution, wave.points}};
 }
 
@@ -147,7 +156,7 @@ void field_store<Exec>::find(const Exec& exec, const kept_field_wave<Surfaces>& 
   const auto n = static_cast<std::uint32_t>(wave.ray_count);
   const detail::use_slot use{view(), field_of_ray_.data(), sample_, wave.seed};
   exec.for_each(detail::max<std::size_t>(capacity_, 1),
-                detail::begin_store_wave{slots_.view(), state_.data()});
+                detail::begin_store_wave{slots_.view(), settled_.view(), state_.data(), sample_});
   exec.for_each(n, detail::find_fields<rays_type>{{wave.surfaces, wave.mode},
                                                   tree_,
                                                   marks_.view(),
@@ -156,15 +165,15 @@ void field_store<Exec>::find(const Exec& exec, const kept_field_wave<Surfaces>& 
                                                   missing_keys_.data(),
                                                   state_.data(),
                                                   n,
-                                                  counts_rays()});
-  bear(exec);
+                                                  counted()});
+  const detail::count_births births = bear(exec);
   exec.for_each(exec::device_count{&state_.data()->missing, n},
-                detail::find_missing_fields{tree_, use, missing_keys_.data(), state_.data()});
+                detail::find_missing_fields{tree_, use, missing_keys_.data(), state_.data(), births});
 }
 
-/// Gives free slots to wanted keys.
+/// Gives free slots to wanted keys; what is left is to count them.
 template <class Exec>
-void field_store<Exec>::bear(const Exec& exec) {
+detail::count_births field_store<Exec>::bear(const Exec& exec) {
   const std::uint32_t cells = options_.resolution * options_.resolution;
   ::thrust::transform_inclusive_scan(exec.thrust(), wanted_.data(), wanted_.data() + wanted_.size(),
                                      wanted_through_.data(), detail::is_wanted{},
@@ -176,13 +185,15 @@ void field_store<Exec>::bear(const Exec& exec) {
                                    state_.data(),
                                    options_.max_wave_cones / cells};
   exec.for_each(wanted_.size(), births);
-  exec.for_each(1, detail::count_births{births, state_.data()});
+  return {births, state_.data()};
 }
 
 /// Lists the slots to build.
 template <class Exec>
 void field_store<Exec>::list(const Exec& exec, std::uint64_t seed) {
   if (capacity_ == 0) return;
+  if (options_.max_wave_cones == detail::build_limits::none)
+    return exec.for_each(capacity_, detail::list_all_builds{slots_.view(), list_.data(), state_.data()});
   ::thrust::transform_inclusive_scan(exec.thrust(), slots_.data(), slots_.data() + capacity_, through_.data(),
                                      detail::is_to_build{}, ::thrust::plus<std::uint64_t>());
   const detail::build_limits limits{options_.max_wave_cones, options_.resolution * options_.resolution,
@@ -196,14 +207,15 @@ template <class Exec>
 template <class Builder, class Caster>
 void field_store<Exec>::build(const Exec& exec, const Builder& builder, const Caster& caster,
                               std::size_t buffer_bytes) {
-  const std::uint32_t* const counts[2] = {&state_.data()->part, &state_.data()->all};
   if constexpr (is_inline_caster_v<Caster>) {
     using build_type = detail::build_kept_fields<Builder, detail::inline_hits<Caster>>;
-    for (const bool whole : {true, false})
-      exec.for_each_block(exec::device_count{counts[whole], capacity_},
-                          detail::field_scratch_bytes(options_.resolution, Exec::warps_per_block),
-                          build_type{builder, {caster}, listed(whole), whole});
+    exec.for_each_block(exec::device_count{&state_.data()->builds, capacity_},
+                        detail::field_scratch_bytes(options_.resolution, Exec::warps_per_block),
+                        detail::build_listed_fields<build_type>{{builder, {caster}, listed(true), true},
+                                                                {builder, {caster}, listed(false), false},
+                                                                state_.data()});
   } else {
+    const std::uint32_t* const counts[2] = {&state_.data()->part, &state_.data()->all};
     const std::uint32_t cells = builder.cone_count(true);
     const std::size_t room = detail::max<std::size_t>(cells, buffer_bytes / (sizeof(ray) + sizeof(ray_hit)));
     const buffer<ray, Exec> cones(exec, detail::min(room, capacity_ * cells));
@@ -251,7 +263,8 @@ kept_field_statistics field_store<Exec>::statistics(const Exec& exec) const {
 template <class Exec>
 std::size_t field_store<Exec>::slot_bytes() const {
   return slots_.bytes() + fields_.bytes() + words_.bytes() + hits_.bytes() + table_.bytes() +
-         wanted_.bytes() + wanted_through_.bytes() + free_slots_.bytes() + list_.bytes() + through_.bytes();
+         settled_.bytes() + wanted_.bytes() + wanted_through_.bytes() + free_slots_.bytes() + list_.bytes() +
+         through_.bytes();
 }
 
 }  // namespace wfpg

@@ -59,7 +59,7 @@ struct kept_field_builder {
         wave.mode == guiding_mode::oriented && state.key % orientations < orientation_transmits;
     origin.cosine = origin.hemisphere;
     origin.normal = whole ? facing_normal(s) : kept.fields[slot].normal;
-    origin.seed = hash(wave.seed, state.key);
+    origin.seed = static_cast<std::uint32_t>(hash(wave.seed, state.key));
     return {origin, kept.resolution};
   }
 
@@ -77,7 +77,7 @@ struct kept_field_builder {
     const bool hemisphere = cells.origin.hemisphere;
     finish_field(block, words, size, hemisphere, wave.options);
     block.for_each(1, [&](int) {
-      kept.fields[slot] = {cells.origin.normal, wave.fraction, hemisphere};
+      kept.fields[slot] = {hemisphere ? cells.origin.normal : vec3(0.0f), wave.fraction};
       field_slot& state = kept.slots[slot];
       state.last_built = kept.sample;
       ++state.builds;
@@ -108,6 +108,22 @@ struct build_kept_fields {
     });
     block.sync();
     builder.finish(block, slot, cells);
+  }
+};
+
+/// Both: first those of which all cones are cast.
+template <class Build>
+struct build_listed_fields {
+  Build whole, part;
+  const field_store_state* state;
+
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t i) const {
+    const std::uint32_t wholes = state->all;
+    if (i < wholes)
+      whole(block, i);
+    else
+      part(block, i - wholes);
   }
 };
 
@@ -144,7 +160,7 @@ struct invalidate_fields {
 
  private:
   WFPG_HD bool may_see(node_id node, const resident_field& field) const {
-    if (!field.hemisphere) return true;
+    if (!field.hemisphere()) return true;
     const bounds3 box = tree.bounds(node);
     const float reach = 0.5f * (glm::length(bounds.extent()) + glm::length(box.extent()));
     return glm::dot(bounds.centre() - box.centre(), field.normal) >= -reach;

@@ -63,6 +63,17 @@ WFPG_HD inline std::uint64_t hash(std::uint64_t state, std::uint64_t word) {
   return mix_bits(state ^ (word + 0x9e3779b97f4a7c15ull + (state << 6) + (state >> 2)));
 }
 
+/// The same in 32 bits, for what is drawn millions of times and needs no more (finaliser by C. Wellons,
+/// "Prospecting for hash functions", 2018).
+WFPG_HD inline std::uint32_t hash32(std::uint32_t state, std::uint32_t word) {
+  std::uint32_t x = state + word * 0x9e3779b9u;
+  x ^= x >> 16;
+  x *= 0x7feb352du;
+  x ^= x >> 15;
+  x *= 0x846ca68bu;
+  return x ^ (x >> 16);
+}
+
 /// [0, 1) from the upper 24 of 32 bits.
 WFPG_HD inline float unit_float(std::uint32_t bits) {
   return static_cast<float>(bits >> 8) * 0x1p-24f;
@@ -71,6 +82,11 @@ WFPG_HD inline float unit_float(std::uint32_t bits) {
 /// [0, 1)² from 64 bits.
 WFPG_HD inline vec2 unit_vec2(std::uint64_t bits) {
   return {unit_float(static_cast<std::uint32_t>(bits)), unit_float(static_cast<std::uint32_t>(bits >> 32))};
+}
+
+/// [0, 1)² from 32 bits.
+WFPG_HD inline vec2 coarse_vec2(std::uint32_t bits) {
+  return vec2{static_cast<float>(bits & 0xffffu), static_cast<float>(bits >> 16)} * 0x1p-16f;
 }
 
 /// An orthonormal basis whose z is a unit normal (Duff et al. 2017, "Building an Orthonormal Basis,

@@ -135,7 +135,7 @@ struct resident_sink {
   WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field) const {
     const std::uint32_t begin = bins.begin(bin);
     block.for_each(static_cast<int>(bins.size(bin)), [&](int i) {
-      if (i == 0) fields[bin] = {field.normal(), fraction(bins.size(bin)), field.hemisphere()};
+      if (i == 0) fields[bin] = {field.hemisphere() ? field.normal() : vec3(0.0f), fraction(bins.size(bin))};
       field_of_ray[bins.permutation[begin + static_cast<std::uint32_t>(i)]] = static_cast<std::uint32_t>(bin);
     });
   }
