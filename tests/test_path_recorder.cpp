@@ -5,6 +5,8 @@
 
 #include <wfpg/path_recorder.hpp>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -29,8 +31,8 @@ struct recording {
   cached_scene<Exec> scene;
   wfpg::path_recorder<Exec> recorder;
 
-  recording(std::size_t paths, std::uint32_t max_depth, bool include_emission)
-      : scene(row(), 1000), recorder(scene.exec, paths, max_depth, include_emission) {}
+  recording(std::size_t paths, std::uint32_t max_depth, bool include_emission, std::uint32_t share_shift = 0)
+      : scene(row(), 1000), recorder(scene.exec, paths, max_depth, include_emission, share_shift) {}
 
   static wfpg::voxel_fragments<Exec> row() {
     std::vector<voxel_normal> list;
@@ -188,6 +190,70 @@ WFPG_TEST_CASE("a deposit forgets the paths, a clear drops them", "[path_recorde
   r.finish();
   CHECK(r.leaving(0) == 3.0f);
   CHECK(r.dropped() == 0);
+}
+
+TEST_CASE("of each group of runs one is recorded, another in each sample", "[path_recorder]") {
+  constexpr std::size_t paths = 5000;
+  constexpr std::uint32_t run = wfpg::detail::recorded_runs::run, samples = 400;
+  for (const std::uint32_t shift : {0u, 1u, 3u}) {
+    std::vector<std::uint32_t> times(paths, 0);
+    for (std::uint32_t sample = 0; sample < samples; ++sample) {
+      const wfpg::detail::recorded_runs runs{shift,
+                                             static_cast<std::uint32_t>(wfpg::detail::hash(7, sample))};
+      std::vector<bool> taken(runs.size(paths), false);
+      std::size_t wrong = 0;
+      for (std::size_t path = 0; path < paths; ++path) {
+        std::uint32_t place;
+        if (!runs.find(path, place)) continue;
+        ++times[path];
+        wrong += place >= taken.size() || taken[place] || place / run != path / run >> shift;
+        if (place < taken.size()) taken[place] = true;
+      }
+      CHECK(wrong == 0);
+    }
+    const double share = 1.0 / (1 << shift), mean = samples * share;
+    const double deviation = std::sqrt(mean * (1.0 - share));
+    INFO("one of " << (1 << shift));
+    for (std::size_t path = 0; path < paths; path += run) {
+      const auto count = std::count(times.begin() + std::ptrdiff_t(path),
+                                    times.begin() + std::ptrdiff_t(std::min(path + run, paths)), times[path]);
+      CHECK(std::size_t(count) == std::min<std::size_t>(run, paths - path));
+      CHECK(std::abs(times[path] - mean) <= 5.0 * deviation);
+    }
+  }
+}
+
+WFPG_TEST_CASE("a share of the paths is deposited, and the others are not missed", "[path_recorder]") {
+  constexpr std::size_t paths = 300;
+  recording<Exec> all(paths, 2, true), r(paths, 2, true, 2);
+  CHECK(r.recorder.recorded() == 3 * 32);
+  CHECK(r.recorder.bytes() < all.recorder.bytes() / 3);
+  for (std::uint32_t seed = 0; seed < 8; ++seed) {
+    r.scene.cache.clear(r.scene.exec);
+    r.recorder.begin_sample(r.scene.exec, seed);
+    const wfpg::path_recorder_view view = r.view();
+    r.scene.exec.for_each(paths, [=] WFPG_HD(std::size_t path) {
+      view.vertex(path, 0, place(0), up, vec3(1.0f));
+      view.vertex(path, 1, place(1), up, vec3(0.5f));
+      view.radiance(path, 0, vec3(static_cast<float>(path)));
+      view.emission(path, 1, vec3(static_cast<float>(path)));
+    });
+    r.finish();
+    double sum = 0.0, count = 0.0;
+    for (std::size_t path = 0; path < paths; ++path) {
+      std::uint32_t recorded;
+      if (!wfpg::detail::recorded_runs{2, seed}.find(path, recorded)) continue;
+      sum += static_cast<double>(path);
+      count += 1.0;
+    }
+    CHECK(count > 0.0);
+    CHECK(r.leaving(0) == Approx(2.0 * sum / count));
+    CHECK(r.leaving(1) == Approx(2.0 * sum / count));
+    CHECK(r.dropped() == 0);
+    r.vertex(paths, 0, place(0), up, vec3(1.0f));  // no such path
+    CHECK(r.dropped() == 1);
+    r.recorder = wfpg::path_recorder<Exec>(r.scene.exec, paths, 2, true, 2);
+  }
 }
 
 WFPG_TEST_CASE("radiance that is no number is dropped by the cache", "[path_recorder]") {

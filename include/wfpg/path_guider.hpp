@@ -61,11 +61,14 @@ struct guider_options {
   std::uint32_t unguided_samples =
       1;  ///< samples at the beginning that only record ("PT first", section 3.7)
   std::uint64_t seed = 0;
-  std::size_t max_paths = 0;  ///< paths in flight that the recorder holds; 0: the renderer deposits by itself
+  std::size_t max_paths = 0;  ///< paths of a sample; 0: the renderer deposits by itself
+  /// Of the paths of a sample so many are recorded, others in each, that leaves get about as many deposits on
+  /// average, or up to twice as many; 0: all are. What they cost is bounded then, however many pixels.
+  std::uint32_t deposits_per_leaf = 16;
   std::uint32_t max_depth =
       8;                     ///< vertices of a path that the recorder holds, and depths that statistics tell
   std::size_t max_rays = 0;  ///< of a wave; 0: max_paths
-  std::size_t deposit_capacity = 0;  ///< deposits of a sample; 0: max_paths · max_depth
+  std::size_t deposit_capacity = 0;  ///< deposits of a sample; 0: recorded paths · max_depth
   std::size_t caster_buffer_bytes = std::size_t(16) << 20;  ///< for the cones of a batch caster in flight
 };
 
@@ -134,7 +137,9 @@ class path_guider {
 
  private:
   static const guider_options& checked(const guider_options& options);
-  static guider_options with_capacities(guider_options options);
+  static guider_options completed(guider_options options);
+  std::uint32_t share_shift() const;
+  std::size_t deposits_of_sample() const;
   static std::uint32_t resolution_at(const guider_options& options, std::uint32_t depth);
 
   bool keeps_fields() const { return options_.fields == field_lifetime::kept; }

@@ -63,29 +63,45 @@ const guider_options& path_guider<Exec>::checked(const guider_options& o) {
                                          resolution_at(o, depth));
   require(o.product_resolution == 0 || o.guide_fraction < 1.0f, "guide_fraction", o.guide_fraction,
           "less than 1 with products, which do not reach all that a BSDF does");
-  const guider_options full = with_capacities(o);
-  require(full.deposit_capacity < 0xffffffffull, "max_paths times max_depth, the deposits of a sample,",
-          full.deposit_capacity, "less than 2^32 - 1");
+  require(o.deposit_capacity < 0xffffffffull, "deposit_capacity", o.deposit_capacity, "less than 2^32 - 1");
+  require(o.max_paths * o.max_depth < 0xffffffffull, "max_paths times max_depth, the vertices of a sample,",
+          o.max_paths * o.max_depth, "less than 2^32 - 1");
   return o;
 }
 
 template <class Exec>
-guider_options path_guider<Exec>::with_capacities(guider_options o) {
+guider_options path_guider<Exec>::completed(guider_options o) {
   if (o.max_rays == 0) o.max_rays = o.max_paths;
-  if (o.deposit_capacity == 0) o.deposit_capacity = o.max_paths * o.max_depth;
   return o;
+}
+
+/// Of so many paths, a power of two, one is recorded: the power.
+template <class Exec>
+std::uint32_t path_guider<Exec>::share_shift() const {
+  if (options_.deposits_per_leaf == 0) return 0;
+  const std::uint64_t wanted = std::uint64_t(options_.deposits_per_leaf) * octree_.leaf_count();
+  const std::uint64_t all = std::uint64_t(options_.max_paths) * options_.max_depth;
+  std::uint32_t shift = 0;
+  while (wanted > 0 && all >> (shift + 1) >= wanted) ++shift;
+  return shift;
+}
+
+template <class Exec>
+std::size_t path_guider<Exec>::deposits_of_sample() const {
+  if (options_.deposit_capacity > 0) return options_.deposit_capacity;
+  return detail::recorded_runs{share_shift()}.size(options_.max_paths) * options_.max_depth;
 }
 
 template <class Exec>
 path_guider<Exec>::path_guider(const Exec& exec, voxel_fragments<Exec> fragments,
                                const guider_options& options)
-    : options_(with_capacities(checked(options))),
+    : options_(completed(checked(options))),
       build_(fragments.report),
       octree_(exec, fragments),
-      cache_(exec, octree_, fragments, options_.deposit_capacity),
+      cache_(exec, octree_, fragments, deposits_of_sample()),
       working_memory_(std::make_unique<retaining_resource>(exec.resource())),
       exec_(exec.with_resource(working_memory_.get())),
-      recorder_(exec_, options_.max_paths, options_.max_depth, options_.include_emission),
+      recorder_(exec_, options_.max_paths, options_.max_depth, options_.include_emission, share_shift()),
       product_points_(exec_, std::size_t(2) * options_.product_resolution * options_.product_resolution),
       counts_(exec_, options_.max_depth) {
   const binning_options binning{options_.min_bin_level, options_.rays_per_bin};
@@ -104,7 +120,7 @@ path_guider<Exec>::path_guider(const Exec& exec, voxel_fragments<Exec> fragments
 template <class Exec>
 void path_guider<Exec>::begin_sample() {
   ++samples_;
-  recorder_.clear(exec_);
+  recorder_.begin_sample(exec_, static_cast<std::uint32_t>(detail::hash(options_.seed, samples_)));
   if (keeps_fields()) store_.begin_sample(exec_, samples_);
 }
 
