@@ -15,10 +15,11 @@ namespace wfpg {
 
 namespace detail {
 
-/// Where a number fell among inclusive sums: the entry, and how far into its width, in [0,1]: it may round
-/// to 1.
+/// Where a number fell among inclusive sums: the entry, its width, and how far into it, in [0,1]: it may
+/// round to 1.
 struct sums_position {
   std::uint32_t index = 0;
+  std::uint32_t width = 0;
   float fraction = 0.0f;
 };
 
@@ -29,12 +30,19 @@ WFPG_HD sums_position find_in_sums(const Sums& sums, std::uint32_t n, std::uint3
   const std::uint32_t total = sums(n - 1) - before;
   const auto scaled = static_cast<std::uint64_t>(u * 0x1p24f) * total;  // exact: u has 24 bits
   const std::uint32_t target = before + min(static_cast<std::uint32_t>(scaled >> 24), total - 1u);
-  std::uint32_t low = 0;
-  for (std::uint32_t size = n; size > 1; size -= size / 2)
-    low += sums(low + size / 2 - 1) > target ? 0 : size / 2;
-  if (low > 0) before = sums(low - 1);
+  // The entry is one of `size` from `low` on: `before` is the sum before them, `through` that with them.
+  std::uint32_t low = 0, through = before + total;
+  for (std::uint32_t size = n; size > 1;) {
+    const std::uint32_t half = size / 2, sum = sums(low + half - 1);
+    const bool above = sum > target;
+    low += above ? 0 : half;
+    size = above ? half : size - half;
+    before = above ? before : sum;
+    through = above ? sum : through;
+  }
   const float rest = static_cast<float>(scaled & 0xffffffu) * 0x1p-24f;
-  return {low, (static_cast<float>(target - before) + rest) / static_cast<float>(sums(low) - before)};
+  const std::uint32_t width = through - before;
+  return {low, width, (static_cast<float>(target - before) + rest) / static_cast<float>(width)};
 }
 
 /// A place inside a cell off its faces by more than rounding moves a point to a direction and back, so that a
@@ -74,29 +82,34 @@ class grid_distribution {
   /// A point of [0,1)² from u in [0,1)². Monotone in each coordinate inside a row: stratified u stay
   /// stratified.
   WFPG_HD vec2 sample(vec2 u) const {
-    cell_block cell;
-    return sample({0, 0, resolution_}, u, cell);
+    std::uint32_t weight;
+    return sample({0, 0, resolution_}, u, weight);
   }
   /// The same, and pdf() of the point: of the cell that the search ended in.
   WFPG_HD vec2 sample(vec2 u, float& density) const {
-    cell_block cell;
-    const vec2 point = sample({0, 0, resolution_}, u, cell);
-    density = cell_pdf(cell.x, cell.y);
+    std::uint32_t weight;
+    const vec2 point = sample({0, 0, resolution_}, u, weight);
+    density = density_of(weight);
     return point;
   }
-  /// A point of a block, as its cells' weights have it, and the cell that it lies in. Precondition: the
-  /// block has weight.
-  WFPG_HD vec2 sample(const cell_block& b, vec2 u, cell_block& cell) const {
+  /// A point of a block, as its cells' weights have it, and the weight of the cell that it lies in.
+  /// Precondition: the block has weight.
+  WFPG_HD vec2 sample(const cell_block& b, vec2 u, std::uint32_t& weight) const {
+    const std::uint32_t f = resolution_, last = b.x + b.side - 1;
+    const std::uint32_t* const rows = sums_ + b.y * f;
     const auto row = detail::find_in_sums(
-        [&](std::uint32_t i) { return before(b.x + b.side, b.y + i + 1) - before(b.x, b.y + i + 1); }, b.side,
+        [&](std::uint32_t i) { return rows[i * f + last] - (b.x > 0 ? rows[i * f + b.x - 1] : 0u); }, b.side,
         before(b.x + b.side, b.y) - before(b.x, b.y), u.y);
     const std::uint32_t y = b.y + row.index;
-    const auto column = detail::find_in_sums(
-        [&](std::uint32_t i) { return before(b.x + i + 1, y + 1) - before(b.x + i + 1, y); }, b.side,
-        before(b.x, y + 1) - before(b.x, y), u.x);
-    cell = {b.x + column.index, y, 1};
-    return vec2{static_cast<float>(cell.x) + detail::inside_cell(column.fraction),
-                static_cast<float>(cell.y) + detail::inside_cell(row.fraction)} /
+    // The row's own sums are the differences to the row before it.
+    const std::uint32_t* const sums = sums_ + y * f + b.x;
+    const std::uint32_t back = y > 0 ? f : 0u, mask = y > 0 ? ~0u : 0u;
+    const auto column =
+        detail::find_in_sums([&](std::uint32_t i) { return sums[i] - (*(sums + i - back) & mask); }, b.side,
+                             before(b.x, y + 1) - before(b.x, y), u.x);
+    weight = column.width;
+    return vec2{static_cast<float>(b.x + column.index) + detail::inside_cell(column.fraction),
+                static_cast<float>(y) + detail::inside_cell(row.fraction)} /
            static_cast<float>(resolution_);
   }
 
@@ -107,12 +120,13 @@ class grid_distribution {
         detail::clamp(coordinate * static_cast<float>(resolution_), 0.0f, last));
   }
   /// The density at a point, per unit of the square's area.
-  WFPG_HD float pdf(vec2 uv) const { return cell_pdf(cell_along(uv.x), cell_along(uv.y)); }
+  WFPG_HD float pdf(vec2 uv) const { return density_of(weight(cell_along(uv.x), cell_along(uv.y))); }
 
  private:
-  WFPG_HD float cell_pdf(std::uint32_t x, std::uint32_t y) const {
+  /// In a cell.
+  WFPG_HD float density_of(std::uint32_t weight) const {
     const auto cells = static_cast<float>(resolution_ * resolution_);
-    return static_cast<float>(weight(x, y)) / static_cast<float>(total()) * cells;
+    return static_cast<float>(weight) / static_cast<float>(total()) * cells;
   }
   /// The sum of the cells of the first x columns and y rows.
   WFPG_HD std::uint32_t before(std::uint32_t x, std::uint32_t y) const {

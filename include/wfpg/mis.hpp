@@ -67,16 +67,19 @@ struct basic_guide_mixture {
     if (s.bsdf.is_delta()) return from_bsdf(s.bsdf.sample(s.outgoing, u), sampling_technique::delta);
     if (!guides()) return from_bsdf(s.bsdf.sample(s.outgoing, u), sampling_technique::bsdf);
     const mixture_shares shares = shares_of(s);
+    sampled_direction result;
+    float of_field;
     if (u_technique < shares.guide) {
-      float from_field;
-      const vec3 direction = field.sample(u, from_field);
-      return {direction, shares.guide * from_field + bsdf_pdf(s, shares, direction),
-              sampling_technique::guide};
+      result.direction = field.sample(u, of_field);
+      result.technique = sampling_technique::guide;
+    } else {
+      const bsdf_sample drawn = draw(s, u_technique < shares.guide + shares.glossy, u);
+      if (!(drawn.pdf > 0.0f)) return {};
+      result.direction = drawn.direction;
+      result.technique = sampling_technique::bsdf;
+      of_field = field.pdf(drawn.direction);
     }
-    sampled_direction result =
-        from_bsdf(draw(s, u_technique < shares.guide + shares.glossy, u), sampling_technique::bsdf);
-    if (result.pdf > 0.0f)
-      result.pdf = shares.guide * field.pdf(result.direction) + bsdf_pdf(s, shares, result.direction);
+    result.pdf = shares.guide * of_field + bsdf_pdf(s, shares, result.direction);
     return result;
   }
 

@@ -70,10 +70,10 @@ class product_field {
     if (resolution_ == 0) return field_.sample(u, density);
     const auto drawn = detail::find_in_sums([this](std::uint32_t i) { return weights_[i]; },
                                             resolution_ * resolution_, 0, u.x);
-    cell_block cell;
+    std::uint32_t weight;
     const vec2 uv =
-        field_.grid().sample(block(drawn.index), {detail::min(drawn.fraction, 1.0f - 0x1p-24f), u.y}, cell);
-    density = cell_pdf(cell, drawn.index);
+        field_.grid().sample(block(drawn.index), {detail::min(drawn.fraction, 1.0f - 0x1p-24f), u.y}, weight);
+    density = cell_pdf(weight, drawn.index);
     return field_.direction(uv);
   }
 
@@ -83,7 +83,7 @@ class product_field {
     vec2 uv;
     if (!field_.locate(d, uv)) return 0.0f;
     const std::uint32_t x = field_.grid().cell_along(uv.x), y = field_.grid().cell_along(uv.y);
-    return cell_pdf({x, y, 1}, y / side_ * resolution_ + x / side_);
+    return cell_pdf(field_.grid().weight(x, y), y / side_ * resolution_ + x / side_);
   }
 
  private:
@@ -92,10 +92,11 @@ class product_field {
     return {i % resolution_ * side_, i / resolution_ * side_, side_};
   }
 
-  WFPG_HD float cell_pdf(const cell_block& cell, std::uint32_t i) const {
+  /// In a cell of block i.
+  WFPG_HD float cell_pdf(std::uint32_t weight, std::uint32_t i) const {
     const std::uint32_t product = weights_[i] - (i > 0 ? weights_[i - 1] : 0u);
     if (product == 0) return 0.0f;
-    const auto inside = static_cast<float>(field_.grid().weight(cell));
+    const auto inside = static_cast<float>(weight);
     const auto whole = static_cast<float>(field_.grid().weight(block(i)));
     return static_cast<float>(product) * inside /
            (static_cast<float>(total()) * whole * field_.cell_solid_angle());
