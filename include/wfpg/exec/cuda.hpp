@@ -173,13 +173,13 @@ class cuda {
   void for_each(std::size_t n, const F& f) const {
     if (n == 0) return;
     const std::size_t blocks = (n + threads - 1) / threads;
-    launch(wfpg::detail::for_each_kernel<std::size_t, F>, blocks, 0, n, f);
+    launch(wfpg::detail::for_each_kernel<std::size_t, F>, blocks, threads, 0, n, f);
   }
   template <class F>
   void for_each(device_count n, const F& f) const {
     if (n.capacity == 0) return;
     const std::size_t blocks = (n.capacity + threads - 1) / threads;
-    launch(wfpg::detail::for_each_kernel<device_count, F>, at_most_resident(blocks), 0, n, f);
+    launch(wfpg::detail::for_each_kernel<device_count, F>, at_most_resident(blocks), threads, 0, n, f);
   }
 
   template <class F>
@@ -192,7 +192,8 @@ class cuda {
   }
 
  private:
-  static constexpr unsigned threads = static_cast<unsigned>(block::threads);
+  // Of a loop over indices: few, so that a block whose last ray takes long holds few others up.
+  static constexpr unsigned threads = 128;
 
   void copy(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind) const {
     if (bytes) wfpg::detail::check_cuda(cudaMemcpyAsync(to, from, bytes, kind, stream_), "cudaMemcpyAsync");
@@ -218,7 +219,7 @@ class cuda {
     constexpr std::size_t without_asking = 32 * 1024;  // of 48 KiB, in which static arrays lie too
     if (scratch_bytes > without_asking)
       allow_shared_memory(reinterpret_cast<const void*>(kernel), scratch_bytes);
-    launch(kernel, at_most_resident(most), scratch_bytes, n, scratch_bytes, f);
+    launch(kernel, at_most_resident(most), block::threads, scratch_bytes, n, scratch_bytes, f);
   }
 
   /// Asks for more shared memory than a kernel has without. Throws std::invalid_argument where the device has
@@ -238,9 +239,10 @@ class cuda {
   }
 
   template <class... Parameters, class... Arguments>
-  void launch(void (*kernel)(Parameters...), std::size_t blocks, std::size_t shared_bytes,
-              const Arguments&... arguments) const {
-    kernel<<<static_cast<unsigned>(blocks), threads, shared_bytes, stream_>>>(Parameters(arguments)...);
+  void launch(void (*kernel)(Parameters...), std::size_t blocks, unsigned threads_of_block,
+              std::size_t shared_bytes, const Arguments&... arguments) const {
+    kernel<<<static_cast<unsigned>(blocks), threads_of_block, shared_bytes, stream_>>>(
+        Parameters(arguments)...);
     wfpg::detail::check_cuda(cudaGetLastError(), "kernel launch");
   }
 
