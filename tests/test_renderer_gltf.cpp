@@ -166,19 +166,42 @@ TEST_CASE("glTF: what materials become", "[renderer][gltf]") {
   CHECK(read(R"({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.5},
                  "extensions": {"KHR_materials_specular": {"specularFactor": 0}}})")
             .kind == material_kind::lambert);
-  CHECK(read(R"({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 1}})").kind ==
-        material_kind::lambert);
-  const auto glass = read(R"({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0},
-      "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_ior": {"ior": 1.7}}})");
-  CHECK(glass.kind == material_kind::dielectric);
-  CHECK(glass.ior == Approx(1.7f));
-  const auto frosted = read(R"({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.5},
-      "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}})");
-  CHECK(frosted.kind == material_kind::rough_dielectric);
-  CHECK(frosted.alpha == Approx(0.25f));
+  CHECK(read(R"({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 1}})").alpha == 1.0f);
   const auto lamp = read(R"({"emissiveFactor": [1, 0.5, 0],
                              "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 300}}})");
   check_close(lamp.emission, {300.0f, 150.0f, 0.0f}, 1e-3f);
+}
+
+TEST_CASE("glTF: what transmits becomes solid or thin", "[renderer][gltf]") {
+  const auto read = [](const std::string& roughness, const std::string& extensions) {
+    return tiny_gltf()
+        .with("materials", R"([{"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": )" +
+                               roughness + R"(}, "extensions": {)" + extensions + "}}]")
+        .load()
+        .materials.at(0);
+  };
+  const std::string clear = R"("KHR_materials_transmission": {"transmissionFactor": 1})";
+  const std::string solid = R"(, "KHR_materials_volume": {"thicknessFactor": 1})";
+  const auto glass = read("0", clear + solid + R"(, "KHR_materials_ior": {"ior": 1.7})");
+  CHECK(glass.kind == material_kind::dielectric);
+  CHECK(glass.ior == Approx(1.7f));
+  CHECK(read("0", clear).kind == material_kind::thin_dielectric);
+  const auto frosted = read("0.5", clear + solid);
+  CHECK(frosted.kind == material_kind::rough_dielectric);
+  CHECK(frosted.alpha == Approx(0.25f));
+  CHECK(read("0.5", clear).kind == material_kind::thin_metallic_roughness);
+  const auto half = read("0.5", R"("KHR_materials_transmission": {"transmissionFactor": 0.5})" + solid);
+  CHECK(half.kind == material_kind::metallic_roughness);
+  CHECK(half.transmission == 0.5f);
+  const auto leaf = read("0.5", R"("KHR_materials_diffuse_transmission": {"diffuseTransmissionFactor": 0.25,
+                                   "diffuseTransmissionColorFactor": [0.1, 0.9, 0.2]})");
+  CHECK(leaf.kind == material_kind::thin_metallic_roughness);
+  CHECK(leaf.diffuse_transmission == 0.25f);
+  check_close(leaf.transmitted_color, {0.1f, 0.9f, 0.2f});
+  const auto dim = read("0.5", R"("KHR_materials_specular": {"specularFactor": 0.5})");
+  CHECK(dim.kind == material_kind::metallic_roughness);
+  CHECK(dim.specular == 0.5f);
+  CHECK(read("0.5", R"("KHR_materials_ior": {"ior": 0})").ior > 100.0f);
 }
 
 TEST_CASE("glTF: a base colour texture becomes linear", "[renderer][gltf]") {

@@ -56,6 +56,38 @@ std::vector<named_bsdf> non_delta() {
   return all;
 }
 
+/// All lobes: what a material shares out to metal, facets, transmission and diffuse transmission.
+bsdf layered(material_kind kind, const float (&factors)[4], float alpha, float ior = 1.5f) {
+  bsdf f = make(kind, colour, alpha);
+  f.ior = ior;
+  f.transmitted_colour = render::unorm8x3(vec3(0.3f, 0.9f, 0.4f));
+  f.factors.metallic = render::unorm8(factors[0]);
+  f.factors.specular = render::unorm8(factors[1]);
+  f.factors.transmission = render::unorm8(factors[2]);
+  f.factors.diffuse_transmission = render::unorm8(factors[3]);
+  return f;
+}
+
+std::vector<named_bsdf> layered_bsdfs() {
+  constexpr float shares[][4] = {{0, 0.5f, 0, 0},       {0.4f, 1, 0, 0},       {0.3f, 0.2f, 0, 0},
+                                 {0, 1, 0.6f, 0},       {0.3f, 0.7f, 0.5f, 0}, {0, 0, 1, 0},
+                                 {0, 0.3f, 0, 0.7f},    {0, 0, 0, 1},          {0, 1, 0.4f, 0.3f},
+                                 {0.5f, 0.8f, 1, 0.5f}, {0, 0, 0, 0},          {1, 0, 1, 1}};
+  std::vector<named_bsdf> all;
+  for (const auto& factors : shares)
+    for (const float alpha : {0.15f, 0.6f})
+      for (const material_kind kind :
+           {material_kind::metallic_roughness, material_kind::thin_metallic_roughness}) {
+        const bsdf f = layered(kind, factors, alpha, alpha < 0.5f ? 1.8f : 1.3f);
+        const bool thin = kind == material_kind::thin_metallic_roughness;
+        if (thin ? !f.transmits() : f.transmits() && factors[3] > 0.0f) continue;
+        std::string name = thin ? "thin, factors" : "factors";
+        for (const float factor : factors) name += ' ' + std::to_string(factor);
+        all.push_back({name + ", alpha " + std::to_string(alpha), f});
+      }
+  return all;
+}
+
 std::vector<vec3> viewers() {
   return {vec3(0.0f, 0.0f, 1.0f), glm::normalize(vec3(0.6f, 0.1f, 0.8f)),
           glm::normalize(vec3(0.5f, -0.9f, 0.3f))};
@@ -76,8 +108,10 @@ using estimate = wfpg::detail::sample_mean;
 void check(const std::string& name, const bsdf& f) {
   wfpg::testing::bsdf_check_options options;
   options.normal = f.normal;
-  options.samples = std::size_t(1) << 15;
-  if (f.transmits()) options.ior = f.ior;
+  options.samples = std::size_t(1) << 14;
+  const bool thin =
+      f.kind == material_kind::thin_dielectric || f.kind == material_kind::thin_metallic_roughness;
+  if (f.transmits() && !thin) options.ior = f.ior;
   const auto report = wfpg::testing::check_bsdf(wfpg::exec::tbb(), f, options);
   INFO(name << ": " << report.message);
   CHECK(report);
@@ -87,11 +121,54 @@ void check(const std::string& name, const bsdf& f) {
 
 TEST_CASE("materials pass the library's checks of BSDFs", "[renderer][bsdf]") {
   for (const auto& [name, f] : non_delta()) check(name, f);
-  for (const material_kind kind : {material_kind::mirror, material_kind::dielectric})
+  for (const material_kind kind :
+       {material_kind::mirror, material_kind::dielectric, material_kind::thin_dielectric})
     check("smooth", make(kind, white));
   for (const material_kind kind : {material_kind::lambert, material_kind::conductor, material_kind::plastic})
     check("white", make(kind, white, 0.2f));
   check("black", make(material_kind::lambert, vec3(0.0f)));
+}
+
+TEST_CASE("all lobes together pass the library's checks of BSDFs", "[renderer][bsdf]") {
+  for (auto [name, f] : layered_bsdfs()) {
+    check(name, f);
+    f.normal = glm::normalize(vec3(0.4f, 0.1f, 1.0f));
+    if (f.alpha == 0.6f) check(name + ", tilted", f);
+  }
+}
+
+TEST_CASE("kinds are what all lobes together are for their factors", "[renderer][bsdf]") {
+  const auto is_same = [](const bsdf& a, const bsdf& b) {
+    for (std::uint32_t i = 0; i < 1000; ++i) {
+      const vec3 wo = uniform_sphere(numbers(i, 8)), wi = uniform_sphere(numbers(i, 9));
+      const vec3 expected = a.eval_rgb(wo, wi);
+      if (glm::length(expected - b.eval_rgb(wo, wi)) > 1e-4f * glm::length(expected) + 1e-6f) return false;
+    }
+    return true;
+  };
+  for (const float alpha : {0.1f, 0.5f}) {
+    const auto of = [&](std::initializer_list<float> f) {
+      return layered(material_kind::metallic_roughness, {f.begin()[0], f.begin()[1], f.begin()[2], 0.0f},
+                     alpha);
+    };
+    CHECK(is_same(make(material_kind::lambert, colour, alpha), of({0, 0, 0})));
+    CHECK(is_same(make(material_kind::plastic, colour, alpha), of({0, 1, 0})));
+    CHECK(is_same(make(material_kind::conductor, colour, alpha), of({1, 1, 0})));
+    CHECK(is_same(make(material_kind::rough_dielectric, colour, alpha), of({0, 1, 1})));
+    CHECK_FALSE(is_same(make(material_kind::plastic, colour, alpha), of({0, 0.5f, 0})));
+  }
+}
+
+TEST_CASE("a thin dielectric lets light straight through", "[renderer][bsdf]") {
+  const bsdf pane = make(material_kind::thin_dielectric, colour);
+  for (const float side : {1.0f, -1.0f}) {
+    const vec3 wo = side * viewers()[1];
+    const wfpg::bsdf_sample through = pane.sample(wo, {0.9f, 0.5f}), back = pane.sample(wo, {0.0f, 0.5f});
+    CHECK(through.direction == -wo);
+    CHECK(pane.delta_weight_rgb(wo, through.direction) == colour);
+    CHECK(glm::length(back.direction - vec3(-wo.x, -wo.y, wo.z)) < 1e-5f);
+    CHECK(through.pdf + back.pdf == Approx(1.0f));
+  }
 }
 
 TEST_CASE("a white GGX conductor loses only what shadowing takes", "[renderer][bsdf]") {
@@ -106,7 +183,12 @@ TEST_CASE("a white GGX conductor loses only what shadowing takes", "[renderer][b
 }
 
 TEST_CASE("nothing leaks where shading and geometric sides differ", "[renderer][bsdf]") {
-  for (const auto& [name, f] : non_delta()) {
+  std::vector<named_bsdf> all = non_delta();
+  for (named_bsdf& each : layered_bsdfs()) {
+    each.f.normal = glm::normalize(vec3(0.4f, 0.1f, 1.0f));
+    all.push_back(each);
+  }
+  for (const auto& [name, f] : all) {
     INFO(name);
     for (std::uint32_t i = 0; i < 5000; ++i) {
       const vec3 wo = uniform_sphere(numbers(i, 8)), wi = uniform_sphere(numbers(i, 9));

@@ -116,6 +116,7 @@ struct scene_view {
     if (front) result.emission = scatters.emission;
     bsdf& f = result.surface.bsdf;
     f.kind = scatters.kind;
+    set_lobes(scatters, f);
     // A dielectric has to know inside from outside; the others reflect on either side.
     const float outward = f.transmits() ? side : 1.0f;
     f.normal = outward * facing;
@@ -132,6 +133,15 @@ struct scene_view {
   }
 
  private:
+  WFPG_HD static void set_lobes(const material& scatters, bsdf& f) {
+    if (f.kind < first_kind_of_all_lobes) return;
+    f.factors.metallic = unorm8(scatters.metallic);
+    f.factors.specular = unorm8(scatters.specular);
+    f.factors.transmission = unorm8(scatters.transmission);
+    f.factors.diffuse_transmission = unorm8(scatters.diffuse_transmission);
+    f.transmitted_colour = unorm8x3(scatters.transmitted_color);
+  }
+
   static constexpr float least_cosine = 1e-2f;
   static constexpr float least_alpha = 1e-3f;
 };

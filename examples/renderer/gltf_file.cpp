@@ -88,7 +88,8 @@ bool keep_encoded(tinygltf::Image* target, const int, std::string*, std::string*
 }
 
 void require_known_extensions(const tinygltf::Model& model) {
-  const char* known[] = {"KHR_materials_emissive_strength",
+  const char* known[] = {"KHR_materials_diffuse_transmission",
+                         "KHR_materials_emissive_strength",
                          "KHR_materials_ior",
                          "KHR_materials_specular",
                          "KHR_materials_transmission",

@@ -8,12 +8,12 @@
 namespace render {
 
 /// Reads the file's default scene: triangle meshes with node transforms, normals and the first texture
-/// coordinates; base colour factor and texture, metallic-roughness, KHR_materials_transmission, _ior,
-/// _specular and _emissive_strength; the first perspective camera (without one: a view of the bounding box
-/// from +z); from the scene's extras `resolution` (width, height) and `environment.radiance` (a number or
-/// RGB). What else the file asks for is left out, with a line in scene::warnings. A scene may have no
-/// triangles. Throws std::runtime_error with path and reason for a file that is missing, damaged, or refers
-/// to what it does not contain.
+/// coordinates; base colour factor and texture, metallic-roughness, KHR_materials_transmission,
+/// _diffuse_transmission, _ior, _specular (its factor), _emissive_strength and _volume (whether it is one);
+/// the first perspective camera (without one: a view of the bounding box from +z); from the scene's extras
+/// `resolution` (width, height) and `environment.radiance` (a number or RGB). What else the file asks for is
+/// left out, with a line in scene::warnings. A scene may have no triangles. Throws std::runtime_error with
+/// path and reason for a file that is missing, damaged, or refers to what it does not contain.
 scene load_gltf(const std::string& path);
 
 }  // namespace render

@@ -16,8 +16,13 @@
 namespace render::gltf {
 namespace {
 
-/// The smoothest coat that is still sampled as a rough one.
+/// The smoothest facets that are still sampled as rough ones.
 constexpr float min_alpha = 0.01f;
+
+/// Below this, rough facets refract nothing that could be told from what goes straight on.
+constexpr float least_rough_ior = 1.01f;
+/// Reflects all but half a percent: as good as infinite.
+constexpr float largest_ior = 1000.0f;
 
 /// Decoded images beyond this are refused: 64 Mi texels take 768 MiB.
 constexpr int max_side = 1 << 15;
@@ -75,6 +80,38 @@ double extension_number(const tinygltf::Material& source, const char* extension,
   return found == source.extensions.end() ? otherwise : number_of(found->second, member, otherwise);
 }
 
+/// A colour of one of a material's extensions, channels in [0, 1]; white where it is missing.
+vec3 extension_colour(const tinygltf::Material& source, const char* extension, const char* member) {
+  const auto found = source.extensions.find(extension);
+  if (found == source.extensions.end() || !found->second.IsObject() || !found->second.Has(member))
+    return vec3(1.0f);
+  const tinygltf::Value& value = found->second.Get(member);
+  if (!value.IsArray() || value.ArrayLen() != 3)
+    throw std::runtime_error(std::string("a ") + member + " has not 3 components");
+  vec3 colour(1.0f);
+  for (int c = 0; c < 3; ++c)
+    if (value.Get(c).IsNumber()) colour[c] = float(limited(value.Get(c).GetNumberAsDouble(), 0.0, 1.0));
+  return colour;
+}
+
+/// The cheapest kind that scatters as the material's lobes do together.
+material_kind kind_of(const material& m, bool thin) {
+  const bool smooth = m.alpha == 0.0f;
+  if (m.metallic == 1.0f) return smooth ? material_kind::mirror : material_kind::conductor;
+  const bool has_one_base = m.metallic == 0.0f && m.diffuse_transmission == 0.0f;
+  if (has_one_base && m.transmission == 1.0f && m.specular == 1.0f) {
+    if (smooth || m.ior < least_rough_ior)
+      return thin ? material_kind::thin_dielectric : material_kind::dielectric;
+    if (!thin) return material_kind::rough_dielectric;
+  }
+  if (has_one_base && m.transmission == 0.0f) {
+    if (m.specular == 0.0f || m.ior == 1.0f) return material_kind::lambert;
+    if (m.specular == 1.0f) return material_kind::plastic;
+  }
+  const bool transmits = m.transmission > 0.0f || m.diffuse_transmission > 0.0f;
+  return thin && transmits ? material_kind::thin_metallic_roughness : material_kind::metallic_roughness;
+}
+
 class material_reader {
  public:
   material_reader(const tinygltf::Model& model, scene& target) : model_(model), target_(target) {}
@@ -82,7 +119,8 @@ class material_reader {
   material read(const tinygltf::Material& source) {
     material result;
     read_base_color(source, result);
-    read_kind(source, result);
+    read_lobes(source, result);
+    choose_kind(source, result);
     read_emission(source, result);
     warn_of_unsupported(source);
     return result;
@@ -99,24 +137,34 @@ class material_reader {
     if (pbr.baseColorTexture.index >= 0) result.base_texture = texture_of(pbr.baseColorTexture);
   }
 
-  void read_kind(const tinygltf::Material& source, material& result) {
-    const double roughness = limited(source.pbrMetallicRoughness.roughnessFactor, 0.0, 1.0);
-    const double specular = extension_number(source, "KHR_materials_specular", "specularFactor", 1.0);
-    const float alpha = float(roughness * roughness);
-    result.ior = float(limited(extension_number(source, "KHR_materials_ior", "ior", 1.5), 1.0, 10.0));
-    result.alpha = std::max(alpha, min_alpha);
-    if (source.pbrMetallicRoughness.metallicFactor >= 0.5) {
-      result.kind = roughness == 0.0 ? material_kind::mirror : material_kind::conductor;
-    } else if (extension_number(source, "KHR_materials_transmission", "transmissionFactor", 0.0) > 0.5) {
-      // Without a change of index facets refract nothing.
-      const bool rough = roughness > 0.0 && result.ior > 1.01f;
-      result.kind = rough ? material_kind::rough_dielectric : material_kind::dielectric;
-    } else if (specular <= 0.0 || roughness >= 1.0) {
-      result.kind = material_kind::lambert;
-    } else {
-      result.kind = material_kind::plastic;
-      if (specular < 1.0) warn("a specularFactor between 0 and 1 is not supported: taken as 1");
+  void read_lobes(const tinygltf::Material& source, material& result) {
+    const tinygltf::PbrMetallicRoughness& pbr = source.pbrMetallicRoughness;
+    const auto share = [&](const char* extension, const char* member, double otherwise) {
+      return float(limited(extension_number(source, extension, member, otherwise), 0.0, 1.0));
+    };
+    const double roughness = limited(pbr.roughnessFactor, 0.0, 1.0);
+    result.alpha = float(roughness * roughness);
+    result.metallic = float(limited(pbr.metallicFactor, 0.0, 1.0));
+    result.specular = share("KHR_materials_specular", "specularFactor", 1.0);
+    result.transmission = share("KHR_materials_transmission", "transmissionFactor", 0.0);
+    const char* diffuse = "KHR_materials_diffuse_transmission";
+    result.diffuse_transmission = share(diffuse, "diffuseTransmissionFactor", 0.0);
+    result.transmitted_color = extension_colour(source, diffuse, "diffuseTransmissionColorFactor");
+    // KHR_materials_ior: 0 stands for an infinite index.
+    const double ior = extension_number(source, "KHR_materials_ior", "ior", 1.5);
+    result.ior = ior == 0.0 ? largest_ior : float(limited(ior, 1.0, largest_ior));
+  }
+
+  void choose_kind(const tinygltf::Material& source, material& result) {
+    bool thin = !(extension_number(source, "KHR_materials_volume", "thicknessFactor", 0.0) > 0.0);
+    if (!thin && result.diffuse_transmission > 0.0f) {
+      warn("diffuse transmission of solids is not supported: taken for that of a thin sheet");
+      thin = true;
     }
+    result.kind = kind_of(result, thin);
+    if (result.kind == material_kind::metallic_roughness && result.transmission > 0.0f)
+      result.ior = std::max(result.ior, least_rough_ior);
+    result.alpha = std::max(result.alpha, min_alpha);
   }
 
   void read_emission(const tinygltf::Material& source, material& result) {
@@ -137,12 +185,14 @@ class material_reader {
     if (source.normalTexture.index >= 0) warn("normal textures are not supported");
     if (source.occlusionTexture.index >= 0) warn("occlusion textures are not supported");
     if (source.alphaMode != "OPAQUE") warn("alpha is not supported: every surface is opaque");
+    if (extension_colour(source, "KHR_materials_specular", "specularColorFactor") != vec3(1.0f))
+      warn("a specularColorFactor is not supported: taken as white");
     for (const auto& extension : source.extensions) warn_of_extension(extension.first, extension.second);
   }
 
   void warn_of_extension(const std::string& name, const tinygltf::Value& value) {
-    const char* read_above[] = {"KHR_materials_emissive_strength", "KHR_materials_ior",
-                                "KHR_materials_specular", "KHR_materials_transmission"};
+    const char* read_above[] = {"KHR_materials_diffuse_transmission", "KHR_materials_emissive_strength",
+                                "KHR_materials_ior", "KHR_materials_specular", "KHR_materials_transmission"};
     if (std::find(std::begin(read_above), std::end(read_above), name) != std::end(read_above)) return;
     if (name != "KHR_materials_volume")
       warn("the extension " + name + " is not supported");

@@ -2,7 +2,7 @@
 // Directions as in <wfpg/bsdf.hpp>: world space, unit length, away from the surface.
 #pragma once
 
-#include "microfacet.hpp"
+#include "metallic_roughness.hpp"
 #include "scene.hpp"
 
 #include <wfpg/bsdf.hpp>
@@ -21,15 +21,33 @@ struct bsdf {
   float alpha = 0.1f;
   float ior = 1.5f;
   material_kind kind = material_kind::lambert;
+  unorm8x3 transmitted_colour{};  ///< this and the next: of the two kinds with all lobes
+  lobe_factors factors{};
 
-  WFPG_HD bool is_delta() const { return kind == material_kind::mirror || kind == material_kind::dielectric; }
+  WFPG_HD bool is_delta() const {
+    return kind == material_kind::mirror || kind == material_kind::dielectric ||
+           kind == material_kind::thin_dielectric;
+  }
   WFPG_HD bool transmits() const {
-    return kind == material_kind::dielectric || kind == material_kind::rough_dielectric;
+    switch (kind) {
+      case material_kind::dielectric:
+      case material_kind::thin_dielectric:
+      case material_kind::rough_dielectric:
+        return true;
+      case material_kind::metallic_roughness:
+      case material_kind::thin_metallic_roughness:
+        return factors.transmits();
+      default:
+        return false;
+    }
   }
 
   /// f |cos| per channel, per steradian; 0 for delta lobes.
   WFPG_HD vec3 eval_rgb(vec3 outgoing, vec3 incident) const {
-    if (kind == material_kind::rough_dielectric) return eval_rough(outgoing, incident);
+    if (has_all_lobes()) {
+      const local_pair pair(*this, outgoing, incident);
+      return pair.exists ? lobes(pair.side).eval(pair.outgoing, pair.incident) : vec3(0.0f);
+    }
     if (is_delta() || !reflects(outgoing, incident)) return vec3(0.0f);
     const frame local(normal);
     const vec3 wo = local.to_local(outgoing);
@@ -46,10 +64,13 @@ struct bsdf {
     return reflects(outgoing, incident) ? wfpg::luminance(colour) * glm::dot(incident, normal) / pi : 0.0f;
   }
 
-  /// The plastic's coat, or all of what has facets alone; and how often sample() draws from it.
+  /// What facets reflect and refract, and how often sample() draws from it.
   WFPG_HD wfpg::glossy_part glossy(vec3 outgoing) const {
-    if (kind == material_kind::conductor || kind == material_kind::rough_dielectric) return {1.0f, alpha};
-    if (kind == material_kind::plastic) return {coat_probability(glm::dot(outgoing, normal)), alpha};
+    if (kind == material_kind::lambert) return {};
+    if (kind == material_kind::conductor) return {1.0f, alpha};
+    const float above = glm::dot(outgoing, normal);
+    if (kind == material_kind::plastic) return {coat_probability(above), alpha};
+    if (has_all_lobes()) return {lobes(side_of(above)).specular_probability(std::abs(above)), alpha};
     return {};
   }
 
@@ -61,7 +82,10 @@ struct bsdf {
   }
   /// The same of one part.
   WFPG_HD float pdf_part(bool coat, vec3 outgoing, vec3 incident) const {
-    if (kind == material_kind::rough_dielectric) return coat ? pdf_rough(outgoing, incident) : 0.0f;
+    if (has_all_lobes()) {
+      const local_pair pair(*this, outgoing, incident);
+      return pair.exists ? lobes(pair.side).pdf(coat, pair.outgoing, pair.incident) : 0.0f;
+    }
     if (is_delta() || is_black() || !reflects(outgoing, incident)) return 0.0f;
     if (!coat) return glm::dot(incident, normal) / pi;
     const frame local(normal);
@@ -72,6 +96,7 @@ struct bsdf {
   WFPG_HD wfpg::bsdf_sample sample(vec3 outgoing, vec2 u) const {
     if (is_black()) return {};
     if (kind == material_kind::dielectric) return sample_dielectric(outgoing, u.x);
+    if (kind == material_kind::thin_dielectric) return sample_thin_dielectric(outgoing, u.x);
     if (kind == material_kind::mirror) {
       const vec3 incident = mirrored(outgoing, normal);
       return {incident, reflects(outgoing, incident) ? 1.0f : 0.0f};
@@ -84,12 +109,20 @@ struct bsdf {
   }
   /// The same from one part, with its density.
   WFPG_HD wfpg::bsdf_sample sample_part(bool coat, vec3 outgoing, vec2 u) const {
-    if (kind == material_kind::rough_dielectric)
-      return coat ? sample_rough(outgoing, u) : wfpg::bsdf_sample{};
+    if (is_delta() || is_black()) return {};
     const frame local(normal);
-    const vec3 wo = local.to_local(outgoing);
-    if (is_delta() || is_black() || wo.z <= 0.0f) return {};
-    const vec3 wi = coat ? mirrored(wo, ggx{alpha}.sample(wo, u)) : cosine_hemisphere(u);
+    vec3 wo = local.to_local(outgoing), wi;
+    if (has_all_lobes()) {
+      const float side = side_of(wo.z);
+      wo = transmits() ? side * wo : wo;
+      if (wo.z <= 0.0f) return {};
+      wi = lobes(side).sample(coat, wo, u);
+      if (wi == vec3(0.0f)) return {};
+      wi = side * wi;
+    } else {
+      if (wo.z <= 0.0f) return {};
+      wi = coat ? mirrored(wo, ggx{alpha}.sample(wo, u)) : cosine_hemisphere(u);
+    }
     const vec3 incident = glm::normalize(local.to_world(wi));
     return {incident, pdf_part(coat, outgoing, incident)};
   }
@@ -100,7 +133,7 @@ struct bsdf {
     const float above = glm::dot(outgoing, normal);
     if (above * glm::dot(incident, normal) > 0.0f) return vec3(1.0f);
     // Radiance is squeezed into a smaller solid angle where the index is larger.
-    const float eta = relative_ior(above);
+    const float eta = is_thin() ? 1.0f : relative_ior(above);
     return colour / (eta * eta);
   }
 
@@ -111,12 +144,24 @@ struct bsdf {
     const float density = pdf(outgoing, incident);
     if (!(density > 0.0f)) return 0.0f;
     const float above = glm::dot(outgoing, normal);
-    const float eta = above * glm::dot(incident, normal) < 0.0f ? relative_ior(above) : 1.0f;
+    const bool enters = !is_thin() && above * glm::dot(incident, normal) < 0.0f;
+    const float eta = enters ? relative_ior(above) : 1.0f;
     return eta * eta * eval(outgoing, incident) / density;
   }
 
  private:
+  WFPG_HD bool has_all_lobes() const {
+    return kind == material_kind::rough_dielectric || kind == material_kind::metallic_roughness ||
+           kind == material_kind::thin_metallic_roughness;
+  }
+  WFPG_HD bool is_thin() const {
+    return kind == material_kind::thin_dielectric || kind == material_kind::thin_metallic_roughness;
+  }
+
   WFPG_HD bool is_black() const {
+    if (kind == material_kind::metallic_roughness || kind == material_kind::thin_metallic_roughness)
+      return !(factors.specular > 0.0f || wfpg::luminance(colour) > 0.0f ||
+               (factors.diffuse_transmission > 0.0f && wfpg::luminance(vec3(transmitted_colour)) > 0.0f));
     const bool needs_colour = kind == material_kind::lambert || kind == material_kind::mirror;
     return needs_colour && !(wfpg::luminance(colour) > 0.0f);
   }
@@ -126,18 +171,8 @@ struct bsdf {
            glm::dot(incident, normal) > 0.0f && glm::dot(incident, geometric_normal) > 0.0f;
   }
 
-  WFPG_HD static vec3 mirrored(vec3 w, vec3 about) { return 2.0f * glm::dot(w, about) * about - w; }
-
   WFPG_HD float relative_ior(float outgoing_cosine) const {
     return outgoing_cosine > 0.0f ? ior : 1.0f / ior;
-  }
-
-  /// True with a probability, from a number in [0,1), which is one again after it.
-  WFPG_HD static bool chosen(float& u, float probability) {
-    const bool is_chosen = u < probability;
-    u = is_chosen ? u / probability : (u - probability) / (1.0f - probability);
-    u = glm::min(0x1.fffffep-1f, u);
-    return is_chosen;
   }
 
   // How often a plastic's sample comes from its coat: as the two reflect, but neither is ever left out.
@@ -148,73 +183,33 @@ struct bsdf {
     return glm::min(0.9f, glm::max(0.1f, coat / (coat + (1.0f - coat) * base)));
   }
 
-  /// Two directions and the facet between them, where there is one, on a rough boundary: turned so that
-  /// `outgoing` is above it.
-  struct facet {
-    vec3 outgoing{0.0f}, incident{0.0f}, h{0.0f};
-    float eta = 1.0f;
-    bool exists = false;
+  WFPG_HD static float side_of(float cosine) { return cosine < 0.0f ? -1.0f : 1.0f; }
 
-    WFPG_HD bool mirrors() const { return incident.z > 0.0f; }
+  /// Two directions turned so that `outgoing` is above the surface, where light can go from one to the other.
+  struct local_pair {
+    vec3 outgoing, incident;
+    float side;
+    bool exists;
+
+    WFPG_HD local_pair(const bsdf& f, vec3 world_outgoing, vec3 world_incident) {
+      const frame local(f.normal);
+      outgoing = local.to_local(world_outgoing);
+      incident = local.to_local(world_incident);
+      side = side_of(outgoing.z);
+      exists = outgoing.z * glm::dot(world_outgoing, f.geometric_normal) > 0.0f &&
+               incident.z * glm::dot(world_incident, f.geometric_normal) > 0.0f &&
+               (f.transmits() || (outgoing.z > 0.0f && incident.z > 0.0f)) && !f.is_black();
+      outgoing = side * outgoing;
+      incident = side * incident;
+    }
   };
 
-  WFPG_HD facet facet_between(vec3 outgoing, vec3 incident) const {
-    facet f;
-    const frame local(normal);
-    const float above = glm::dot(outgoing, normal), side = above < 0.0f ? -1.0f : 1.0f;
-    f.outgoing = side * local.to_local(outgoing);
-    f.incident = side * local.to_local(incident);
-    f.eta = relative_ior(above);
-    const vec3 sum = f.outgoing + (f.mirrors() ? 1.0f : f.eta) * f.incident;
-    f.h = glm::normalize(sum.z < 0.0f ? -sum : sum);
-    const bool sides_agree = above * glm::dot(outgoing, geometric_normal) > 0.0f &&
-                             glm::dot(incident, normal) * glm::dot(incident, geometric_normal) > 0.0f;
-    f.exists =
-        sides_agree && glm::dot(f.outgoing, f.h) > 0.0f && (f.mirrors() || glm::dot(f.incident, f.h) < 0.0f);
-    return f;
-  }
-
-  WFPG_HD vec3 eval_rough(vec3 outgoing, vec3 incident) const {
-    const facet f = facet_between(outgoing, incident);
-    if (!f.exists) return vec3(0.0f);
-    const float cosine = glm::dot(f.outgoing, f.h);
-    if (f.mirrors())
-      return vec3(fresnel_dielectric(cosine, f.eta) * ggx{alpha}.eval(f.outgoing, f.incident, f.h));
-    const float reflected = fresnel_dielectric(cosine, -glm::dot(f.incident, f.h), f.eta);
-    return colour * ((1.0f - reflected) * ggx{alpha}.eval_through(f.outgoing, f.incident, f.h, f.eta));
-  }
-
-  // As the boundary would if it were smooth: two numbers do not suffice to ask the facet that was drawn.
-  WFPG_HD static float mirror_probability(float cosine, float eta) {
-    return glm::clamp(fresnel_dielectric(cosine, eta), 0.1f, 0.9f);
-  }
-
-  WFPG_HD float pdf_rough(vec3 outgoing, vec3 incident) const {
-    const facet f = facet_between(outgoing, incident);
-    if (!f.exists) return 0.0f;
-    const float mirrored = mirror_probability(f.outgoing.z, f.eta);
-    if (f.mirrors()) return mirrored * ggx{alpha}.pdf(f.outgoing, f.h);
-    return (1.0f - mirrored) * ggx{alpha}.pdf_through(f.outgoing, f.incident, f.h, f.eta);
-  }
-
-  WFPG_HD wfpg::bsdf_sample sample_rough(vec3 outgoing, vec2 u) const {
-    const frame local(normal);
-    const float above = glm::dot(outgoing, normal), side = above < 0.0f ? -1.0f : 1.0f;
-    const vec3 wo = side * local.to_local(outgoing);
-    if (wo.z <= 0.0f) return {};
-    const float eta = relative_ior(above), mirrors = mirror_probability(wo.z, eta);
-    const bool reflect = chosen(u.x, mirrors);
-    const vec3 h = ggx{alpha}.sample(wo, u);
-    const vec3 wi = reflect ? mirrored(wo, h) : refracted(wo, h, eta);
-    if (wi.z == 0.0f || (wi.z > 0.0f) != reflect) return {};
-    const vec3 incident = glm::normalize(local.to_world(side * wi));
-    return {incident, pdf_rough(outgoing, incident)};
-  }
-
-  /// 0 where all is reflected.
-  WFPG_HD static vec3 refracted(vec3 w, vec3 about, float eta) {
-    const float cosine = glm::dot(w, about), square = 1.0f - (1.0f - cosine * cosine) / (eta * eta);
-    return square > 0.0f ? (cosine / eta - std::sqrt(square)) * about - w / eta : vec3(0.0f);
+  /// All lobes as the side of `outgoing` sees them.
+  WFPG_HD metallic_roughness lobes(float side) const {
+    lobe_factors shares = factors;
+    if (kind == material_kind::rough_dielectric) shares.specular = shares.transmission = unorm8(1.0f);
+    const bool solid = shares.transmits() && !is_thin();
+    return {colour, vec3(transmitted_colour), shares, alpha, solid ? relative_ior(side) : ior, is_thin()};
   }
 
   WFPG_HD wfpg::bsdf_sample sample_dielectric(vec3 outgoing, float u) const {
@@ -229,6 +224,14 @@ struct bsdf {
     const bool same_side = glm::dot(outgoing, geometric_normal) * glm::dot(incident, geometric_normal) > 0.0f;
     if (same_side != reflect) return {};
     return {incident, reflect ? reflected : 1.0f - reflected};
+  }
+
+  WFPG_HD wfpg::bsdf_sample sample_thin_dielectric(vec3 outgoing, float u) const {
+    const float reflected = fresnel_dielectric(std::abs(glm::dot(outgoing, normal)), ior);
+    if (u >= reflected) return {-outgoing, 1.0f - reflected};
+    const vec3 incident = mirrored(outgoing, normal);
+    const bool same_side = glm::dot(outgoing, geometric_normal) * glm::dot(incident, geometric_normal) > 0.0f;
+    return {incident, same_side ? reflected : 0.0f};
   }
 };
 

@@ -28,6 +28,25 @@ WFPG_HD inline vec3 fresnel_schlick(vec3 normal_reflectance, float cosine) {
   return normal_reflectance + (vec3(1.0f) - normal_reflectance) * (x2 * x2 * x);
 }
 
+/// `w` mirrored about a unit vector.
+WFPG_HD inline vec3 mirrored(vec3 w, vec3 about) {
+  return 2.0f * glm::dot(w, about) * about - w;
+}
+
+/// `w` refracted at a boundary whose normal lies on its side; 0 where all is reflected.
+WFPG_HD inline vec3 refracted(vec3 w, vec3 about, float eta) {
+  const float cosine = glm::dot(w, about), square = 1.0f - (1.0f - cosine * cosine) / (eta * eta);
+  return square > 0.0f ? (cosine / eta - std::sqrt(square)) * about - w / eta : vec3(0.0f);
+}
+
+/// True with a probability, from a number in [0,1), which is one again after it.
+WFPG_HD inline bool chosen(float& u, float probability) {
+  const bool is_chosen = u < probability;
+  u = is_chosen ? u / probability : (u - probability) / (1.0f - probability);
+  u = glm::min(0x1.fffffep-1f, u);
+  return is_chosen;
+}
+
 /// The GGX distribution of roughness `alpha` in (0, 1], isotropic.
 struct ggx {
   float alpha = 1.0f;

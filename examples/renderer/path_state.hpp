@@ -30,18 +30,20 @@ struct path_state {
   }
 };
 
-/// A path's last hit: its surface without what is in there twice.
+/// A path's last hit: its surface without what is in there twice. Nothing is initialised: vertices are made
+/// of a hit or copied over.
 struct path_vertex {
-  vec3 position{0.0f};
-  float offset = 0.0f;  ///< as in surface_point
-  vec3 geometric_normal{0.0f};
-  float alpha = 0.0f;
-  vec3 normal{0.0f};
-  float ior = 0.0f;
-  vec3 outgoing{0.0f};
-  material_kind kind = material_kind::lambert;
-  vec3 colour{0.0f};
-  std::uint32_t unused = 0;
+  vec3 position;
+  float offset;  ///< as in surface_point
+  vec3 geometric_normal;
+  float alpha;
+  vec3 normal;
+  float ior;
+  vec3 outgoing;
+  material_kind kind;
+  unorm8x3 transmitted_colour;
+  vec3 colour;
+  lobe_factors factors;
 
   path_vertex() = default;
   WFPG_HD explicit path_vertex(const hit_surface& hit)
@@ -53,7 +55,9 @@ struct path_vertex {
         ior(hit.surface.bsdf.ior),
         outgoing(hit.surface.outgoing),
         kind(hit.surface.bsdf.kind),
-        colour(hit.surface.bsdf.colour) {}
+        transmitted_colour(hit.surface.bsdf.transmitted_colour),
+        colour(hit.surface.bsdf.colour),
+        factors(hit.surface.bsdf.factors) {}
 
   WFPG_HD render::bsdf bsdf() const {
     render::bsdf f;
@@ -63,12 +67,16 @@ struct path_vertex {
     f.colour = colour;
     f.alpha = alpha;
     f.ior = ior;
+    f.transmitted_colour = transmitted_colour;
+    f.factors = factors;
     return f;
   }
   WFPG_HD wfpg::surface<render::bsdf> surface() const {
     return {position, geometric_normal, normal, outgoing, bsdf(), true};
   }
 };
+
+static_assert(sizeof(path_vertex) == 80, "every kernel of a wave reads it");
 
 /// A sample of next-event estimation that waits for its weight.
 struct light_query {

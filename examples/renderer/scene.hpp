@@ -21,14 +21,19 @@ struct texture {
   std::vector<vec3> texels;
 };
 
-enum class material_kind : std::uint32_t {
-  lambert,           ///< diffuse reflection
-  plastic,           ///< diffuse below a GGX dielectric coat
-  conductor,         ///< GGX with Schlick's Fresnel from base_color
-  mirror,            ///< perfect reflection times base_color
-  dielectric,        ///< smooth, reflects and refracts, what it refracts times base_color
-  rough_dielectric,  ///< the same of GGX facets
+enum class material_kind : std::uint8_t {
+  lambert,                  ///< diffuse reflection
+  plastic,                  ///< diffuse below a GGX dielectric coat
+  conductor,                ///< GGX with Schlick's Fresnel from base_color
+  mirror,                   ///< perfect reflection times base_color
+  dielectric,               ///< smooth, reflects and refracts, what it refracts times base_color
+  rough_dielectric,         ///< the same of GGX facets
+  thin_dielectric,          ///< smooth, reflects, and lets base_color through unbent
+  metallic_roughness,       ///< all lobes of metallic_roughness.hpp, around a solid
+  thin_metallic_roughness,  ///< the same of a sheet
 };
+/// Kinds from this one on read all numbers of a material.
+inline constexpr material_kind first_kind_of_all_lobes = material_kind::metallic_roughness;
 /// Bits of a key that is a material's kind: all are below 2^bits - 1.
 inline constexpr int material_key_bits = 4;
 
@@ -39,7 +44,12 @@ struct material {
   std::int32_t base_texture = -1;  ///< multiplies base_color; index into scene::textures, -1: none
   float alpha = 0.1f;              ///< GGX roughness (not perceptual), (0, 1]
   float ior = 1.5f;                ///< inside over outside, for plastic and dielectrics; not 1 of a rough one
-  vec3 emission{0.0f};             ///< emitted radiance, W/(m² sr), on the counter-clockwise side
+  float metallic = 0.0f;           ///< this and the next four: of kinds with all lobes, see lobe_factors
+  float specular = 1.0f;
+  float transmission = 0.0f;
+  float diffuse_transmission = 0.0f;  ///< positive of thin kinds alone
+  vec3 transmitted_color{1.0f};       ///< of diffuse transmission
+  vec3 emission{0.0f};                ///< emitted radiance, W/(m² sr), on the counter-clockwise side
 };
 
 /// A pinhole. The picture's y runs down from `up`.
