@@ -2,7 +2,10 @@
 // not sampled here: BSDFs and guiding find it.
 #pragma once
 
+#include "alias_table.hpp"
 #include "device_scene.hpp"
+
+#include <numeric>
 
 namespace render {
 
@@ -23,27 +26,19 @@ WFPG_HD inline float solid_angle_pdf(float area_pdf, float distance, float cosin
 /// Trivially copyable.
 struct light_view {
   wfpg::array_view<const std::uint32_t> triangles;
-  wfpg::array_view<const float> cdf;  ///< inclusive, the last is 1
-  float total_power = 0.0f;           ///< sum of luminance times area
+  wfpg::array_view<const alias_column> table;  ///< by power, a column for each of the triangles
+  float total_power = 0.0f;                    ///< sum of luminance times area
 
   /// Density by area of any point of an emitter with this radiance.
   WFPG_HD float pdf(vec3 radiance) const {
     return total_power > 0.0f ? wfpg::luminance(radiance) / total_power : 0.0f;
   }
 
-  WFPG_HD light_sample sample(const scene_view& scene, float choice, vec2 u) const {
+  WFPG_HD light_sample sample(const scene_view& scene, vec2 choice, vec2 u) const {
     if (triangles.empty()) return {};
-    std::size_t first = 0;
-    std::size_t last = triangles.size() - 1;
-    while (first < last) {
-      const std::size_t middle = (first + last) / 2;
-      if (choice < cdf[middle])
-        last = middle;
-      else
-        first = middle + 1;
-    }
+    const std::uint32_t triangle = triangles[pick(table, choice)];
     const float root = std::sqrt(u.x);
-    const surface_point point = scene.point({triangles[first], root * (1.0f - u.y), root * u.y});
+    const surface_point point = scene.point({triangle, root * (1.0f - u.y), root * u.y});
     const vec3 radiance = scene.materials[point.material].emission;
     return {point.position, point.geometric_normal, radiance, pdf(radiance), point.offset};
   }
@@ -55,21 +50,19 @@ class light_distribution {
  public:
   light_distribution(const Exec& exec, const scene& host) {
     std::vector<std::uint32_t> triangles;
-    std::vector<double> sums;
+    std::vector<double> powers;
     for (std::size_t i = 0; i < host.triangles.size(); ++i) {
       const double power = power_of(host, i);
       if (!(power > 0.0)) continue;
       triangles.push_back(static_cast<std::uint32_t>(i));
-      sums.push_back((sums.empty() ? 0.0 : sums.back()) + power);
+      powers.push_back(power);
     }
-    std::vector<float> cdf;
-    for (const double sum : sums) cdf.push_back(static_cast<float>(sum / sums.back()));
-    total_power_ = sums.empty() ? 0.0f : static_cast<float>(sums.back());
+    total_power_ = static_cast<float>(std::accumulate(powers.begin(), powers.end(), 0.0));
     triangles_ = wfpg::buffer<std::uint32_t, Exec>(exec, triangles);
-    cdf_ = wfpg::buffer<float, Exec>(exec, cdf);
+    table_ = wfpg::buffer<alias_column, Exec>(exec, make_alias_table(powers));
   }
 
-  light_view view() const { return {triangles_.view(), cdf_.view(), total_power_}; }
+  light_view view() const { return {triangles_.view(), table_.view(), total_power_}; }
 
  private:
   static double power_of(const scene& host, std::size_t triangle) {
@@ -81,7 +74,7 @@ class light_distribution {
   }
 
   wfpg::buffer<std::uint32_t, Exec> triangles_;
-  wfpg::buffer<float, Exec> cdf_;
+  wfpg::buffer<alias_column, Exec> table_;
   float total_power_ = 0.0f;
 };
 

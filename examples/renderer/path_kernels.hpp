@@ -172,7 +172,7 @@ struct query_lights {
     const path_vertex& vertex = vertices[path];
     const bsdf scatters = vertex.bsdf();
     if (scatters.is_delta()) return {};
-    const light_sample light = world.lights.sample(world.scene, at.draw(path, dimension::light_choice).x,
+    const light_sample light = world.lights.sample(world.scene, at.draw(path, dimension::light_choice),
                                                    at.draw(path, dimension::light_point));
     const vec3 toward = light.position - vertex.position;
     const float distance = glm::length(toward);
