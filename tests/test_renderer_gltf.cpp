@@ -217,21 +217,69 @@ TEST_CASE("glTF: a base colour texture becomes linear", "[renderer][gltf]") {
                              {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}])");
   const scene s = tiny.load();
   REQUIRE(s.textures.size() == 1);
-  CHECK(s.materials[0].base_texture == 0);
-  CHECK(s.materials[1].base_texture == 0);
+  CHECK(s.materials[0].base_texture.index == 0);
+  CHECK(s.materials[1].base_texture.index == 0);
   REQUIRE(s.textures[0].texels.size() == 2);
-  check_close(s.textures[0].texels[0], {0.25f, 0.0f, 1.0f}, 0.005f);
-  check_close(s.textures[0].texels[1], vec3(0.5f), 0.005f);
+  check_close(vec3(s.textures[0].texels[0]), {0.25f, 0.0f, 1.0f}, 0.005f);
+  check_close(vec3(s.textures[0].texels[1]), vec3(0.5f), 0.005f);
 
   tiny.with("images", R"([{"uri": "data:image/png;base64,)" + base64(bytes.substr(0, 50)) + R"("}])");
   CHECK(contains(tiny.error(), "image 0"));
+  tiny.with("images", R"([{"uri": "nowhere.png"}])");
+  CHECK(contains(tiny.error(), "nowhere.png"));
+}
+
+TEST_CASE("glTF: metallic-roughness textures, samplers and texture transforms", "[renderer][gltf]") {
+  temporary_folder folder;
+  image picture = render::make_image(1, 1);
+  picture.pixels = {vec3(render::srgb_to_linear(0.2f), render::srgb_to_linear(0.4f), 1.0f)};
+  render::write_png(folder.file("t.png"), picture);
+  tiny_gltf tiny;
+  tiny.with("images",
+            R"([{"uri": "data:image/png;base64,)" + base64(content_of(folder.file("t.png"))) + R"("}])");
+  tiny.with("samplers", R"([{"wrapS": 33071, "wrapT": 33648}])");
+  tiny.with("textures", R"([{"source": 0, "sampler": 0}])");
+  tiny.with("materials", R"([{"pbrMetallicRoughness": {
+      "baseColorTexture": {"index": 0, "extensions": {"KHR_texture_transform": {
+          "offset": [0.5, 0.25], "rotation": 1.5707963267948966, "scale": [2, 3]}}},
+      "metallicRoughnessTexture": {"index": 0}}}])");
+  const scene s = tiny.load();
+  CHECK(s.warnings.size() == 1);  // of the camera that is made up
+  REQUIRE(s.textures.size() == 2);
+  const render::material& m = s.materials[0];
+  CHECK(m.kind == material_kind::metallic_roughness);
+  CHECK(s.textures[0].wrap_u == render::texture_wrap::clamp_to_edge);
+  CHECK(s.textures[0].wrap_v == render::texture_wrap::mirrored_repeat);
+  check_close(vec3(s.textures[std::size_t(m.base_texture.index)].texels[0]), picture.pixels[0], 0.005f);
+  check_close(vec3(s.textures[std::size_t(m.metallic_roughness_texture.index)].texels[0]), {0.2f, 0.4f, 1.0f},
+              0.005f);
+  // The extension's own matrices: a quarter turn takes (u, v) to (v, -u).
+  const render::vec2 place = m.base_texture.transformed({0.1f, 0.2f});
+  CHECK(place.x == Approx(0.5f + 3.0f * 0.2f));
+  CHECK(place.y == Approx(0.25f - 2.0f * 0.1f));
+
+  tiny.with("samplers", R"([{"wrapS": 7}])");
+  CHECK(contains(tiny.error(), "wrap mode"));
+  tiny.with("samplers", "[]");
+  CHECK(contains(tiny.error(), "sampler 0"));
+}
+
+TEST_CASE("glTF: alpha masks", "[renderer][gltf]") {
+  tiny_gltf tiny;
+  const scene s = tiny.with("materials", R"([{"alphaMode": "MASK", "pbrMetallicRoughness":
+      {"baseColorFactor": [1, 1, 1, 0.25]}}, {"alphaCutoff": 0.3, "alphaMode": "MASK"}, {}])")
+                      .load();
+  CHECK(s.materials[0].opacity == 0.25f);
+  CHECK(s.materials[0].alpha_cutoff == 0.5f);
+  CHECK(s.materials[1].alpha_cutoff == Approx(0.3f));
+  CHECK(s.materials[2].alpha_cutoff == 0.0f);
 }
 
 TEST_CASE("glTF: what is not supported is said once", "[renderer][gltf]") {
   tiny_gltf tiny;
   tiny.with("meshes", R"([{"primitives": [{"attributes": {"POSITION": 0}, "mode": 1},
                                           {"attributes": {"POSITION": 0}, "mode": 0}]}])");
-  tiny.with("materials", R"([{"alphaMode": "BLEND"}, {"alphaMode": "MASK"}])");
+  tiny.with("materials", R"([{"alphaMode": "BLEND"}, {"alphaMode": "BLEND"}])");
   const scene s = tiny.load();
   CHECK(s.triangles.empty());
   int lines = 0;

@@ -7,7 +7,7 @@
 // with exact signs; boxes are wider than what rounding can do.
 #pragma once
 
-#include "device_scene.hpp"
+#include "cut_outs.hpp"
 #include "frame.hpp"
 #include "warp_hints.hpp"
 
@@ -160,20 +160,23 @@ class bvh_caster {
   static constexpr std::uint32_t most_levels = stack_size / (bvh_node::width - 1);
 
   bvh_caster() = default;
-  bvh_caster(const bvh_node* nodes, const bvh_triangle* triangles, float environment)
-      : nodes_(nodes), triangles_(triangles), environment_(environment) {}
+  bvh_caster(const bvh_node* nodes, const bvh_triangle* triangles, const scene_view* cut_outs,
+             float environment)
+      : nodes_(nodes), triangles_(triangles), cut_outs_(cut_outs), environment_(environment) {}
 
   /// The guider's form: distance, or the environment's luminance.
   WFPG_HD wfpg::ray_hit operator()(const wfpg::ray& ray) const {
-    const hit found = cast<false>(ray);
+    const hit found = nearest(ray);
     if (!found.triangle.is_hit()) return {-1.0f, environment_};
     return {found.distance, 0.0f};
   }
 
-  WFPG_HD triangle_hit intersect(const wfpg::ray& ray) const { return cast<false>(ray).triangle; }
+  WFPG_HD triangle_hit intersect(const wfpg::ray& ray) const { return nearest(ray).triangle; }
 
   /// True where anything lies inside (t_min, t_max).
-  WFPG_HD bool occluded(const wfpg::ray& ray) const { return cast<true>(ray).triangle.is_hit(); }
+  WFPG_HD bool occluded(const wfpg::ray& ray) const {
+    return (cut_outs_ ? nearest(ray) : cast<true>(ray)).triangle.is_hit();
+  }
 
  private:
   struct hit {
@@ -188,6 +191,10 @@ class bvh_caster {
 
   /// With fewer lanes on their way to a leaf, those that are there do not wait for them.
   static constexpr int least_company = 24;
+
+  WFPG_HD hit nearest(const wfpg::ray& ray) const {
+    return cast_through_cut_outs(cut_outs_, ray, [this](const wfpg::ray& r) { return cast<false>(r); });
+  }
 
   /// The nearest hit, or any.
   template <bool Any>
@@ -266,6 +273,7 @@ class bvh_caster {
 
   const bvh_node* nodes_ = nullptr;
   const bvh_triangle* triangles_ = nullptr;
+  const scene_view* cut_outs_ = nullptr;
   float environment_ = 0.0f;
   std::uint32_t one_ = detail::byte_float_base;  // where compilers do not know it
 };

@@ -21,6 +21,8 @@
 #include <thrust/sort.h>
 #include <thrust/transform_reduce.h>
 
+#include <vector>
+
 namespace render {
 
 struct bvh_options {
@@ -298,9 +300,11 @@ class bvh_scene {
 
   /// Over a scene whose arrays the policy has already.
   bvh_scene(const Exec& exec, const scene& host, const scene_view& arrays)
-      : bvh_scene(exec, {arrays.positions, arrays.triangles}, wfpg::luminance(host.environment)) {}
+      : bvh_scene(exec, {arrays.positions, arrays.triangles}, wfpg::luminance(host.environment)) {
+    if (has_cut_outs(host)) cut_outs_ = wfpg::buffer<scene_view, Exec>(exec, std::vector<scene_view>{arrays});
+  }
 
-  bvh_caster caster() const { return {nodes_.data(), triangles_.data(), environment_}; }
+  bvh_caster caster() const { return {nodes_.data(), triangles_.data(), cut_outs_.data(), environment_}; }
   std::size_t bytes() const { return nodes_.bytes() + triangles_.bytes(); }
   std::size_t node_count() const { return nodes_.size(); }
 
@@ -371,6 +375,7 @@ class bvh_scene {
 
   wfpg::buffer<bvh_node, Exec> nodes_;
   wfpg::buffer<bvh_triangle, Exec> triangles_;
+  wfpg::buffer<scene_view, Exec> cut_outs_;  // one, or none
   float environment_ = 0.0f;
 };
 

@@ -7,6 +7,8 @@
 #include <wfpg/buffer.hpp>
 #include <wfpg/error.hpp>
 
+#include <algorithm>
+
 namespace render {
 
 inline constexpr std::uint32_t no_triangle = 0xffffffffu;
@@ -23,6 +25,34 @@ struct triangle_hit {
 /// Texels of a texture inside scene_view::texels.
 struct texture_span {
   std::uint32_t first, width, height;
+  texture_wrap wrap_u, wrap_v;
+};
+
+/// A coordinate of a texture between two of its `size` texels along one axis.
+struct texel_pair {
+  std::uint32_t first, second;
+  float second_weight;
+
+  WFPG_HD texel_pair(float coordinate, std::uint32_t size, texture_wrap wrap) {
+    // Only near the origin is there precision for a texel; two copies show a mirrored one.
+    const float period = wrap == texture_wrap::mirrored_repeat ? 2.0f : 1.0f;
+    const float near = wrap == texture_wrap::clamp_to_edge
+                           ? glm::clamp(coordinate, 0.0f, 1.0f)
+                           : coordinate - period * std::floor(coordinate / period);
+    const float x = near * static_cast<float>(size) - 0.5f, floor = std::floor(x);
+    second_weight = x - floor;
+    first = wrapped(static_cast<std::int32_t>(floor), static_cast<std::int32_t>(size), wrap);
+    second = wrapped(static_cast<std::int32_t>(floor) + 1, static_cast<std::int32_t>(size), wrap);
+  }
+
+ private:
+  // `i` is in [-1, 2 size].
+  WFPG_HD static std::uint32_t wrapped(std::int32_t i, std::int32_t size, texture_wrap wrap) {
+    if (wrap == texture_wrap::clamp_to_edge) return static_cast<std::uint32_t>(glm::clamp(i, 0, size - 1));
+    const std::int32_t copies = wrap == texture_wrap::mirrored_repeat ? 2 * size : size;
+    const std::int32_t at = (i + copies) % copies;
+    return static_cast<std::uint32_t>(at < size ? at : copies - 1 - at);
+  }
 };
 
 /// A point of the scene's geometry, before it is known from where it is seen.
@@ -55,7 +85,7 @@ struct scene_view {
   wfpg::array_view<const std::uint32_t> triangle_materials;
   wfpg::array_view<const material> materials;
   wfpg::array_view<const texture_span> textures;
-  wfpg::array_view<const vec3> texels;
+  wfpg::array_view<const vec4> texels;
   vec3 environment{0.0f};
 
   WFPG_HD const material& material_of(std::uint32_t triangle) const {
@@ -80,24 +110,36 @@ struct scene_view {
       if (length > 1e-6f) point.normal = n / length;
       if (glm::dot(point.normal, point.geometric_normal) < 0.0f) point.normal = -point.normal;
     }
-    if (!uvs.empty()) point.uv = w * uvs[corners.x] + hit.u * uvs[corners.y] + hit.v * uvs[corners.z];
+    point.uv = uv_at(hit);
     return point;
   }
 
-  /// Texture `index` at `uv`, v down; bilinear and repeated.
-  WFPG_HD vec3 texel(std::int32_t index, vec2 uv) const {
-    const texture_span span = textures[index];
-    const float x = (uv.x - std::floor(uv.x)) * static_cast<float>(span.width) - 0.5f;
-    const float y = (uv.y - std::floor(uv.y)) * static_cast<float>(span.height) - 0.5f;
-    const float fx = x - std::floor(x), fy = y - std::floor(y);
-    // x and y are at least -1/2: one width more keeps the index from being negative.
-    const auto column = static_cast<std::uint32_t>(std::floor(x) + static_cast<float>(span.width));
-    const auto row = static_cast<std::uint32_t>(std::floor(y) + static_cast<float>(span.height));
-    const auto at = [&](std::uint32_t c, std::uint32_t r) {
-      return texels[span.first + (r % span.height) * span.width + c % span.width];
+  /// Texture coordinates; 0 where there are none.
+  WFPG_HD vec2 uv_at(triangle_hit hit) const {
+    if (uvs.empty()) return vec2(0.0f);
+    const uvec3 corners = triangles[hit.triangle];
+    return (1.0f - hit.u - hit.v) * uvs[corners.x] + hit.u * uvs[corners.y] + hit.v * uvs[corners.z];
+  }
+
+  /// What a texture shows at `uv`, v down. Precondition: there is one.
+  WFPG_HD vec4 texel(const texture_reference& reference, vec2 uv) const {
+    const texture_span span = textures[reference.index];
+    const vec2 place = reference.transformed(uv);
+    const texel_pair column(place.x, span.width, span.wrap_u), row(place.y, span.height, span.wrap_v);
+    const float fx = column.second_weight, fy = row.second_weight;
+    const auto along = [&](std::uint32_t r) {
+      const std::size_t first = span.first + std::size_t(r) * span.width;
+      return (1.0f - fx) * texels[first + column.first] + fx * texels[first + column.second];
     };
-    return (1.0f - fy) * ((1.0f - fx) * at(column, row) + fx * at(column + 1, row)) +
-           fy * ((1.0f - fx) * at(column, row + 1) + fx * at(column + 1, row + 1));
+    return (1.0f - fy) * along(row.first) + fy * along(row.second);
+  }
+
+  /// True where the material of a triangle has a hole at the hit.
+  WFPG_HD bool is_cut_out(triangle_hit hit) const {
+    const material& m = material_of(hit.triangle);
+    if (!(m.alpha_cutoff > 0.0f)) return false;
+    const float alpha = m.base_texture.index >= 0 ? texel(m.base_texture, uv_at(hit)).w : 1.0f;
+    return m.opacity * alpha < m.alpha_cutoff;
   }
 
   /// The surface at `hit` seen along `outgoing` (unit length, away from the surface).
@@ -116,14 +158,13 @@ struct scene_view {
     if (front) result.emission = scatters.emission;
     bsdf& f = result.surface.bsdf;
     f.kind = scatters.kind;
-    set_lobes(scatters, f);
+    set_lobes(scatters, at.uv, f);
     // A dielectric has to know inside from outside; the others reflect on either side.
     const float outward = f.transmits() ? side : 1.0f;
     f.normal = outward * facing;
     f.geometric_normal = outward * side * at.geometric_normal;
     f.colour = scatters.base_color;
-    if (scatters.base_texture >= 0) f.colour *= texel(scatters.base_texture, at.uv);
-    f.alpha = glm::max(least_alpha, scatters.alpha);
+    if (scatters.base_texture.index >= 0) f.colour *= vec3(texel(scatters.base_texture, at.uv));
     f.ior = scatters.ior;
     result.surface.position = at.position;
     result.surface.geometric_normal = f.geometric_normal;
@@ -133,9 +174,12 @@ struct scene_view {
   }
 
  private:
-  WFPG_HD static void set_lobes(const material& scatters, bsdf& f) {
+  WFPG_HD void set_lobes(const material& scatters, vec2 uv, bsdf& f) const {
+    const texture_reference& varied = scatters.metallic_roughness_texture;
+    const vec4 factors = varied.index >= 0 ? texel(varied, uv) : vec4(1.0f);
+    f.alpha = glm::max(least_alpha, scatters.alpha * factors.y * factors.y);
     if (f.kind < first_kind_of_all_lobes) return;
-    f.factors.metallic = unorm8(scatters.metallic);
+    f.factors.metallic = unorm8(scatters.metallic * factors.z);
     f.factors.specular = unorm8(scatters.specular);
     f.factors.transmission = unorm8(scatters.transmission);
     f.factors.diffuse_transmission = unorm8(scatters.diffuse_transmission);
@@ -145,6 +189,12 @@ struct scene_view {
   static constexpr float least_cosine = 1e-2f;
   static constexpr float least_alpha = 1e-3f;
 };
+
+/// Whether any material of a scene has holes.
+inline bool has_cut_outs(const scene& host) {
+  return std::any_of(host.materials.begin(), host.materials.end(),
+                     [](const material& m) { return m.alpha_cutoff > 0.0f; });
+}
 
 /// The arrays of a scene in the memory of a policy.
 template <class Exec>
@@ -161,14 +211,14 @@ class device_scene {
         environment_(host.environment) {
     check(host);
     std::vector<texture_span> spans;
-    std::vector<vec3> texels;
+    std::vector<vec4> texels;
     for (const texture& t : host.textures) {
       spans.push_back({static_cast<std::uint32_t>(texels.size()), static_cast<std::uint32_t>(t.width),
-                       static_cast<std::uint32_t>(t.height)});
+                       static_cast<std::uint32_t>(t.height), t.wrap_u, t.wrap_v});
       texels.insert(texels.end(), t.texels.begin(), t.texels.end());
     }
     textures_ = wfpg::buffer<texture_span, Exec>(exec, spans);
-    texels_ = wfpg::buffer<vec3, Exec>(exec, texels);
+    texels_ = wfpg::buffer<vec4, Exec>(exec, texels);
   }
 
   scene_view view() const {
@@ -201,10 +251,14 @@ class device_scene {
     for (const std::uint32_t m : host.triangle_materials)
       require(m < host.materials.size(), "an element of scene.triangle_materials", m,
               "below the number of materials");
+    for (const texture& t : host.textures)
+      require(t.width > 0 && t.height > 0 && t.texels.size() == std::size_t(t.width) * std::size_t(t.height),
+              "texture.texels.size()", t.texels.size(), "positive, and width times height");
     const auto textures = static_cast<std::int32_t>(host.textures.size());
     for (const material& m : host.materials)
-      require(m.base_texture < textures, "material.base_texture", m.base_texture,
-              "below the number of textures");
+      for (const texture_reference& reference : {m.base_texture, m.metallic_roughness_texture})
+        require(reference.index < textures, "texture_reference.index", reference.index,
+                "below the number of textures");
   }
 
   wfpg::buffer<vec3, Exec> positions_, normals_;
@@ -213,7 +267,7 @@ class device_scene {
   wfpg::buffer<std::uint32_t, Exec> triangle_materials_;
   wfpg::buffer<material, Exec> materials_;
   wfpg::buffer<texture_span, Exec> textures_;
-  wfpg::buffer<vec3, Exec> texels_;
+  wfpg::buffer<vec4, Exec> texels_;
   vec3 environment_;
 };
 

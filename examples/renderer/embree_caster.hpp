@@ -1,7 +1,7 @@
 // Embree 3 as the ray caster of the renderer and of the guider.
 #pragma once
 
-#include "device_scene.hpp"
+#include "cut_outs.hpp"
 
 #include <wfpg/ray_caster.hpp>
 
@@ -14,23 +14,21 @@ namespace render {
 /// Casts rays, from any thread. Trivially copyable; valid while the embree_scene it is from lives.
 class embree_caster {
  public:
-  embree_caster(RTCScene scene, float environment) : scene_(scene), environment_(environment) {}
+  embree_caster(RTCScene scene, const scene_view* cut_outs, float environment)
+      : scene_(scene), cut_outs_(cut_outs), environment_(environment) {}
 
   /// The guider's form: distance, or the environment's luminance.
   wfpg::ray_hit operator()(const wfpg::ray& ray) const {
-    const RTCRayHit found = cast(ray);
-    if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {-1.0f, environment_};
-    return {found.ray.tfar, 0.0f};
+    const hit found = nearest(ray);
+    if (!found.triangle.is_hit()) return {-1.0f, environment_};
+    return {found.distance, 0.0f};
   }
 
-  triangle_hit intersect(const wfpg::ray& ray) const {
-    const RTCRayHit found = cast(ray);
-    if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
-    return {found.hit.primID, found.hit.u, found.hit.v};
-  }
+  triangle_hit intersect(const wfpg::ray& ray) const { return nearest(ray).triangle; }
 
   /// True where anything lies inside (t_min, t_max).
   bool occluded(const wfpg::ray& ray) const {
+    if (cut_outs_) return nearest(ray).triangle.is_hit();
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     RTCRay shadow = convert(ray);
@@ -39,6 +37,15 @@ class embree_caster {
   }
 
  private:
+  struct hit {
+    triangle_hit triangle;
+    float distance = 0.0f;
+  };
+
+  hit nearest(const wfpg::ray& ray) const {
+    return cast_through_cut_outs(cut_outs_, ray, [this](const wfpg::ray& r) { return cast(r); });
+  }
+
   static RTCRay convert(const wfpg::ray& ray) {
     RTCRay result{};
     result.org_x = ray.origin.x;
@@ -53,17 +60,19 @@ class embree_caster {
     return result;
   }
 
-  RTCRayHit cast(const wfpg::ray& ray) const {
+  hit cast(const wfpg::ray& ray) const {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     RTCRayHit result{};
     result.ray = convert(ray);
     result.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(scene_, &context, &result);
-    return result;
+    if (result.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
+    return {{result.hit.primID, result.hit.u, result.hit.v}, result.ray.tfar};
   }
 
   RTCScene scene_;
+  const scene_view* cut_outs_;
   float environment_;
 };
 
@@ -73,11 +82,15 @@ class embree_scene {
   static constexpr const char* name = "embree";
 
   /// Builds with all the machine's threads. Throws std::runtime_error where Embree fails.
+  /// Precondition: the scene has no cut-outs.
   explicit embree_scene(const scene& host);
+  /// The same with cut-outs. `arrays` are the scene's, in host memory, and outlive this.
   template <class Exec>
-  embree_scene(const Exec&, const scene& host, const scene_view&) : embree_scene(host) {}
+  embree_scene(const Exec&, const scene& host, const scene_view& arrays) : embree_scene(host) {
+    if (has_cut_outs(host)) cut_outs_ = std::make_unique<const scene_view>(arrays);
+  }
 
-  embree_caster caster() const { return {scene_.get(), environment_}; }
+  embree_caster caster() const { return {scene_.get(), cut_outs_.get(), environment_}; }
 
  private:
   struct release {
@@ -87,6 +100,7 @@ class embree_scene {
 
   std::unique_ptr<RTCDeviceTy, release> device_;
   std::unique_ptr<RTCSceneTy, release> scene_;
+  std::unique_ptr<const scene_view> cut_outs_;
   float environment_ = 0.0f;
 };
 

@@ -8,7 +8,8 @@
 namespace render {
 
 /// Reads the file's default scene: triangle meshes with node transforms, normals and the first texture
-/// coordinates; base colour factor and texture, metallic-roughness, KHR_materials_transmission,
+/// coordinates; base colour and metallic-roughness, factors and textures with their
+/// wrap modes and KHR_texture_transform, alpha masks; KHR_materials_transmission,
 /// _diffuse_transmission, _ior, _specular (its factor), _emissive_strength and _volume (whether it is one);
 /// the first perspective camera (without one: a view of the bounding box from +z); from the scene's extras
 /// `resolution` (width, height) and `environment.radiance` (a number or RGB). What else the file asks for is

@@ -6,12 +6,14 @@
 #include <stb_image.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace render::gltf {
 namespace {
@@ -24,7 +26,10 @@ constexpr float least_rough_ior = 1.01f;
 /// Reflects all but half a percent: as good as infinite.
 constexpr float largest_ior = 1000.0f;
 
-/// Decoded images beyond this are refused: 64 Mi texels take 768 MiB.
+/// Of an alpha mask; above 1 nothing is left.
+constexpr double largest_cutoff = 2.0;
+
+/// Decoded images beyond this are refused: 64 Mi texels take 1 GiB.
 constexpr int max_side = 1 << 15;
 constexpr std::int64_t max_texels = std::int64_t(1) << 26;
 
@@ -35,19 +40,26 @@ struct free_pixels {
 template <class T>
 using pixel_pointer = std::unique_ptr<T, free_pixels>;
 
-/// Decoded sRGB of 8 or 16 bits as linear RGB; grey is repeated, alpha ignored.
+/// What an image's numbers are; alpha is linear in both.
+enum class encoding { srgb, linear };
+
+/// Decoded RGBA of 8 or 16 bits as linear numbers; grey is repeated.
 template <class T>
-texture linear_texture(const T* pixels, int width, int height) {
+texture linear_texture(const T* pixels, int width, int height, encoding encoded) {
   constexpr int levels = std::numeric_limits<T>::max();
+  const auto fraction = [](int i) { return float(i) / float(levels); };
   std::vector<float> curve(std::size_t(levels) + 1);
-  for (int i = 0; i <= levels; ++i) curve[std::size_t(i)] = srgb_to_linear(float(i) / float(levels));
-  texture result{width, height, std::vector<vec3>(std::size_t(width) * std::size_t(height))};
-  for (std::size_t i = 0; i < result.texels.size(); ++i)
-    result.texels[i] = {curve[pixels[3 * i]], curve[pixels[3 * i + 1]], curve[pixels[3 * i + 2]]};
+  for (int i = 0; i <= levels; ++i)
+    curve[std::size_t(i)] = encoded == encoding::srgb ? srgb_to_linear(fraction(i)) : fraction(i);
+  texture result{width, height, std::vector<vec4>(std::size_t(width) * std::size_t(height))};
+  for (std::size_t i = 0; i < result.texels.size(); ++i) {
+    const T* const p = pixels + 4 * i;
+    result.texels[i] = {curve[p[0]], curve[p[1]], curve[p[2]], fraction(p[3])};
+  }
   return result;
 }
 
-texture decode(const byte_range& encoded, const std::string& name) {
+texture decode(const byte_range& encoded, encoding is, const std::string& name) {
   if (encoded.size == 0 || encoded.size > std::size_t(std::numeric_limits<int>::max()))
     throw std::runtime_error(name + " has no usable data");
   const int size = static_cast<int>(encoded.size);
@@ -59,12 +71,12 @@ texture decode(const byte_range& encoded, const std::string& name) {
                              std::to_string(height));
   if (stbi_is_16_bit_from_memory(encoded.first, size)) {
     const pixel_pointer<stbi_us> pixels(
-        stbi_load_16_from_memory(encoded.first, size, &width, &height, &channels, 3));
-    if (pixels) return linear_texture(pixels.get(), width, height);
+        stbi_load_16_from_memory(encoded.first, size, &width, &height, &channels, 4));
+    if (pixels) return linear_texture(pixels.get(), width, height, is);
   } else {
     const pixel_pointer<stbi_uc> pixels(
-        stbi_load_from_memory(encoded.first, size, &width, &height, &channels, 3));
-    if (pixels) return linear_texture(pixels.get(), width, height);
+        stbi_load_from_memory(encoded.first, size, &width, &height, &channels, 4));
+    if (pixels) return linear_texture(pixels.get(), width, height, is);
   }
   throw std::runtime_error(name + " cannot be decoded: " + stbi_failure_reason());
 }
@@ -80,24 +92,35 @@ double extension_number(const tinygltf::Material& source, const char* extension,
   return found == source.extensions.end() ? otherwise : number_of(found->second, member, otherwise);
 }
 
+/// The numbers of an extension's member, which has to have as many as `numbers`, or `numbers` without it.
+template <std::size_t N>
+std::array<double, N> extension_numbers(const tinygltf::Value& extension, const char* member,
+                                        std::array<double, N> numbers) {
+  if (!extension.IsObject() || !extension.Has(member)) return numbers;
+  const tinygltf::Value& value = extension.Get(member);
+  if (!value.IsArray() || value.ArrayLen() != N)
+    throw std::runtime_error(std::string("a ") + member + " has not " + std::to_string(N) + " components");
+  for (std::size_t i = 0; i < N; ++i) {
+    const double number = value.Get(int(i)).IsNumber() ? value.Get(int(i)).GetNumberAsDouble() : numbers[i];
+    if (std::isfinite(number)) numbers[i] = number;
+  }
+  return numbers;
+}
+
 /// A colour of one of a material's extensions, channels in [0, 1]; white where it is missing.
 vec3 extension_colour(const tinygltf::Material& source, const char* extension, const char* member) {
   const auto found = source.extensions.find(extension);
-  if (found == source.extensions.end() || !found->second.IsObject() || !found->second.Has(member))
-    return vec3(1.0f);
-  const tinygltf::Value& value = found->second.Get(member);
-  if (!value.IsArray() || value.ArrayLen() != 3)
-    throw std::runtime_error(std::string("a ") + member + " has not 3 components");
-  vec3 colour(1.0f);
-  for (int c = 0; c < 3; ++c)
-    if (value.Get(c).IsNumber()) colour[c] = float(limited(value.Get(c).GetNumberAsDouble(), 0.0, 1.0));
-  return colour;
+  if (found == source.extensions.end()) return vec3(1.0f);
+  const auto rgb = extension_numbers<3>(found->second, member, {1.0, 1.0, 1.0});
+  return {float(limited(rgb[0], 0.0, 1.0)), float(limited(rgb[1], 0.0, 1.0)),
+          float(limited(rgb[2], 0.0, 1.0))};
 }
 
 /// The cheapest kind that scatters as the material's lobes do together.
 material_kind kind_of(const material& m, bool thin) {
   const bool smooth = m.alpha == 0.0f;
-  if (m.metallic == 1.0f) return smooth ? material_kind::mirror : material_kind::conductor;
+  const bool varies = m.metallic_roughness_texture.index >= 0 && m.metallic > 0.0f;
+  if (m.metallic == 1.0f && !varies) return smooth ? material_kind::mirror : material_kind::conductor;
   const bool has_one_base = m.metallic == 0.0f && m.diffuse_transmission == 0.0f;
   if (has_one_base && m.transmission == 1.0f && m.specular == 1.0f) {
     if (smooth || m.ior < least_rough_ior)
@@ -110,6 +133,29 @@ material_kind kind_of(const material& m, bool thin) {
   }
   const bool transmits = m.transmission > 0.0f || m.diffuse_transmission > 0.0f;
   return thin && transmits ? material_kind::thin_metallic_roughness : material_kind::metallic_roughness;
+}
+
+texture_wrap wrap_of(int gltf_mode) {
+  switch (gltf_mode) {
+    case TINYGLTF_TEXTURE_WRAP_REPEAT:
+      return texture_wrap::repeat;
+    case TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT:
+      return texture_wrap::mirrored_repeat;
+    case TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE:
+      return texture_wrap::clamp_to_edge;
+    default:
+      throw std::runtime_error("a sampler's wrap mode " + std::to_string(gltf_mode) + " is none");
+  }
+}
+
+/// KHR_texture_transform: scaled, then turned counter-clockwise (v runs down), then moved.
+void set_transform(const tinygltf::Value& extension, texture_reference& target) {
+  const auto scale = extension_numbers<2>(extension, "scale", {1.0, 1.0});
+  const auto offset = extension_numbers<2>(extension, "offset", {0.0, 0.0});
+  const double angle = number_of(extension, "rotation", 0.0), c = std::cos(angle), s = std::sin(angle);
+  target.u_axis = {float(c * scale[0]), float(-s * scale[0])};
+  target.v_axis = {float(s * scale[1]), float(c * scale[1])};
+  target.offset = {float(offset[0]), float(offset[1])};
 }
 
 class material_reader {
@@ -134,7 +180,13 @@ class material_reader {
     if (pbr.baseColorFactor.size() < 3) throw std::runtime_error("a baseColorFactor has too few components");
     for (int c = 0; c < 3; ++c)
       result.base_color[c] = float(limited(pbr.baseColorFactor[std::size_t(c)], 0.0, 1.0));
-    if (pbr.baseColorTexture.index >= 0) result.base_texture = texture_of(pbr.baseColorTexture);
+    result.base_texture = texture_of(pbr.baseColorTexture, encoding::srgb);
+    if (source.alphaMode == "MASK") {
+      if (pbr.baseColorFactor.size() == 4) result.opacity = float(limited(pbr.baseColorFactor[3], 0.0, 1.0));
+      result.alpha_cutoff = float(limited(source.alphaCutoff, 0.0, largest_cutoff));
+    } else if (source.alphaMode == "BLEND") {
+      warn("blended alpha is not supported: the surface is opaque");
+    }
   }
 
   void read_lobes(const tinygltf::Material& source, material& result) {
@@ -142,6 +194,7 @@ class material_reader {
     const auto share = [&](const char* extension, const char* member, double otherwise) {
       return float(limited(extension_number(source, extension, member, otherwise), 0.0, 1.0));
     };
+    result.metallic_roughness_texture = texture_of(pbr.metallicRoughnessTexture, encoding::linear);
     const double roughness = limited(pbr.roughnessFactor, 0.0, 1.0);
     result.alpha = float(roughness * roughness);
     result.metallic = float(limited(pbr.metallicFactor, 0.0, 1.0));
@@ -180,11 +233,8 @@ class material_reader {
   }
 
   void warn_of_unsupported(const tinygltf::Material& source) {
-    if (source.pbrMetallicRoughness.metallicRoughnessTexture.index >= 0)
-      warn("metallic-roughness textures are not supported");
     if (source.normalTexture.index >= 0) warn("normal textures are not supported");
     if (source.occlusionTexture.index >= 0) warn("occlusion textures are not supported");
-    if (source.alphaMode != "OPAQUE") warn("alpha is not supported: every surface is opaque");
     if (extension_colour(source, "KHR_materials_specular", "specularColorFactor") != vec3(1.0f))
       warn("a specularColorFactor is not supported: taken as white");
     for (const auto& extension : source.extensions) warn_of_extension(extension.first, extension.second);
@@ -200,47 +250,69 @@ class material_reader {
       warn("absorption inside a volume is not supported");
   }
 
-  /// The index into scene::textures, -1 for none.
-  std::int32_t texture_of(const tinygltf::TextureInfo& info) {
-    if (info.texCoord != 0) {
-      warn("texture coordinates other than TEXCOORD_0 are not supported: the texture is left out");
-      return -1;
+  /// TextureInfo is a type of tinygltf's for each place that refers to a texture.
+  template <class TextureInfo>
+  texture_reference texture_of(const TextureInfo& info, encoding is) {
+    texture_reference result;
+    if (info.index < 0) return result;
+    int coordinates = info.texCoord;
+    for (const auto& [name, extension] : info.extensions) {
+      if (name != "KHR_texture_transform") {
+        warn("the extension " + name + " of textures is not supported");
+        continue;
+      }
+      set_transform(extension, result);
+      coordinates = int(limited(number_of(extension, "texCoord", coordinates), 0.0, 1e6));
     }
-    if (!info.extensions.empty()) warn("texture transforms are not supported");
-    if (std::size_t(info.index) >= model_.textures.size())
-      throw std::runtime_error("texture " + std::to_string(info.index) + " does not exist");
-    const tinygltf::Texture& source = model_.textures[std::size_t(info.index)];
-    warn_of_sampler(source.sampler);
-    if (source.source >= 0) return image_of(source.source);
-    warn("a texture without a PNG or JPEG image is left out");
-    return -1;
+    if (coordinates != 0)
+      warn("texture coordinates other than TEXCOORD_0 are not supported: the texture is left out");
+    else
+      result.index = index_of(info.index, is);
+    return result;
   }
 
-  void warn_of_sampler(int index) {
-    if (index < 0) return;
-    if (std::size_t(index) >= model_.samplers.size())
-      throw std::runtime_error("sampler " + std::to_string(index) + " does not exist");
-    const tinygltf::Sampler& sampler = model_.samplers[std::size_t(index)];
-    if (sampler.wrapS != TINYGLTF_TEXTURE_WRAP_REPEAT || sampler.wrapT != TINYGLTF_TEXTURE_WRAP_REPEAT)
-      warn("texture wrapping other than repeat is not supported: the texture is repeated");
+  /// The index into scene::textures, -1 for none.
+  std::int32_t index_of(int gltf_texture, encoding is) {
+    if (std::size_t(gltf_texture) >= model_.textures.size())
+      throw std::runtime_error("texture " + std::to_string(gltf_texture) + " does not exist");
+    const auto [entry, is_new] =
+        index_of_texture_.try_emplace({gltf_texture, is}, std::int32_t(target_.textures.size()));
+    if (!is_new) return entry->second;
+    const tinygltf::Texture& source = model_.textures[std::size_t(gltf_texture)];
+    if (source.source < 0) {
+      warn("a texture without a PNG or JPEG image is left out");
+      return entry->second = -1;
+    }
+    texture decoded = image_of(source.source, is);
+    set_wrapping(source.sampler, decoded);
+    target_.textures.push_back(std::move(decoded));
+    return entry->second;
   }
 
-  std::int32_t image_of(int index) {
+  void set_wrapping(int sampler, texture& target) {
+    if (sampler < 0) return;
+    if (std::size_t(sampler) >= model_.samplers.size())
+      throw std::runtime_error("sampler " + std::to_string(sampler) + " does not exist");
+    const tinygltf::Sampler& source = model_.samplers[std::size_t(sampler)];
+    target.wrap_u = wrap_of(source.wrapS);
+    target.wrap_v = wrap_of(source.wrapT);
+    if (source.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST)
+      warn("texture filters are not supported: all are bilinear");
+  }
+
+  texture image_of(int index, encoding is) const {
     if (std::size_t(index) >= model_.images.size())
       throw std::runtime_error("image " + std::to_string(index) + " does not exist");
-    const auto [entry, is_new] = texture_of_image_.try_emplace(index, std::int32_t(target_.textures.size()));
-    if (is_new) {
-      const tinygltf::Image& image = model_.images[std::size_t(index)];
-      const byte_range encoded = image.bufferView >= 0 ? view_bytes(model_, image.bufferView)
-                                                       : byte_range{image.image.data(), image.image.size()};
-      target_.textures.push_back(decode(encoded, "image " + std::to_string(index)));
-    }
-    return entry->second;
+    const tinygltf::Image& image = model_.images[std::size_t(index)];
+    const byte_range encoded = image.bufferView >= 0 ? view_bytes(model_, image.bufferView)
+                                                     : byte_range{image.image.data(), image.image.size()};
+    const bool in_file = !image.uri.empty() && image.uri.rfind("data:", 0) != 0;
+    return decode(encoded, is, "image " + std::to_string(index) + (in_file ? " (" + image.uri + ")" : ""));
   }
 
   const tinygltf::Model& model_;
   scene& target_;
-  std::map<int, std::int32_t> texture_of_image_;
+  std::map<std::pair<int, encoding>, std::int32_t> index_of_texture_;
 };
 
 }  // namespace

@@ -5,6 +5,8 @@
 
 #include <wfpg/exec/cuda.hpp>
 
+#include <stdexcept>
+
 namespace render {
 namespace {
 
@@ -14,7 +16,10 @@ class optix_accelerated {
   static constexpr const char* name = "optix";
 
   optix_accelerated(const wfpg::exec::cuda& exec, const scene& host, const scene_view& view)
-      : scene_(exec, view.positions, view.triangles, wfpg::luminance(host.environment)) {}
+      : scene_(exec, view.positions, view.triangles, wfpg::luminance(host.environment)) {
+    if (has_cut_outs(host))
+      throw std::runtime_error("--device optix does not support alpha masks; --device cuda does");
+  }
 
   optix_caster caster() const { return scene_.caster(); }
 

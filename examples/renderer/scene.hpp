@@ -4,21 +4,39 @@
 
 #include <wfpg/types.hpp>
 
+#include <glm/vec4.hpp>
+
 #include <cstdint>
 #include <string>
 #include <vector>
 
 namespace render {
 
+using glm::vec4;
 using wfpg::uvec3;
 using wfpg::vec2;
 using wfpg::vec3;
 
-/// Linear RGB texels, row by row from the top; looked up bilinearly and repeated.
+/// What lies beyond a texture's edges.
+enum class texture_wrap : std::uint8_t { repeat, mirrored_repeat, clamp_to_edge };
+
+/// Linear RGB texels and alpha, row by row from the top; looked up bilinearly.
 struct texture {
   int width = 0;
   int height = 0;
-  std::vector<vec3> texels;
+  std::vector<vec4> texels;
+  texture_wrap wrap_u = texture_wrap::repeat;
+  texture_wrap wrap_v = texture_wrap::repeat;
+};
+
+/// A texture of a material, and where on it a point of the surface lies.
+struct texture_reference {
+  std::int32_t index = -1;  ///< into scene::textures; -1: none, white
+  vec2 u_axis{1.0f, 0.0f};  ///< uv.x u_axis + uv.y v_axis + offset
+  vec2 v_axis{0.0f, 1.0f};
+  vec2 offset{0.0f};
+
+  WFPG_HD vec2 transformed(vec2 uv) const { return uv.x * u_axis + uv.y * v_axis + offset; }
 };
 
 enum class material_kind : std::uint8_t {
@@ -40,11 +58,14 @@ inline constexpr int material_key_bits = 4;
 /// How a surface scatters and emits.
 struct material {
   material_kind kind = material_kind::lambert;
-  vec3 base_color{0.8f};           ///< reflectance, per channel in [0, 1]
-  std::int32_t base_texture = -1;  ///< multiplies base_color; index into scene::textures, -1: none
-  float alpha = 0.1f;              ///< GGX roughness (not perceptual), (0, 1]
-  float ior = 1.5f;                ///< inside over outside, for plastic and dielectrics; not 1 of a rough one
-  float metallic = 0.0f;           ///< this and the next four: of kinds with all lobes, see lobe_factors
+  vec3 base_color{0.8f};                         ///< reflectance, per channel in [0, 1]
+  texture_reference base_texture;                ///< multiplies base_color and opacity
+  texture_reference metallic_roughness_texture;  ///< green multiplies the root of alpha, blue metallic
+  float opacity = 1.0f;                          ///< in [0, 1]
+  float alpha_cutoff = 0.0f;                     ///< where opacity is less there is a hole
+  float alpha = 0.1f;                            ///< GGX roughness (not perceptual), (0, 1]
+  float ior = 1.5f;       ///< inside over outside, for plastic and dielectrics; not 1 of a rough one
+  float metallic = 0.0f;  ///< this and the next four: of kinds with all lobes, see lobe_factors
   float specular = 1.0f;
   float transmission = 0.0f;
   float diffuse_transmission = 0.0f;  ///< positive of thin kinds alone

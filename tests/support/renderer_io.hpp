@@ -78,7 +78,7 @@ inline void check_consistent(const scene& s) {
     for (int i = 0; i < 3; ++i) bad += t[i] >= s.positions.size();
   for (std::uint32_t m : s.triangle_materials) bad += m >= s.materials.size();
   for (const vec3& n : s.normals) bad += std::abs(glm::length(n) - 1.0f) > 1e-4f;
-  for (const render::material& m : s.materials) bad += m.base_texture >= int(s.textures.size());
+  for (const render::material& m : s.materials) bad += m.base_texture.index >= int(s.textures.size());
   CHECK(bad == 0);
   CHECK(glm::length(s.view.forward) == Approx(1.0f));
   CHECK(glm::length(glm::cross(s.view.forward, s.view.up)) > 0.01f);
