@@ -269,8 +269,9 @@ TEST_CASE("light samples follow power, and report the density of a hit", "[rende
   int bright = 0;
   vec3 centre(0.0f);
   for (std::uint32_t i = 0; i < n; ++i) {
-    const light_sample drawn = lights.view().sample(geometry.view(), random(i, 0), random(i, 1));
-    REQUIRE(drawn.pdf == lights.view().pdf(drawn.radiance));
+    const std::uint32_t light = pick(lights.view().table, random(i, 0));
+    const emitter_point drawn = lights.view().sample_emitter(geometry.view(), light, random(i, 1));
+    REQUIRE(drawn.pdf == lights.view().pdf(wfpg::luminance(drawn.radiance)));
     if (drawn.radiance.x < 2.0f) continue;
     ++bright;
     centre += drawn.position;
@@ -278,6 +279,93 @@ TEST_CASE("light samples follow power, and report the density of a hit", "[rende
   }
   CHECK(bright / static_cast<double>(n) == Approx(0.75).margin(0.006));
   CHECK(glm::length(centre / static_cast<float>(bright) - vec3(1.0f / 3.0f, -1.0f / 3.0f, 0.0f)) < 0.01f);
+}
+
+TEST_CASE("lights without extent light what faces them", "[renderer]") {
+  material grey;
+  grey.base_color = vec3(0.5f);
+  scene s = square_of(grey);
+  setup narrow;
+  narrow.side = 1;
+  narrow.max_depth = 3;
+  punctual_light light;
+  light.position = {0.0f, 0.0f, 4.0f};
+  light.intensity = vec3(32.0f);
+  const auto radiance = [&](const punctual_light& source) {
+    s.punctual_lights = {source};
+    s.view.vertical_fov = 0.01f;
+    return trace<wfpg::exec::seq>(s, narrow).front().x;
+  };
+  // Albedo / pi times irradiance: 32 / 4².
+  CHECK(radiance(light) == Approx(0.5f / pi * 2.0f).epsilon(1e-3));
+  light.kind = punctual_kind::spot;
+  light.cos_inner = 0.9f;
+  light.cos_outer = 0.8f;
+  CHECK(radiance(light) == Approx(0.5f / pi * 2.0f).epsilon(1e-3));
+  light.direction = glm::normalize(vec3(std::sqrt(1.0f - 0.85f * 0.85f), 0.0f, -0.85f));
+  CHECK(radiance(light) == Approx(0.25f * 0.5f / pi * 2.0f).epsilon(2e-2));  // half way between the cones
+  light.direction = {0.0f, 0.0f, 1.0f};
+  CHECK(radiance(light) == 0.0f);
+  light.kind = punctual_kind::directional;
+  light.direction = {0.0f, 0.6f, -0.8f};
+  CHECK(radiance(light) == Approx(0.5f / pi * 32.0f * 0.8f).epsilon(1e-3));
+  light.direction = {0.0f, 0.0f, 1.0f};
+  CHECK(radiance(light) == 0.0f);
+}
+
+TEST_CASE("a solid absorbs by Beer's law, and an emitter shows its texture", "[renderer]") {
+  // A slab of glass, seen straight on, before an emitter.
+  scene s;
+  for (const float z : {0.0f, -1.0f, -2.0f}) {
+    const auto first = static_cast<std::uint32_t>(s.positions.size());
+    for (const vec2 corner : {vec2(-9, -9), vec2(9, -9), vec2(9, 9), vec2(-9, 9)}) {
+      s.positions.emplace_back(corner.x, corner.y, z);
+      s.uvs.push_back(vec2(0.5f));
+    }
+    for (const uvec3 t : {uvec3(0, 1, 2), uvec3(0, 2, 3)})
+      s.triangles.push_back(first + (z == -1.0f ? uvec3(t.x, t.z, t.y) : t));
+  }
+  s.triangle_materials = {0, 0, 0, 0, 1, 1};
+  s.materials.resize(2);
+  s.materials[0].kind = material_kind::dielectric;
+  s.materials[0].base_color = vec3(1.0f);
+  s.materials[0].ior = 1.0f;
+  s.materials[0].absorption = {0.5f, 1.0f, 2.0f};
+  s.materials[1].emission = vec3(4.0f);
+  s.materials[1].emission_texture.index = 0;
+  s.textures.push_back({1, 1, {vec4(0.5f, 1.0f, 1.0f, 1.0f)}});
+  s.view.position = {0.0f, 0.0f, 1.0f};
+  s.view.vertical_fov = 0.01f;
+  setup with;
+  with.side = 4;
+  const vec3 seen = trace<wfpg::exec::seq>(s, with).front();
+  const vec3 expected = vec3(2.0f, 4.0f, 4.0f) * glm::exp(-s.materials[0].absorption);
+  CHECK(glm::length(seen - expected) < 1e-3f);
+}
+
+TEST_CASE("next-event estimation finds a textured emitter's mean", "[renderer]") {
+  // A lamp of which the texture leaves half dark, above a floor.
+  material floor;
+  floor.base_color = vec3(0.7f);
+  scene s = square_of(floor);
+  for (const vec3 corner : {vec3(-1, -1, 1), vec3(-1, 1, 1), vec3(1, 1, 1), vec3(1, -1, 1)})
+    s.positions.push_back(corner);
+  for (const vec3& p : s.positions) s.uvs.push_back(0.5f * vec2(p) + vec2(0.5f));
+  s.triangles.insert(s.triangles.end(), {{4, 5, 6}, {4, 6, 7}});
+  s.triangle_materials = {0, 0, 1, 1};
+  s.materials.resize(2);
+  s.materials[1].emission = vec3(3.0f);
+  s.materials[1].emission_texture.index = 0;
+  s.textures.push_back({2, 1, {vec4(0.0f, 0.0f, 0.0f, 1.0f), vec4(1.0f)}});
+  s.view.position = {0.0f, -0.5f, 0.9f};
+  s.view.forward = {0.0f, 0.4f, -0.9f};
+  setup with{32, 3, true, 0, 32};
+  const batch on = batch_of(s, with);
+  with.nee = false;
+  const batch off = batch_of(s, with);
+  INFO(on.mean() << " with, " << off.mean() << " without");
+  CHECK(std::abs(on.mean() - off.mean()) < 4.0 * std::sqrt(on.variance_of_mean() + off.variance_of_mean()));
+  CHECK(on.mean() > 0.0);
 }
 
 TEST_CASE("textures are bilinear and repeat", "[renderer]") {

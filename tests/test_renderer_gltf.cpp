@@ -264,6 +264,45 @@ TEST_CASE("glTF: metallic-roughness textures, samplers and texture transforms", 
   CHECK(contains(tiny.error(), "sampler 0"));
 }
 
+TEST_CASE("glTF: punctual lights", "[renderer][gltf]") {
+  tiny_gltf tiny;
+  tiny.with("extensions", R"({"KHR_lights_punctual": {"lights": [
+      {"type": "spot", "intensity": 5, "color": [1, 0.5, 0], "spot": {"outerConeAngle": 0.5}},
+      {"type": "directional"}, {"type": "point", "range": 3}]}})");
+  tiny.with("nodes", R"([{"mesh": 0, "children": [1, 2, 3], "translation": [1, 2, 3]},
+      {"extensions": {"KHR_lights_punctual": {"light": 0}}, "rotation": [0, 0.7071067811865475, 0, 0.7071067811865476]},
+      {"extensions": {"KHR_lights_punctual": {"light": 1}}},
+      {"extensions": {"KHR_lights_punctual": {"light": 2}}}])");
+  const scene s = tiny.load();
+  REQUIRE(s.punctual_lights.size() == 3);
+  CHECK(s.punctual_lights[0].kind == render::punctual_kind::spot);
+  check_close(s.punctual_lights[0].position, {1, 2, 3});
+  check_close(s.punctual_lights[0].direction, {-1, 0, 0});
+  check_close(s.punctual_lights[0].intensity, {5, 2.5f, 0});
+  CHECK(s.punctual_lights[0].cos_outer == Approx(std::cos(0.5f)));
+  CHECK(s.punctual_lights[1].kind == render::punctual_kind::directional);
+  check_close(s.punctual_lights[1].direction, {0, 0, -1});
+  CHECK(warns(s, "range"));
+  tiny.with("nodes", R"([{"extensions": {"KHR_lights_punctual": {"light": 3}}}])");
+  CHECK(contains(tiny.error(), "light 3"));
+}
+
+TEST_CASE("glTF: volumes absorb, emission has textures", "[renderer][gltf]") {
+  temporary_folder folder;
+  render::write_png(folder.file("t.png"), render::make_image(1, 1));
+  tiny_gltf tiny;
+  tiny.with("images",
+            R"([{"uri": "data:image/png;base64,)" + base64(content_of(folder.file("t.png"))) + R"("}])");
+  tiny.with("textures", R"([{"source": 0}])");
+  tiny.with("materials", R"([{"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}},
+      {"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0}, "extensions": {
+        "KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume":
+          {"thicknessFactor": 1, "attenuationDistance": 2, "attenuationColor": [1, 0.5, 0.25]}}}])");
+  const scene s = tiny.load();
+  CHECK(s.materials[0].emission_texture.index == 0);
+  check_close(s.materials[1].absorption, {0.0f, std::log(2.0f) / 2.0f, std::log(4.0f) / 2.0f});
+}
+
 TEST_CASE("glTF: alpha masks", "[renderer][gltf]") {
   tiny_gltf tiny;
   const scene s = tiny.with("materials", R"([{"alphaMode": "MASK", "pbrMetallicRoughness":

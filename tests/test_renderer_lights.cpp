@@ -88,7 +88,8 @@ TEST_CASE("emitters are drawn by power, and their density by area is their radia
   constexpr std::uint32_t draws = 100000;
   double bright = 0.0;
   for (std::uint32_t i = 0; i < draws; ++i) {
-    const light_sample drawn = lights.view().sample(geometry.view(), numbers(i, 2), numbers(i, 3));
+    const std::uint32_t light = pick(lights.view().table, numbers(i, 2));
+    const emitter_point drawn = lights.view().sample_emitter(geometry.view(), light, numbers(i, 3));
     REQUIRE(drawn.pdf == Approx(static_cast<double>(drawn.radiance.x) / power));
     bright += drawn.radiance == vec3(2.0f) ? 1.0 : 0.0;
   }

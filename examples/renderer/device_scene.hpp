@@ -68,8 +68,10 @@ struct surface_point {
 /// What a path needs of a hit: how the surface scatters, how it emits, where rays may begin.
 struct hit_surface {
   wfpg::surface<bsdf> surface;
-  vec3 emission{0.0f};  ///< toward the viewer, W/(m² sr)
-  float offset = 0.0f;  ///< as in surface_point
+  vec3 emission{0.0f};             ///< toward the viewer, W/(m² sr)
+  float emitted_luminance = 0.0f;  ///< what it is on average, by which lights are chosen
+  vec3 absorption{0.0f};           ///< along the ray that ends here, 1 / scene unit
+  float offset = 0.0f;             ///< as in surface_point
 };
 
 /// A point from which a ray toward `direction` does not hit the surface it leaves.
@@ -84,6 +86,7 @@ struct scene_view {
   wfpg::array_view<const uvec3> triangles;
   wfpg::array_view<const std::uint32_t> triangle_materials;
   wfpg::array_view<const material> materials;
+  wfpg::array_view<const float> emitted_luminances;  ///< a material; means over its texture
   wfpg::array_view<const texture_span> textures;
   wfpg::array_view<const vec4> texels;
   vec3 environment{0.0f};
@@ -134,6 +137,11 @@ struct scene_view {
     return (1.0f - fy) * along(row.first) + fy * along(row.second);
   }
 
+  /// What the front of a material emits, W/(m² sr).
+  WFPG_HD vec3 emitted(const material& m, vec2 uv) const {
+    return m.emission_texture.index >= 0 ? m.emission * vec3(texel(m.emission_texture, uv)) : m.emission;
+  }
+
   /// True where the material of a triangle has a hole at the hit.
   WFPG_HD bool is_cut_out(triangle_hit hit) const {
     const material& m = material_of(hit.triangle);
@@ -155,7 +163,12 @@ struct scene_view {
 
     hit_surface result;
     result.offset = at.offset;
-    if (front) result.emission = scatters.emission;
+    if (!front) {
+      result.absorption = scatters.absorption;
+    } else if (scatters.emission != vec3(0.0f)) {
+      result.emission = emitted(scatters, at.uv);
+      result.emitted_luminance = emitted_luminances[at.material];
+    }
     bsdf& f = result.surface.bsdf;
     f.kind = scatters.kind;
     set_lobes(scatters, at.uv, f);
@@ -196,6 +209,22 @@ inline bool has_cut_outs(const scene& host) {
                      [](const material& m) { return m.alpha_cutoff > 0.0f; });
 }
 
+/// The luminance that each material of a scene emits, averaged over its texture.
+inline std::vector<float> emitted_luminances(const scene& host) {
+  std::vector<float> luminances;
+  for (const material& m : host.materials) {
+    vec3 mean(1.0f);
+    if (m.emission != vec3(0.0f) && m.emission_texture.index >= 0) {
+      glm::dvec3 sum(0.0);
+      const std::vector<vec4>& texels = host.textures[std::size_t(m.emission_texture.index)].texels;
+      for (const vec4& texel : texels) sum += glm::dvec3(texel);
+      mean = vec3(sum / static_cast<double>(texels.size()));
+    }
+    luminances.push_back(wfpg::luminance(m.emission * mean));
+  }
+  return luminances;
+}
+
 /// The arrays of a scene in the memory of a policy.
 template <class Exec>
 class device_scene {
@@ -210,6 +239,7 @@ class device_scene {
         materials_(exec, host.materials),
         environment_(host.environment) {
     check(host);
+    emitted_luminances_ = wfpg::buffer<float, Exec>(exec, emitted_luminances(host));
     std::vector<texture_span> spans;
     std::vector<vec4> texels;
     for (const texture& t : host.textures) {
@@ -229,6 +259,7 @@ class device_scene {
     v.triangles = triangles_.view();
     v.triangle_materials = triangle_materials_.view();
     v.materials = materials_.view();
+    v.emitted_luminances = emitted_luminances_.view();
     v.textures = textures_.view();
     v.texels = texels_.view();
     v.environment = environment_;
@@ -256,7 +287,8 @@ class device_scene {
               "texture.texels.size()", t.texels.size(), "positive, and width times height");
     const auto textures = static_cast<std::int32_t>(host.textures.size());
     for (const material& m : host.materials)
-      for (const texture_reference& reference : {m.base_texture, m.metallic_roughness_texture})
+      for (const texture_reference& reference :
+           {m.base_texture, m.metallic_roughness_texture, m.emission_texture})
         require(reference.index < textures, "texture_reference.index", reference.index,
                 "below the number of textures");
   }
@@ -266,6 +298,7 @@ class device_scene {
   wfpg::buffer<uvec3, Exec> triangles_;
   wfpg::buffer<std::uint32_t, Exec> triangle_materials_;
   wfpg::buffer<material, Exec> materials_;
+  wfpg::buffer<float, Exec> emitted_luminances_;
   wfpg::buffer<texture_span, Exec> textures_;
   wfpg::buffer<vec4, Exec> texels_;
   vec3 environment_;

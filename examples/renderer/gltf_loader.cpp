@@ -10,6 +10,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/matrix.hpp>
+#include <glm/vector_relational.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -123,7 +124,6 @@ class scene_reader {
     read_extras();
     if (!has_camera_) frame_everything();
     if (!model_.animations.empty()) warn("animations are not supported");
-    if (!model_.lights.empty()) warn("punctual lights are not supported");
   }
 
  private:
@@ -182,6 +182,8 @@ class scene_reader {
   void read_node(const tinygltf::Node& node, const glm::dmat4& to_world) {
     if (node.skin >= 0) warn("skinning is not supported");
     if (node.camera >= 0) read_camera(node.camera, to_world);
+    const auto light = node.extensions.find("KHR_lights_punctual");
+    if (light != node.extensions.end()) read_light(gltf::number_of(light->second, "light", -1.0), to_world);
     if (node.mesh < 0) return;
     if (std::size_t(node.mesh) >= model_.meshes.size())
       throw std::runtime_error("mesh " + std::to_string(node.mesh) + " does not exist");
@@ -284,6 +286,42 @@ class scene_reader {
     const double aspect = source.perspective.aspectRatio;
     if (aspect > 0.1 && aspect < 10.0) target_.width = int(std::lround(target_.height * aspect));
     has_camera_ = true;
+  }
+
+  void read_light(double index, const glm::dmat4& to_world) {
+    if (!(index >= 0.0 && index < double(model_.lights.size())))
+      throw std::runtime_error("light " + std::to_string(int(std::clamp(index, -1.0, 1e9))) +
+                               " does not exist");
+    const tinygltf::Light& source = model_.lights[std::size_t(index)];
+    punctual_light light;
+    if (source.type == "spot")
+      light.kind = punctual_kind::spot;
+    else if (source.type == "directional")
+      light.kind = punctual_kind::directional;
+    else if (source.type != "point")
+      return warn("lights of type '" + source.type + "' are not supported");
+    light.position = vec3(to_world[3]);
+    light.direction = unit_or(-vec3(to_world[2]), vec3(0.0f));
+    light.intensity = light_intensity(source);
+    light.cos_inner = float(std::cos(source.spot.innerConeAngle));
+    light.cos_outer = float(std::cos(source.spot.outerConeAngle));
+    if (!finite(light.position) || light.direction == vec3(0.0f))
+      throw std::runtime_error("a light's transform is degenerate");
+    if (light.kind == punctual_kind::spot && !(light.cos_inner > light.cos_outer))
+      throw std::runtime_error("a spot's inner cone is not inside its outer one");
+    if (source.range > 0.0) warn("the range of lights is not supported: they shine on everything");
+    target_.punctual_lights.push_back(light);
+  }
+
+  static vec3 light_intensity(const tinygltf::Light& source) {
+    if (!source.color.empty() && source.color.size() != 3)
+      throw std::runtime_error("a light's color has not 3 components");
+    vec3 intensity(0.0f);
+    for (int c = 0; c < 3; ++c)
+      intensity[c] = float(source.intensity * (source.color.empty() ? 1.0 : source.color[std::size_t(c)]));
+    if (!finite(intensity) || glm::any(glm::lessThan(intensity, vec3(0.0f))))
+      throw std::runtime_error("a light's intensity is not finite or negative");
+    return intensity;
   }
 
   /// Looks along -z at the whole bounding box.

@@ -3,6 +3,7 @@
 
 #include "image_io.hpp"
 
+#include <glm/exponential.hpp>
 #include <stb_image.h>
 
 #include <algorithm>
@@ -218,6 +219,16 @@ class material_reader {
     if (result.kind == material_kind::metallic_roughness && result.transmission > 0.0f)
       result.ior = std::max(result.ior, least_rough_ior);
     result.alpha = std::max(result.alpha, min_alpha);
+    if (!thin && result.transmission > 0.0f && result.metallic < 1.0f) result.absorption = absorption(source);
+  }
+
+  // KHR_materials_volume: what is left after the attenuation distance is the attenuation colour.
+  static vec3 absorption(const tinygltf::Material& source) {
+    constexpr float least_left = 1e-6f;
+    const double distance = extension_number(source, "KHR_materials_volume", "attenuationDistance", 0.0);
+    if (!(distance > 0.0)) return vec3(0.0f);
+    const vec3 left = extension_colour(source, "KHR_materials_volume", "attenuationColor");
+    return -glm::log(glm::max(left, vec3(least_left))) / float(distance);
   }
 
   void read_emission(const tinygltf::Material& source, material& result) {
@@ -229,7 +240,7 @@ class material_reader {
       result.emission[c] = float(limited(source.emissiveFactor[std::size_t(c)] * strength, 0.0, largest));
     const bool emits = result.emission != vec3(0.0f);
     if (emits && source.doubleSided) warn("two-sided emission is not supported: the front side emits");
-    if (emits && source.emissiveTexture.index >= 0) warn("emissive textures are not supported");
+    if (emits) result.emission_texture = texture_of(source.emissiveTexture, encoding::srgb);
   }
 
   void warn_of_unsupported(const tinygltf::Material& source) {
@@ -237,17 +248,18 @@ class material_reader {
     if (source.occlusionTexture.index >= 0) warn("occlusion textures are not supported");
     if (extension_colour(source, "KHR_materials_specular", "specularColorFactor") != vec3(1.0f))
       warn("a specularColorFactor is not supported: taken as white");
-    for (const auto& extension : source.extensions) warn_of_extension(extension.first, extension.second);
+    for (const auto& extension : source.extensions) warn_of_extension(extension.first);
   }
 
-  void warn_of_extension(const std::string& name, const tinygltf::Value& value) {
-    const char* read_above[] = {"KHR_materials_diffuse_transmission", "KHR_materials_emissive_strength",
-                                "KHR_materials_ior", "KHR_materials_specular", "KHR_materials_transmission"};
-    if (std::find(std::begin(read_above), std::end(read_above), name) != std::end(read_above)) return;
-    if (name != "KHR_materials_volume")
+  void warn_of_extension(const std::string& name) {
+    const char* read_above[] = {"KHR_materials_diffuse_transmission",
+                                "KHR_materials_emissive_strength",
+                                "KHR_materials_ior",
+                                "KHR_materials_specular",
+                                "KHR_materials_transmission",
+                                "KHR_materials_volume"};
+    if (std::find(std::begin(read_above), std::end(read_above), name) == std::end(read_above))
       warn("the extension " + name + " is not supported");
-    else if (value.IsObject() && value.Has("attenuationDistance"))
-      warn("absorption inside a volume is not supported");
   }
 
   /// TextureInfo is a type of tinygltf's for each place that refers to a texture.

@@ -1,5 +1,5 @@
-// Emitting triangles, picked in proportion to their power and sampled uniformly by area. The environment is
-// not sampled here: BSDFs and guiding find it.
+// The lights of a scene, picked in proportion to their power: emitting triangles, sampled uniformly by area,
+// and lights without extent. The environment is not sampled here: BSDFs and guiding find it.
 #pragma once
 
 #include "alias_table.hpp"
@@ -10,12 +10,22 @@
 namespace render {
 
 /// A point of an emitter.
-struct light_sample {
+struct emitter_point {
   vec3 position{0.0f};
   vec3 normal{0.0f};  ///< geometric, unit length, on the side that emits
   vec3 radiance{0.0f};
-  float pdf = 0.0f;     ///< per unit area; 0 where there is no light
+  float pdf = 0.0f;     ///< per unit area
   float offset = 0.0f;  ///< as in surface_point
+};
+
+/// Light that a point may get from one direction.
+struct light_sample {
+  vec3 direction{0.0f};  ///< toward the light, unit length
+  float pdf = 0.0f;     ///< per steradian, or the probability of a light without extent; 0: there is no light
+  vec3 radiance{0.0f};  ///< of a light without extent: irradiance of what faces it
+  bool is_delta = false;    ///< it has no extent
+  bool is_distant = false;  ///< `end` says nothing
+  vec3 end{0.0f};           ///< where a ray toward it ends
 };
 
 /// Density per solid angle of a direction, from the density by area of the point it leads to.
@@ -26,56 +36,134 @@ WFPG_HD inline float solid_angle_pdf(float area_pdf, float distance, float cosin
 /// Trivially copyable.
 struct light_view {
   wfpg::array_view<const std::uint32_t> triangles;
-  wfpg::array_view<const alias_column> table;  ///< by power, a column for each of the triangles
-  float total_power = 0.0f;                    ///< sum of luminance times area
+  wfpg::array_view<const punctual_light> punctual;
+  wfpg::array_view<const alias_column> table;  ///< by power: a column for each triangle, then for the others
+  float total_power = 0.0f;                    ///< over pi; of an emitter, mean luminance times area
 
-  /// Density by area of any point of an emitter with this radiance.
-  WFPG_HD float pdf(vec3 radiance) const {
-    return total_power > 0.0f ? wfpg::luminance(radiance) / total_power : 0.0f;
+  float scene_radius = 0.0f;  ///< of a sphere around the scene
+
+  /// Over pi, of the light that may meet a scene of that radius.
+  WFPG_HD static float power_of(const punctual_light& source, float radius) {
+    const float luminance = wfpg::luminance(source.intensity);
+    if (source.kind == punctual_kind::directional) return radius * radius * luminance;
+    return (source.kind == punctual_kind::point ? 4.0f : 2.0f * (1.0f - source.cos_outer)) * luminance;
   }
 
-  WFPG_HD light_sample sample(const scene_view& scene, vec2 choice, vec2 u) const {
-    if (triangles.empty()) return {};
-    const std::uint32_t triangle = triangles[pick(table, choice)];
+  /// Density by area of any point of an emitter with this mean luminance.
+  WFPG_HD float pdf(float luminance) const { return total_power > 0.0f ? luminance / total_power : 0.0f; }
+
+  /// A point of emitter number `light`.
+  WFPG_HD emitter_point sample_emitter(const scene_view& scene, std::uint32_t light, vec2 u) const {
     const float root = std::sqrt(u.x);
-    const surface_point point = scene.point({triangle, root * (1.0f - u.y), root * u.y});
-    const vec3 radiance = scene.materials[point.material].emission;
-    return {point.position, point.geometric_normal, radiance, pdf(radiance), point.offset};
+    const triangle_hit hit{triangles[light], root * (1.0f - u.y), root * u.y};
+    const surface_point at = scene.point(hit);
+    const vec3 radiance =
+        scene.is_cut_out(hit) ? vec3(0.0f) : scene.emitted(scene.materials[at.material], at.uv);
+    return {at.position, at.geometric_normal, radiance, pdf(scene.emitted_luminances[at.material]),
+            at.offset};
+  }
+
+  /// Light for a point; `choice` picks the light.
+  WFPG_HD light_sample sample(const scene_view& scene, vec3 from, vec2 choice, vec2 u) const {
+    if (table.empty()) return {};
+    const std::uint32_t light = pick(table, choice);
+    if (light < triangles.size()) return from_emitter(sample_emitter(scene, light, u), from);
+    return from_punctual(punctual[light - triangles.size()], from);
+  }
+
+ private:
+  WFPG_HD static light_sample from_emitter(const emitter_point& point, vec3 from) {
+    const vec3 toward = point.position - from;
+    const float distance = glm::length(toward);
+    light_sample light;
+    if (!(distance > 0.0f)) return light;
+    light.direction = toward / distance;
+    light.pdf = solid_angle_pdf(point.pdf, distance, -glm::dot(point.normal, light.direction));
+    light.radiance = point.radiance;
+    light.end = leave_surface(point.position, point.normal, -light.direction, point.offset);
+    return light;
+  }
+
+  WFPG_HD light_sample from_punctual(const punctual_light& source, vec3 from) const {
+    light_sample light;
+    light.is_delta = true;
+    light.pdf = power_of(source, scene_radius) / total_power;
+    light.is_distant = source.kind == punctual_kind::directional;
+    if (light.is_distant) {
+      light.direction = -source.direction;
+      light.radiance = source.intensity;
+      return light;
+    }
+    light.end = source.position;
+    const vec3 toward = source.position - from;
+    const float distance = glm::length(toward);
+    if (!(distance > 0.0f)) return {};
+    light.direction = toward / distance;
+    light.radiance = source.intensity * (dimming(source, light.direction) / (distance * distance));
+    return light;
+  }
+
+  // KHR_lights_punctual, "Inner and Outer Cone Angles".
+  WFPG_HD static float dimming(const punctual_light& source, vec3 toward) {
+    if (source.kind != punctual_kind::spot) return 1.0f;
+    const float cosine = -glm::dot(source.direction, toward);
+    const float width = glm::max(1e-3f, source.cos_inner - source.cos_outer);
+    const float x = glm::clamp((cosine - source.cos_outer) / width, 0.0f, 1.0f);
+    return x * x;
   }
 };
 
-/// The distribution over a scene's emitters, in the memory of a policy.
+/// The distribution over a scene's lights, in the memory of a policy.
 template <class Exec>
 class light_distribution {
  public:
-  light_distribution(const Exec& exec, const scene& host) {
+  light_distribution(const Exec& exec, const scene& host) : radius_(radius_of(host)) {
     std::vector<std::uint32_t> triangles;
     std::vector<double> powers;
+    const std::vector<float> luminances = emitted_luminances(host);
     for (std::size_t i = 0; i < host.triangles.size(); ++i) {
-      const double power = power_of(host, i);
+      const double power = static_cast<double>(luminances[host.triangle_materials[i]]) * area_of(host, i);
       if (!(power > 0.0)) continue;
       triangles.push_back(static_cast<std::uint32_t>(i));
       powers.push_back(power);
     }
+    for (const punctual_light& light : host.punctual_lights)
+      powers.push_back(static_cast<double>(light_view::power_of(light, radius_)));
     total_power_ = static_cast<float>(std::accumulate(powers.begin(), powers.end(), 0.0));
     triangles_ = wfpg::buffer<std::uint32_t, Exec>(exec, triangles);
-    table_ = wfpg::buffer<alias_column, Exec>(exec, make_alias_table(powers));
+    punctual_ = wfpg::buffer<punctual_light, Exec>(exec, host.punctual_lights);
+    if (total_power_ > 0.0f) table_ = wfpg::buffer<alias_column, Exec>(exec, make_alias_table(powers));
   }
 
-  light_view view() const { return {triangles_.view(), table_.view(), total_power_}; }
+  light_view view() const {
+    light_view v;
+    v.triangles = triangles_.view();
+    v.punctual = punctual_.view();
+    v.table = table_.view();
+    v.total_power = total_power_;
+    v.scene_radius = radius_;
+    return v;
+  }
 
  private:
-  static double power_of(const scene& host, std::size_t triangle) {
+  static double area_of(const scene& host, std::size_t triangle) {
     const uvec3 t = host.triangles[triangle];
     const vec3 a = host.positions[t.x];
-    const float area = 0.5f * glm::length(glm::cross(host.positions[t.y] - a, host.positions[t.z] - a));
-    return static_cast<double>(wfpg::luminance(host.materials[host.triangle_materials[triangle]].emission)) *
-           area;
+    return static_cast<double>(0.5f *
+                               glm::length(glm::cross(host.positions[t.y] - a, host.positions[t.z] - a)));
+  }
+
+  static float radius_of(const scene& host) {
+    wfpg::bounds3 box;
+    for (const vec3& p : host.positions) box = {glm::min(box.lower, p), glm::max(box.upper, p)};
+    return box.empty() ? 0.0f : 0.5f * glm::length(box.extent());
   }
 
   wfpg::buffer<std::uint32_t, Exec> triangles_;
+  wfpg::buffer<punctual_light, Exec> punctual_;
   wfpg::buffer<alias_column, Exec> table_;
   float total_power_ = 0.0f;
+  float radius_ = 0.0f;
 };
 
 }  // namespace render

@@ -146,6 +146,8 @@ void run(arguments& given) {
   if (!given.size.empty()) parse_size(given.size, given.options);
   const render::scene scene = load_scene(given.scene);
   for (const std::string& warning : scene.warnings) std::cerr << "wfpg-render: warning: " << warning << '\n';
+  if (!scene.punctual_lights.empty() && !given.options.nee)
+    std::cerr << "wfpg-render: warning: point, spot and directional lights are lost with --nee off\n";
   // Read before rendering, so that a wrong path costs no time.
   std::optional<render::image> reference;
   if (!given.reference.empty()) reference = render::read_exr(given.reference);

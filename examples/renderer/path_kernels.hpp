@@ -122,8 +122,9 @@ struct trace_paths {
     }
     const hit_surface found = world.scene.surface(hit, -path.direction);
     const wfpg::surface<bsdf>& surface = found.surface;
-    recorder.vertex(id, at.depth, surface.position, surface.outgoing, path.throughput);
-    gather(id, path.throughput * found.emission * emission_weight(path, found));
+    const vec3 before = path.throughput, throughput = before * absorb(id, path, found);
+    recorder.vertex(id, at.depth, surface.position, surface.outgoing, throughput);
+    gather(id, throughput * found.emission * emission_weight(path, found));
     if (at.is_last()) return end(id);
     vertices.emplace(id, found);
     keys[id] = static_cast<std::uint32_t>(surface.bsdf.kind);
@@ -132,6 +133,18 @@ struct trace_paths {
  private:
   WFPG_HD void end(std::uint32_t id) const {
     paths.update(id, [](path_state& path) { path.active = 0; });
+  }
+
+  // What a solid leaves of the light along the path's last segment, which is inside where it ends at its
+  // back.
+  WFPG_HD vec3 absorb(std::uint32_t id, const path_state& path, const hit_surface& found) const {
+    if (found.absorption == vec3(0.0f)) return vec3(1.0f);
+    const vec3 left = glm::exp(-found.absorption * glm::length(found.surface.position - path.origin));
+    paths.update(id, [&](path_state& p) {
+      p.throughput *= left;
+      p.reflectance *= wfpg::luminance(left);
+    });
+    return left;
   }
 
   WFPG_HD void gather(std::uint32_t id, vec3 contribution) const {
@@ -146,8 +159,8 @@ struct trace_paths {
     const vec3 normal = found.surface.geometric_normal;
     const float cosine = std::abs(glm::dot(normal, path.direction));
     const float distance = glm::length(found.surface.position - path.origin);
-    return wfpg::power_heuristic(path.pdf,
-                                 solid_angle_pdf(world.lights.pdf(found.emission), distance, cosine));
+    return wfpg::power_heuristic(
+        path.pdf, solid_angle_pdf(world.lights.pdf(found.emitted_luminance), distance, cosine));
   }
 };
 
@@ -172,30 +185,32 @@ struct query_lights {
     const path_vertex& vertex = vertices[path];
     const bsdf scatters = vertex.bsdf();
     if (scatters.is_delta()) return {};
-    const light_sample light = world.lights.sample(world.scene, at.draw(path, dimension::light_choice),
-                                                   at.draw(path, dimension::light_point));
-    const vec3 toward = light.position - vertex.position;
-    const float distance = glm::length(toward);
-    if (!(light.pdf > 0.0f && distance > 0.0f)) return {};
+    const light_sample light =
+        world.lights.sample(world.scene, vertex.position, at.draw(path, dimension::light_choice),
+                            at.draw(path, dimension::light_point));
+    if (!(light.pdf > 0.0f)) return {};
     light_query result;
-    result.direction = toward / distance;
-    result.pdf = solid_angle_pdf(light.pdf, distance, -glm::dot(light.normal, result.direction));
-    if (!(result.pdf > 0.0f)) return {};
-    result.value = scatters.eval_rgb(vertex.outgoing, result.direction) * light.radiance / result.pdf;
+    result.direction = light.direction;
+    result.pdf = light.is_delta ? unrivalled_pdf : light.pdf;
+    result.value = scatters.eval_rgb(vertex.outgoing, light.direction) * light.radiance / light.pdf;
     if (!(wfpg::luminance(result.value) > 0.0f)) return {};
-    return is_hidden(slot, vertex, light, result.direction) ? light_query{} : result;
+    return is_hidden(slot, vertex, light) ? light_query{} : result;
   }
 
-  WFPG_HD bool is_hidden(std::size_t slot, const path_vertex& vertex, const light_sample& light,
-                         vec3 direction) const {
-    const vec3 end = leave_surface(light.position, light.normal, -direction, light.offset);
+  WFPG_HD bool is_hidden(std::size_t slot, const path_vertex& vertex, const light_sample& light) const {
     wfpg::ray ray;
-    ray.origin = leave_surface(vertex.position, vertex.geometric_normal, direction, vertex.offset);
-    ray.t_max = glm::length(end - ray.origin);
-    if (!(ray.t_max > 0.0f)) return false;
-    ray.direction = (end - ray.origin) / ray.t_max;
+    ray.origin = leave_surface(vertex.position, vertex.geometric_normal, light.direction, vertex.offset);
+    ray.direction = light.direction;
+    if (!light.is_distant) {
+      ray.t_max = glm::length(light.end - ray.origin);
+      if (!(ray.t_max > 0.0f)) return false;
+      ray.direction = (light.end - ray.origin) / ray.t_max;
+    }
     return answers.is_hidden(slot, ray);
   }
+
+  // Beside this every density is as good as 0: nothing else finds a light without extent.
+  static constexpr float unrivalled_pdf = 1e30f;
 };
 
 /// Forgets the light samples that a batch caster found hidden.

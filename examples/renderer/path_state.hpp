@@ -81,7 +81,7 @@ static_assert(sizeof(path_vertex) == 80, "every kernel of a wave reads it");
 /// A sample of next-event estimation that waits for its weight.
 struct light_query {
   vec3 direction{0.0f};  ///< toward the light, unit length; zero where there is nothing to add
-  float pdf = 0.0f;      ///< of the direction by light sampling, per steradian
+  float pdf = 0.0f;      ///< of the direction by light sampling, per steradian; huge where nothing rivals it
   vec3 value{0.0f};      ///< BSDF, cosine and radiance over that pdf
   std::uint32_t unused = 0;
 };

@@ -68,9 +68,23 @@ struct material {
   float metallic = 0.0f;  ///< this and the next four: of kinds with all lobes, see lobe_factors
   float specular = 1.0f;
   float transmission = 0.0f;
-  float diffuse_transmission = 0.0f;  ///< positive of thin kinds alone
-  vec3 transmitted_color{1.0f};       ///< of diffuse transmission
-  vec3 emission{0.0f};                ///< emitted radiance, W/(m² sr), on the counter-clockwise side
+  float diffuse_transmission = 0.0f;   ///< positive of thin kinds alone
+  vec3 transmitted_color{1.0f};        ///< of diffuse transmission
+  vec3 emission{0.0f};                 ///< emitted radiance, W/(m² sr), on the counter-clockwise side
+  texture_reference emission_texture;  ///< multiplies emission
+  vec3 absorption{0.0f};               ///< inside of solids that transmit, 1 / scene unit
+};
+
+enum class punctual_kind : std::uint8_t { point, spot, directional };
+
+/// A light without extent, as KHR_lights_punctual has it: next-event estimation alone finds it.
+struct punctual_light {
+  punctual_kind kind = punctual_kind::point;
+  vec3 position{0.0f};                ///< of points and spots
+  vec3 direction{0.0f, 0.0f, -1.0f};  ///< in which spots and directional lights shine, unit length
+  vec3 intensity{1.0f};               ///< W/sr; of directional lights irradiance, W/m²
+  float cos_inner = 1.0f;             ///< of a spot's half angle that is not dimmed
+  float cos_outer = 0.0f;             ///< and of the one where it ends, less than that
 };
 
 /// A pinhole. The picture's y runs down from `up`.
@@ -90,6 +104,7 @@ struct scene {
   std::vector<std::uint32_t> triangle_materials;  ///< a triangle; index into materials
   std::vector<material> materials;
   std::vector<texture> textures;
+  std::vector<punctual_light> punctual_lights;
   camera view;
   vec3 environment{0.0f};             ///< constant radiance, W/(m² sr)
   int width = 512, height = 512;      ///< intended size of the picture, pixels
