@@ -368,6 +368,24 @@ TEST_CASE("next-event estimation finds a textured emitter's mean", "[renderer]")
   CHECK(on.mean() > 0.0);
 }
 
+TEST_CASE("an environment map lights as it is sampled and as it is found", "[renderer]") {
+  material grey;
+  grey.base_color = vec3(0.5f);
+  scene s = square_of(grey);
+  s.view.vertical_fov = 0.01f;
+  s.sky.width = 4;
+  s.sky.height = 4;
+  setup with{8, 3, true, 0, 64};
+  s.sky.texels.assign(16, vec3(2.0f));
+  CHECK(mean_of(trace<wfpg::exec::tbb>(s, with)) == Approx(1.0).epsilon(0.02));
+  for (std::size_t i = 0; i < 16; ++i) s.sky.texels[i] = vec3(i % 5 == 0 ? 20.0f : 0.1f);
+  const batch on = batch_of(s, with);
+  with.nee = false;
+  const batch off = batch_of(s, with);
+  INFO(on.mean() << " with, " << off.mean() << " without");
+  CHECK(std::abs(on.mean() - off.mean()) < 4.0 * std::sqrt(on.variance_of_mean() + off.variance_of_mean()));
+}
+
 TEST_CASE("textures are bilinear and repeat", "[renderer]") {
   scene s = square_of({});
   s.uvs = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};

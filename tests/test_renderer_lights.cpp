@@ -95,3 +95,34 @@ TEST_CASE("emitters are drawn by power, and their density by area is their radia
   }
   CHECK(bright / draws == Approx(1.0 / power).margin(0.006));
 }
+
+TEST_CASE("an environment map is sampled by luminance", "[renderer][lights]") {
+  scene s;
+  s.sky = {8, 4, std::vector<vec3>(32, vec3(0.0f))};
+  for (std::uint32_t i = 0; i < 32; ++i) s.sky.texels[i] = vec3(0.05f + numbers(i, 4).x * numbers(i, 4).x);
+  const wfpg::exec::seq exec;
+  const device_scene<wfpg::exec::seq> geometry(exec, s);
+  const environment_view sky = geometry.view().environment;
+  // The density of a uniform direction averages to 1 over the sphere; a sample's inverse to the sphere's
+  // area.
+  double integral = 0.0, area = 0.0;
+  constexpr std::uint32_t draws = 200000;
+  for (std::uint32_t i = 0; i < draws; ++i) {
+    const vec2 u = numbers(i, 5);
+    const float y = 1.0f - 2.0f * u.x, r = std::sqrt(std::max(0.0f, 1.0f - y * y));
+    integral +=
+        static_cast<double>(sky.pdf({r * std::cos(2.0f * pi * u.y), y, r * std::sin(2.0f * pi * u.y)}));
+    const vec3 drawn = sky.sample(numbers(i, 6), numbers(i, 7));
+    REQUIRE(glm::length(drawn) == Approx(1.0f).epsilon(1e-4));
+    REQUIRE(sky.pdf(drawn) > 0.0f);
+    area += 1.0 / static_cast<double>(sky.pdf(drawn));
+  }
+  CHECK(integral / draws * 4.0 * static_cast<double>(pi) == Approx(1.0).epsilon(0.02));
+  CHECK(area / draws == Approx(4.0 * static_cast<double>(pi)).epsilon(0.05));
+  // The middle is -z, its right +x, the upper edge +y.
+  s.sky = {4, 2, std::vector<vec3>(8, vec3(0.0f))};
+  s.sky.texels[2] = vec3(1.0f);
+  const device_scene<wfpg::exec::seq> corner(exec, s);
+  CHECK(corner.view().environment.radiance(glm::normalize(vec3(1.0f, 1.414f, -1.0f))).x ==
+        Approx(1.0).epsilon(0.01));
+}

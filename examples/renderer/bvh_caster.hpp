@@ -161,13 +161,13 @@ class bvh_caster {
 
   bvh_caster() = default;
   bvh_caster(const bvh_node* nodes, const bvh_triangle* triangles, const scene_view* cut_outs,
-             float environment)
+             const environment_view& environment)
       : nodes_(nodes), triangles_(triangles), cut_outs_(cut_outs), environment_(environment) {}
 
   /// The guider's form: distance, or the environment's luminance.
   WFPG_HD wfpg::ray_hit operator()(const wfpg::ray& ray) const {
     const hit found = nearest(ray);
-    if (!found.triangle.is_hit()) return {-1.0f, environment_};
+    if (!found.triangle.is_hit()) return {-1.0f, wfpg::luminance(environment_.radiance(ray.direction))};
     return {found.distance, 0.0f};
   }
 
@@ -274,7 +274,7 @@ class bvh_caster {
   const bvh_node* nodes_ = nullptr;
   const bvh_triangle* triangles_ = nullptr;
   const scene_view* cut_outs_ = nullptr;
-  float environment_ = 0.0f;
+  environment_view environment_;
   std::uint32_t one_ = detail::byte_float_base;  // where compilers do not know it
 };
 

@@ -289,7 +289,7 @@ class bvh_scene {
   /// out_of_memory, std::invalid_argument for options out of range and 2^28 triangles or more.
   bvh_scene(const Exec& exec, const wfpg::triangle_mesh_view& mesh, float environment,
             const bvh_options& options = {})
-      : environment_(environment) {
+      : environment_(vec3(environment)) {
     using wfpg::detail::require;
     require(options.leaf_triangles >= 1 && options.leaf_triangles <= bvh_child::largest_leaf,
             "leaf_triangles", options.leaf_triangles, "in [1, 7]");
@@ -300,7 +300,8 @@ class bvh_scene {
 
   /// Over a scene whose arrays the policy has already.
   bvh_scene(const Exec& exec, const scene& host, const scene_view& arrays)
-      : bvh_scene(exec, {arrays.positions, arrays.triangles}, wfpg::luminance(host.environment)) {
+      : bvh_scene(exec, {arrays.positions, arrays.triangles}, 0.0f) {
+    environment_ = arrays.environment;
     if (has_cut_outs(host)) cut_outs_ = wfpg::buffer<scene_view, Exec>(exec, std::vector<scene_view>{arrays});
   }
 
@@ -376,7 +377,7 @@ class bvh_scene {
   wfpg::buffer<bvh_node, Exec> nodes_;
   wfpg::buffer<bvh_triangle, Exec> triangles_;
   wfpg::buffer<scene_view, Exec> cut_outs_;  // one, or none
-  float environment_ = 0.0f;
+  environment_view environment_;
 };
 
 }  // namespace render

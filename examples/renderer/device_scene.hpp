@@ -2,12 +2,15 @@
 // surface that a ray hits.
 #pragma once
 
+#include "environment.hpp"
 #include "materials.hpp"
+#include "texel_pair.hpp"
 
 #include <wfpg/buffer.hpp>
 #include <wfpg/error.hpp>
 
 #include <algorithm>
+#include <numeric>
 
 namespace render {
 
@@ -26,33 +29,6 @@ struct triangle_hit {
 struct texture_span {
   std::uint32_t first, width, height;
   texture_wrap wrap_u, wrap_v;
-};
-
-/// A coordinate of a texture between two of its `size` texels along one axis.
-struct texel_pair {
-  std::uint32_t first, second;
-  float second_weight;
-
-  WFPG_HD texel_pair(float coordinate, std::uint32_t size, texture_wrap wrap) {
-    // Only near the origin is there precision for a texel; two copies show a mirrored one.
-    const float period = wrap == texture_wrap::mirrored_repeat ? 2.0f : 1.0f;
-    const float near = wrap == texture_wrap::clamp_to_edge
-                           ? glm::clamp(coordinate, 0.0f, 1.0f)
-                           : coordinate - period * std::floor(coordinate / period);
-    const float x = near * static_cast<float>(size) - 0.5f, floor = std::floor(x);
-    second_weight = x - floor;
-    first = wrapped(static_cast<std::int32_t>(floor), static_cast<std::int32_t>(size), wrap);
-    second = wrapped(static_cast<std::int32_t>(floor) + 1, static_cast<std::int32_t>(size), wrap);
-  }
-
- private:
-  // `i` is in [-1, 2 size].
-  WFPG_HD static std::uint32_t wrapped(std::int32_t i, std::int32_t size, texture_wrap wrap) {
-    if (wrap == texture_wrap::clamp_to_edge) return static_cast<std::uint32_t>(glm::clamp(i, 0, size - 1));
-    const std::int32_t copies = wrap == texture_wrap::mirrored_repeat ? 2 * size : size;
-    const std::int32_t at = (i + copies) % copies;
-    return static_cast<std::uint32_t>(at < size ? at : copies - 1 - at);
-  }
 };
 
 /// A point of the scene's geometry, before it is known from where it is seen.
@@ -89,7 +65,7 @@ struct scene_view {
   wfpg::array_view<const float> emitted_luminances;  ///< a material; means over its texture
   wfpg::array_view<const texture_span> textures;
   wfpg::array_view<const vec4> texels;
-  vec3 environment{0.0f};
+  environment_view environment;
 
   WFPG_HD const material& material_of(std::uint32_t triangle) const {
     return materials[triangle_materials[triangle]];
@@ -247,6 +223,7 @@ class device_scene {
                        static_cast<std::uint32_t>(t.height), t.wrap_u, t.wrap_v});
       texels.insert(texels.end(), t.texels.begin(), t.texels.end());
     }
+    if (!host.sky.texels.empty()) upload_sky(exec, host.sky);
     textures_ = wfpg::buffer<texture_span, Exec>(exec, spans);
     texels_ = wfpg::buffer<vec4, Exec>(exec, texels);
   }
@@ -267,7 +244,18 @@ class device_scene {
   }
 
  private:
+  void upload_sky(const Exec& exec, const environment_map& sky) {
+    const std::vector<double> powers = texel_powers(sky);
+    const auto total = static_cast<float>(std::accumulate(powers.begin(), powers.end(), 0.0));
+    sky_texels_ = wfpg::buffer<vec3, Exec>(exec, sky.texels);
+    if (total > 0.0f) sky_table_ = wfpg::buffer<alias_column, Exec>(exec, make_alias_table(powers));
+    environment_ = {sky, sky_texels_.view(), sky_table_.view(), total};
+  }
+
   static void check(const scene& host) {
+    wfpg::detail::require(
+        host.sky.texels.size() == std::size_t(host.sky.width) * std::size_t(host.sky.height),
+        "scene.sky.texels.size()", host.sky.texels.size(), "width times height");
     using wfpg::detail::require;
     const std::size_t vertices = host.positions.size();
     require(host.normals.empty() || host.normals.size() == vertices, "scene.normals.size()",
@@ -301,7 +289,9 @@ class device_scene {
   wfpg::buffer<float, Exec> emitted_luminances_;
   wfpg::buffer<texture_span, Exec> textures_;
   wfpg::buffer<vec4, Exec> texels_;
-  vec3 environment_;
+  wfpg::buffer<vec3, Exec> sky_texels_;
+  wfpg::buffer<alias_column, Exec> sky_table_;
+  environment_view environment_;
 };
 
 }  // namespace render

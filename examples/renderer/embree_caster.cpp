@@ -23,7 +23,7 @@ void set_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, cons
 
 }  // namespace
 
-embree_scene::embree_scene(const scene& host) : environment_(wfpg::luminance(host.environment)) {
+embree_scene::embree_scene(const scene& host) : environment_(host.environment) {
   device_.reset(rtcNewDevice(nullptr));
   check(device_.get(), "making a device");
   scene_.reset(rtcNewScene(device_.get()));

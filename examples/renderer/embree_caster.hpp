@@ -14,13 +14,13 @@ namespace render {
 /// Casts rays, from any thread. Trivially copyable; valid while the embree_scene it is from lives.
 class embree_caster {
  public:
-  embree_caster(RTCScene scene, const scene_view* cut_outs, float environment)
+  embree_caster(RTCScene scene, const scene_view* cut_outs, const environment_view& environment)
       : scene_(scene), cut_outs_(cut_outs), environment_(environment) {}
 
   /// The guider's form: distance, or the environment's luminance.
   wfpg::ray_hit operator()(const wfpg::ray& ray) const {
     const hit found = nearest(ray);
-    if (!found.triangle.is_hit()) return {-1.0f, environment_};
+    if (!found.triangle.is_hit()) return {-1.0f, wfpg::luminance(environment_.radiance(ray.direction))};
     return {found.distance, 0.0f};
   }
 
@@ -73,7 +73,7 @@ class embree_caster {
 
   RTCScene scene_;
   const scene_view* cut_outs_;
-  float environment_;
+  environment_view environment_;
 };
 
 /// Owns Embree's device and acceleration structure.
@@ -82,11 +82,12 @@ class embree_scene {
   static constexpr const char* name = "embree";
 
   /// Builds with all the machine's threads. Throws std::runtime_error where Embree fails.
-  /// Precondition: the scene has no cut-outs.
+  /// Precondition: the scene has neither cut-outs nor a sky.
   explicit embree_scene(const scene& host);
-  /// The same with cut-outs. `arrays` are the scene's, in host memory, and outlive this.
+  /// The same with both. `arrays` are the scene's, in host memory, and outlive this.
   template <class Exec>
   embree_scene(const Exec&, const scene& host, const scene_view& arrays) : embree_scene(host) {
+    environment_ = arrays.environment;
     if (has_cut_outs(host)) cut_outs_ = std::make_unique<const scene_view>(arrays);
   }
 
@@ -101,7 +102,7 @@ class embree_scene {
   std::unique_ptr<RTCDeviceTy, release> device_;
   std::unique_ptr<RTCSceneTy, release> scene_;
   std::unique_ptr<const scene_view> cut_outs_;
-  float environment_ = 0.0f;
+  environment_view environment_;
 };
 
 }  // namespace render

@@ -7,11 +7,13 @@
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
+#include <stb_image.h>
 #include <stb_image_write.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <stdexcept>
 
 namespace render {
@@ -63,6 +65,27 @@ std::runtime_error with_path(const std::string& path, const std::exception& reas
   return std::runtime_error(path + ": " + reason.what());
 }
 
+image read_exr_pixels(const std::string& path) {
+  Imf::InputFile file(path.c_str());
+  require_channels(file.header().channels());
+  const Imath::Box2i window = file.header().dataWindow();
+  image picture = sized_for(window);
+  file.setFrameBuffer(frame_buffer(&picture.pixels[0].x, window));
+  file.readPixels(window.min.y, window.max.y);
+  return picture;
+}
+
+image read_hdr(const std::string& path) {
+  int width = 0, height = 0, channels = 0;
+  const std::unique_ptr<float, decltype(&stbi_image_free)> pixels(
+      stbi_loadf(path.c_str(), &width, &height, &channels, 3), &stbi_image_free);
+  if (!pixels) throw std::runtime_error(std::string("cannot be decoded: ") + stbi_failure_reason());
+  image picture = make_image(width, height);
+  for (std::size_t i = 0; i < picture.pixels.size(); ++i)
+    picture.pixels[i] = {pixels.get()[3 * i], pixels.get()[3 * i + 1], pixels.get()[3 * i + 2]};
+  return picture;
+}
+
 }  // namespace
 
 image make_image(int width, int height) {
@@ -73,13 +96,19 @@ image make_image(int width, int height) {
 }
 
 image read_exr(const std::string& path) try {
-  Imf::InputFile file(path.c_str());
-  require_channels(file.header().channels());
-  const Imath::Box2i window = file.header().dataWindow();
-  image picture = sized_for(window);
-  file.setFrameBuffer(frame_buffer(&picture.pixels[0].x, window));
-  file.readPixels(window.min.y, window.max.y);
-  return picture;
+  return read_exr_pixels(path);
+} catch (const std::exception& reason) {
+  throw with_path(path, reason);
+}
+
+environment_map read_environment(const std::string& path) try {
+  const bool is_hdr = path.size() > 4 && path.compare(path.size() - 4, 4, ".hdr") == 0;
+  const image picture = is_hdr ? read_hdr(path) : read_exr_pixels(path);
+  for (const vec3& p : picture.pixels)
+    for (int c = 0; c < 3; ++c)
+      if (!(p[c] >= 0.0f) || std::isinf(p[c]))
+        throw std::runtime_error("has radiance that is negative or not finite");
+  return {picture.width, picture.height, picture.pixels};
 } catch (const std::exception& reason) {
   throw with_path(path, reason);
 }

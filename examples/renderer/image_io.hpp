@@ -22,6 +22,10 @@ image make_image(int width, int height);
 /// Throws std::runtime_error that names the path and the reason.
 image read_exr(const std::string& path);
 
+/// The environment of an OpenEXR or Radiance HDR (.hdr) file, twice as wide as high or not. Throws
+/// std::runtime_error that names the path and the reason, also of radiance that is negative or not finite.
+environment_map read_environment(const std::string& path);
+
 /// Writes R, G and B as 32-bit float. Throws std::runtime_error that names the path and the reason.
 void write_exr(const std::string& path, const image& picture);
 

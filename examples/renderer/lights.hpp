@@ -1,9 +1,10 @@
 // The lights of a scene, picked in proportion to their power: emitting triangles, sampled uniformly by area,
-// and lights without extent. The environment is not sampled here: BSDFs and guiding find it.
+// and lights without extent. And an environment that is a map; BSDFs and guiding find a constant one.
 #pragma once
 
 #include "alias_table.hpp"
 #include "device_scene.hpp"
+#include "rng.hpp"
 
 #include <numeric>
 
@@ -37,8 +38,9 @@ WFPG_HD inline float solid_angle_pdf(float area_pdf, float distance, float cosin
 struct light_view {
   wfpg::array_view<const std::uint32_t> triangles;
   wfpg::array_view<const punctual_light> punctual;
-  wfpg::array_view<const alias_column> table;  ///< by power: a column for each triangle, then for the others
-  float total_power = 0.0f;                    ///< over pi; of an emitter, mean luminance times area
+  wfpg::array_view<const alias_column>
+      table;                 ///< by power: a column for each triangle, each other light, and a map
+  float total_power = 0.0f;  ///< over pi; of an emitter, mean luminance times area
 
   float scene_radius = 0.0f;  ///< of a sphere around the scene
 
@@ -47,6 +49,10 @@ struct light_view {
     const float luminance = wfpg::luminance(source.intensity);
     if (source.kind == punctual_kind::directional) return radius * radius * luminance;
     return (source.kind == punctual_kind::point ? 4.0f : 2.0f * (1.0f - source.cos_outer)) * luminance;
+  }
+
+  WFPG_HD static float power_of(const environment_view& environment, float radius) {
+    return radius * radius * environment.total();
   }
 
   /// Density by area of any point of an emitter with this mean luminance.
@@ -63,12 +69,29 @@ struct light_view {
             at.offset};
   }
 
-  /// Light for a point; `choice` picks the light.
-  WFPG_HD light_sample sample(const scene_view& scene, vec3 from, vec2 choice, vec2 u) const {
+  /// Density per steradian with which sample() finds the environment along a direction.
+  WFPG_HD float environment_pdf(const environment_view& environment, vec3 direction) const {
+    if (!(total_power > 0.0f)) return 0.0f;
+    return environment.pdf(direction) * power_of(environment, scene_radius) / total_power;
+  }
+
+  /// Light for a point; draw(dimension) gives random numbers in [0,1)².
+  template <class Draw>
+  WFPG_HD light_sample sample(const scene_view& scene, vec3 from, const Draw& draw) const {
     if (table.empty()) return {};
-    const std::uint32_t light = pick(table, choice);
-    if (light < triangles.size()) return from_emitter(sample_emitter(scene, light, u), from);
-    return from_punctual(punctual[light - triangles.size()], from);
+    const std::uint32_t light = pick(table, draw(dimension::light_choice));
+    if (light < triangles.size())
+      return from_emitter(sample_emitter(scene, light, draw(dimension::light_point)), from);
+    const std::size_t beyond = light - triangles.size();
+    if (beyond < punctual.size()) return from_punctual(punctual[beyond], from);
+    const vec3 direction =
+        scene.environment.sample(draw(dimension::light_texel), draw(dimension::light_point));
+    light_sample sky;
+    sky.direction = direction;
+    sky.pdf = environment_pdf(scene.environment, direction);
+    sky.radiance = scene.environment.radiance(direction);
+    sky.is_distant = true;
+    return sky;
   }
 
  private:
@@ -129,6 +152,8 @@ class light_distribution {
     }
     for (const punctual_light& light : host.punctual_lights)
       powers.push_back(static_cast<double>(light_view::power_of(light, radius_)));
+    const double sky_power = host.sky.texels.empty() ? 0.0 : power_of_sky(host);
+    if (sky_power > 0.0) powers.push_back(sky_power);
     total_power_ = static_cast<float>(std::accumulate(powers.begin(), powers.end(), 0.0));
     triangles_ = wfpg::buffer<std::uint32_t, Exec>(exec, triangles);
     punctual_ = wfpg::buffer<punctual_light, Exec>(exec, host.punctual_lights);
@@ -146,6 +171,11 @@ class light_distribution {
   }
 
  private:
+  double power_of_sky(const scene& host) const {
+    const std::vector<double> powers = texel_powers(host.sky);
+    return static_cast<double>(radius_ * radius_) * std::accumulate(powers.begin(), powers.end(), 0.0);
+  }
+
   static double area_of(const scene& host, std::size_t triangle) {
     const uvec3 t = host.triangles[triangle];
     const vec3 a = host.positions[t.x];

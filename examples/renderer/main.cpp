@@ -20,7 +20,7 @@ namespace {
 constexpr int failure = 2;
 
 struct arguments {
-  std::string scene, size, output, png, stats, reference;
+  std::string scene, environment, size, output, png, stats, reference;
   float exposure = 1.0f;  // of the PNG
   render::render_options options;
 };
@@ -112,6 +112,8 @@ void add_file_options(CLI::App& app, arguments& given) {
   app.add_option("SCENE", given.scene,
                  "a .glb or .gltf file, or one of: " + CLI::detail::join(render::builtin_scene_names(), ", "))
       ->required();
+  app.add_option("--environment", given.environment,
+                 "light from all directions, OpenEXR or .hdr, equirectangular (default: the scene's)");
   app.add_option("-o,--output", given.output, "picture, OpenEXR");
   app.add_option("--png", given.png, "picture, sRGB PNG");
   app.add_option("--exposure", given.exposure, "multiplies the PNG's values (default: 1)")
@@ -137,6 +139,12 @@ render::scene load_scene(const std::string& name) {
                               CLI::detail::join(render::builtin_scene_names(), ", "));
 }
 
+bool is_dark(const render::scene& scene) {
+  for (const render::material& m : scene.materials)
+    if (m.emission != render::vec3(0.0f)) return false;
+  return scene.punctual_lights.empty() && scene.sky.texels.empty() && scene.environment == render::vec3(0.0f);
+}
+
 void print_error(const render::image_error& error) {
   std::printf("mse %.6e  relmse %.6e  relmse trimmed %.6e  mse reinhard %.6e\n", error.mse, error.relmse,
               error.relmse_trimmed, error.mse_reinhard);
@@ -144,10 +152,12 @@ void print_error(const render::image_error& error) {
 
 void run(arguments& given) {
   if (!given.size.empty()) parse_size(given.size, given.options);
-  const render::scene scene = load_scene(given.scene);
+  render::scene scene = load_scene(given.scene);
+  if (!given.environment.empty()) scene.sky = render::read_environment(given.environment);
   for (const std::string& warning : scene.warnings) std::cerr << "wfpg-render: warning: " << warning << '\n';
   if (!scene.punctual_lights.empty() && !given.options.nee)
     std::cerr << "wfpg-render: warning: point, spot and directional lights are lost with --nee off\n";
+  if (is_dark(scene)) std::cerr << "wfpg-render: warning: the scene has no light: the picture is black\n";
   // Read before rendering, so that a wrong path costs no time.
   std::optional<render::image> reference;
   if (!given.reference.empty()) reference = render::read_exr(given.reference);

@@ -117,7 +117,8 @@ struct trace_paths {
     ++segments[id];
     const triangle_hit hit = answers.hit(slot, path.ray());
     if (!hit.is_hit()) {
-      gather(id, path.throughput * world.scene.environment);
+      gather(id,
+             path.throughput * world.scene.environment.radiance(path.direction) * environment_weight(path));
       return end(id);
     }
     const hit_surface found = world.scene.surface(hit, -path.direction);
@@ -153,6 +154,12 @@ struct trace_paths {
     recorder.emission(id, at.depth, contribution);
   }
 
+  WFPG_HD float environment_weight(const path_state& path) const {
+    if (!world.next_event || !(path.pdf > 0.0f)) return 1.0f;
+    return wfpg::power_heuristic(path.pdf,
+                                 world.lights.environment_pdf(world.scene.environment, path.direction));
+  }
+
   // Against next-event estimation at the vertex before, which could have found the same point.
   WFPG_HD float emission_weight(const path_state& path, const hit_surface& found) const {
     if (!world.next_event || !(path.pdf > 0.0f)) return 1.0f;
@@ -185,9 +192,8 @@ struct query_lights {
     const path_vertex& vertex = vertices[path];
     const bsdf scatters = vertex.bsdf();
     if (scatters.is_delta()) return {};
-    const light_sample light =
-        world.lights.sample(world.scene, vertex.position, at.draw(path, dimension::light_choice),
-                            at.draw(path, dimension::light_point));
+    const light_sample light = world.lights.sample(world.scene, vertex.position,
+                                                   [&](std::uint32_t use) { return at.draw(path, use); });
     if (!(light.pdf > 0.0f)) return {};
     light_query result;
     result.direction = light.direction;

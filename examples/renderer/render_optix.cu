@@ -19,6 +19,8 @@ class optix_accelerated {
       : scene_(exec, view.positions, view.triangles, wfpg::luminance(host.environment)) {
     if (has_cut_outs(host))
       throw std::runtime_error("--device optix does not support alpha masks; --device cuda does");
+    if (!host.sky.texels.empty())
+      throw std::runtime_error("--device optix does not support --environment; --device cuda does");
   }
 
   optix_caster caster() const { return scene_.caster(); }

@@ -75,6 +75,13 @@ struct material {
   vec3 absorption{0.0f};               ///< inside of solids that transmit, 1 / scene unit
 };
 
+/// Radiance from all directions, W/(m² sr), row by row from the top; environment.hpp says which is where.
+struct environment_map {
+  int width = 0;
+  int height = 0;
+  std::vector<vec3> texels;
+};
+
 enum class punctual_kind : std::uint8_t { point, spot, directional };
 
 /// A light without extent, as KHR_lights_punctual has it: next-event estimation alone finds it.
@@ -107,6 +114,7 @@ struct scene {
   std::vector<punctual_light> punctual_lights;
   camera view;
   vec3 environment{0.0f};             ///< constant radiance, W/(m² sr)
+  environment_map sky;                ///< in place of that where it has texels
   int width = 512, height = 512;      ///< intended size of the picture, pixels
   int max_depth = 8;                  ///< intended number of path segments
   std::vector<std::string> warnings;  ///< what the file asked for and the loader does not do, once each
