@@ -75,6 +75,38 @@ TEST_CASE("OpenEXR: failures name the path", "[renderer][exr]") {
   CHECK_THROWS_AS(render::write_png("/nonexistent/x.png", grey(2, 2, 1.0f)), std::runtime_error);
 }
 
+TEST_CASE("Environments: OpenEXR and Radiance HDR, and what is wrong with one", "[renderer][environment]") {
+  temporary_folder folder;
+  render::write_exr(folder.file("a.exr"), grey(4, 2, 1.5f));
+  CHECK(render::read_environment(folder.file("a.exr")).texels == std::vector<vec3>(8, vec3(1.5f)));
+
+  // Uncompressed: 4 bytes a pixel, (mantissa + 1/2) / 256 times 2^(exponent - 128), or without the half.
+  const std::string head = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 3\n";
+  std::string pixels;
+  for (int i = 0; i < 6; ++i) pixels += std::string("\x80\x40\x20\x82", 4);
+  const render::environment_map map = render::read_environment(folder.write("a.hdr", head + pixels));
+  REQUIRE((map.width == 3 && map.height == 2 && map.texels.size() == 6));
+  check_close(map.texels[5], {2.0f, 1.0f, 0.5f}, 0.02f);
+
+  const auto error = [](const std::string& path) -> std::string {
+    try {
+      render::read_environment(path);
+    } catch (const std::runtime_error& e) {
+      return e.what();
+    }
+    return "nothing was thrown";
+  };
+  for (const std::string& path :
+       {folder.file("no.hdr"), folder.file("no.exr"), folder.write("noise.hdr", "noise"),
+        folder.write("cut.hdr", head + pixels.substr(0, 9)), folder.write("head.hdr", head)})
+    CHECK(error(path).rfind(path + ": ", 0) == 0);
+  CHECK(contains(error(folder.file("cut.hdr")), "cut off"));
+  render::write_exr(folder.file("negative.exr"), grey(2, 1, -1.0f));
+  CHECK(contains(error(folder.file("negative.exr")), "negative"));
+  render::write_exr(folder.file("nan.exr"), grey(2, 1, std::numeric_limits<float>::quiet_NaN()));
+  CHECK(contains(error(folder.file("nan.exr")), "finite"));
+}
+
 TEST_CASE("The sRGB curve goes both ways", "[renderer][png]") {
   for (int i = 0; i <= 255; ++i) {
     const float encoded = float(i) / 255.0f;

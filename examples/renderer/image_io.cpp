@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <fstream>
 #include <memory>
 #include <stdexcept>
 
@@ -75,11 +76,34 @@ image read_exr_pixels(const std::string& path) {
   return picture;
 }
 
+/// A file as stb_image reads it, which takes what is missing at its end for zeros: that it asked for more is
+/// noted.
+struct noted_file {
+  std::ifstream stream;
+  bool is_cut_off = false;
+
+  static int read(void* self, char* target, int size) {
+    auto& file = *static_cast<noted_file*>(self);
+    file.stream.read(target, size);
+    const int count = static_cast<int>(file.stream.gcount());
+    file.is_cut_off = file.is_cut_off || count == 0;
+    return count;
+  }
+  static void skip(void* self, int size) {
+    static_cast<noted_file*>(self)->stream.seekg(size, std::ios::cur);
+  }
+  static int is_at_end(void* self) { return static_cast<noted_file*>(self)->stream.eof() ? 1 : 0; }
+};
+
 image read_hdr(const std::string& path) {
+  noted_file file{std::ifstream(path, std::ios::binary)};
+  if (!file.stream) throw std::runtime_error("cannot be opened");
+  const stbi_io_callbacks callbacks{noted_file::read, noted_file::skip, noted_file::is_at_end};
   int width = 0, height = 0, channels = 0;
   const std::unique_ptr<float, decltype(&stbi_image_free)> pixels(
-      stbi_loadf(path.c_str(), &width, &height, &channels, 3), &stbi_image_free);
+      stbi_loadf_from_callbacks(&callbacks, &file, &width, &height, &channels, 3), &stbi_image_free);
   if (!pixels) throw std::runtime_error(std::string("cannot be decoded: ") + stbi_failure_reason());
+  if (file.is_cut_off) throw std::runtime_error("is cut off");
   image picture = make_image(width, height);
   for (std::size_t i = 0; i < picture.pixels.size(); ++i)
     picture.pixels[i] = {pixels.get()[3 * i], pixels.get()[3 * i + 1], pixels.get()[3 * i + 2]};
