@@ -102,7 +102,7 @@ struct scene_view {
 
   /// What a texture shows at `uv`, v down. Precondition: there is one.
   WFPG_HD vec4 texel(const texture_reference& reference, vec2 uv) const {
-    const texture_span span = textures[reference.index];
+    const texture_span span = textures[static_cast<std::uint32_t>(reference.index)];
     const vec2 place = reference.transformed(uv);
     const texel_pair column(place.x, span.width, span.wrap_u), row(place.y, span.height, span.wrap_v);
     const float fx = column.second_weight, fy = row.second_weight;
