@@ -5,6 +5,8 @@
 
 #include <wfpg/path_guider.hpp>
 
+#include <algorithm>
+#include <cmath>
 #include <set>
 #include <string>
 #include <vector>
@@ -51,6 +53,56 @@ WFPG_TEST_CASE("path guider: memory() is what it holds of its resource, by part"
     }
   }
   CHECK(resource.bytes_in_use == 0);
+}
+
+template <class Exec>
+std::size_t bytes_of(const wfpg::path_guider<Exec>& guider, const std::string& name) {
+  for (const wfpg::memory_part& part : guider.memory().parts)
+    if (part.name == name) return part.bytes;
+  return 0;
+}
+
+WFPG_TEST_CASE("path guider: what recording takes is bounded by the leaves, not by the paths",
+               "[path_guider]") {
+  const Exec exec;
+  const box_mesh<Exec> mesh(exec);
+  for (const std::size_t paths : {std::size_t(300), std::size_t(20000), std::size_t(200000)}) {
+    guider_options options = tracing_options(paths);
+    options.octree_resolution = 8;
+    const wfpg::path_guider<Exec> some(exec, mesh.view(), options);
+    options.deposits_per_leaf = 0;
+    const wfpg::path_guider<Exec> all(exec, mesh.view(), options);
+    const std::size_t wanted = 16 * some.octree().leaf_count() / 3;  // paths of 3 vertices
+    const std::size_t a_path = 3 * 40 + 4;
+    INFO(paths << " paths, " << wanted << " wanted");
+    CHECK(bytes_of(all, "paths") >= paths * a_path);
+    CHECK(bytes_of(some, "paths") >= std::min(paths, wanted) * a_path);
+    CHECK(bytes_of(some, "paths") <= std::min(paths, 2 * wanted + 64) * a_path + 64);
+    CHECK(bytes_of(some, "deposits") <= bytes_of(all, "deposits"));
+  }
+}
+
+/// What all surfaces radiate, after 12 samples of 4,096 paths.
+template <class Exec>
+float learned_radiance(std::uint32_t deposits_per_leaf) {
+  const Exec exec;
+  const box_mesh<Exec> mesh(exec);
+  guider_options options = tracing_options(4096);
+  options.octree_resolution = 4;
+  options.deposits_per_leaf = deposits_per_leaf;
+  options.unguided_samples = 100;
+  wfpg::path_guider<Exec> guider(exec, mesh.view(), options);
+  trace_paths(exec, guider, 12, 4096, box_caster{});
+  CHECK(guider.statistics().deposits.total() == 0);
+  const wfpg::exitance_cache_view cache = guider.cache();
+  return evaluate(exec, [=] WFPG_HD { return cache.radiance(0, 0); });
+}
+
+WFPG_TEST_CASE("path guider: a share of the paths teaches what all of them do", "[path_guider]") {
+  const float all = learned_radiance<Exec>(0), some = learned_radiance<Exec>(32);
+  CHECK(all > 0.0f);
+  CHECK(some != all);
+  CHECK(std::abs(some - all) < 0.1f * all);
 }
 
 /// Other bins every time, and a third more of them after the first.
