@@ -30,6 +30,10 @@ def print_stages(benchmarks):
         print(f"| {name} | {FLOORS[stage]} | {b['floor_ms']:.3g} | {b['median_ms']:.3g} | {b['ratio']:.2f} |")
 
 
+def ratio(value):
+    return "" if value is None else f"{value:.2f}"
+
+
 def print_equal_time(scenes):
     print("| scene | method | samples | MSE after c / (1 + c) | pt's over it | relative MSE, trimmed | pt's over it |", end="")
     print(" million segments | ms a sample |", " | ".join(STAGES), "| MiB kept | MiB in flight |")
@@ -39,8 +43,8 @@ def print_equal_time(scenes):
             ms = m["milliseconds_a_sample"]
             stages = " | ".join(f"{ms.get(stage, 0.0):.2f}" for stage in STAGES)
             print(
-                f"| {scene['scene']} | {name} | {m['spp']} | {m['mse_reinhard']:.2e} | {m['ratios']['mse_reinhard']:.2f} "
-                f"| {m['relmse_trimmed']:.2e} | {m['ratios']['relmse_trimmed']:.2f} | {m['segments_a_sample'] * 1e-6:.2f} "
+                f"| {scene['scene']} | {name} | {m['spp']} | {m['mse_reinhard']:.2e} | {ratio(m['ratios']['mse_reinhard'])} "
+                f"| {m['relmse_trimmed']:.2e} | {ratio(m['ratios']['relmse_trimmed'])} | {m['segments_a_sample'] * 1e-6:.2f} "
                 f"| {ms['total']:.2f} | {stages} | {m['persistent_bytes'] / 2**20:.1f} | {m['transient_bytes'] / 2**20:.0f} |"
             )
 

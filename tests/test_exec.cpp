@@ -149,7 +149,7 @@ struct visit_by_lanes {
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t) const {
     block.for_each_warp(10, [&](const auto& warp, int i) {
-      warp.for_each_lane([&](int) { visit(static_cast<std::size_t>(i)); });
+      warp.for_lanes_below(warp.width, [&](int) { visit(static_cast<std::size_t>(i)); });
     });
   }
 };
@@ -175,7 +175,8 @@ struct lane_flags {
       const std::uint32_t ballot = warp.ballot(flags);
       const int first = warp.find_first(flags);
       const auto of_lanes = warp.map([](int lane) { return lane * lane; });
-      warp.for_each_lane([&](int lane) { squares[round * warp.width + lane] = of_lanes[lane]; });
+      warp.for_lanes_below(warp.width,
+                           [&](int lane) { squares[round * warp.width + lane] = of_lanes[lane]; });
       warp.for_each(1, [&](int) {
         ballots[round] = ballot;
         firsts[round] = first;
@@ -229,11 +230,11 @@ struct exchange_lanes {
           warp.reduce(value, [](std::int64_t a, std::int64_t b) { return a > b ? a : b; });
       for (int from = 0; from < warp.width; ++from) {
         const std::int64_t broadcast = warp.shuffle(value, from);
-        warp.for_each_lane([&](int lane) {
+        warp.for_lanes_below(warp.width, [&](int lane) {
           if (lane == (from + round) % warp.width) own[lane].broadcast = broadcast;
         });
       }
-      warp.for_each_lane([&](int lane) {
+      warp.for_lanes_below(warp.width, [&](int lane) {
         own[lane].shuffled = shuffled[lane];
         own[lane].sum = sum;
         own[lane].largest = largest;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <wfpg/detail/lanes.hpp>
+#include <wfpg/detail/math.hpp>
 
 #include <cassert>
 #include <cstddef>
@@ -51,9 +52,7 @@ class cpu_block {
     using value = std::decay_t<decltype(f(0))>;
     auto partial = all.map([](int) { return value(0); });
     for (int first = 0; first < n; first += W)
-      all.for_each_lane([&](int lane) {
-        if (first + lane < n) partial[lane] += f(first + lane);
-      });
+      all.for_lanes_below(min(W, n - first), [&](int lane) { partial[lane] += f(first + lane); });
     return all.reduce(partial, [](value a, value b) { return a + b; });
   }
 

@@ -31,10 +31,6 @@ class cuda_warp {
     return lane_register<std::decay_t<decltype(f(0))>>{f(lane())};
   }
   template <class F>
-  __device__ void for_each_lane(F f) const {
-    f(lane());
-  }
-  template <class F>
   __device__ void for_lanes_below(int n, F f) const {
     if (lane() < n) f(lane());
   }

@@ -39,13 +39,6 @@ class emulated_warp {
     return result;
   }
 
-  /// f(lane) for each lane, for what it does.
-  template <class F>
-  WFPG_HD void for_each_lane(F f) const {
-    WFPG_VECTORIZE
-    for (int lane = 0; lane < W; ++lane) f(lane);
-  }
-
   /// f(lane) for the lanes below n, n <= W.
   template <class F>
   WFPG_HD void for_lanes_below(int n, F f) const {

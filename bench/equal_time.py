@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+"""Compares methods on the GPU at equal time, and writes what bench/table.py prints.
+
+usage: bench/equal_time.py DIRECTORY_OF_PROGRAMS OUT.json [SECONDS [REFERENCE_SECONDS [SIZE]]]
+
+Renders each scene with each method for SECONDS (10), and two references for REFERENCE_SECONDS (60) each with other
+seeds, one by path tracing and one guided, so that neither flatters itself. An error is the mean against both, less half
+the difference between the references, which is their own noise.
+"""
+import json
+import os
+import subprocess
+import sys
+import tempfile
+
+SCENES = {"cornell-enclosed": "off", "ajar": "on"}  # and next-event estimation
+METHODS = {
+    "pt": ["--method", "pt"],
+    "transient": ["--fields", "transient"],
+    "wfpg": [],
+    "product": ["--method", "wfpg-product"],
+}
+REFERENCES = {"a": (["--method", "pt"], 901), "b": ([], 902)}
+ERRORS = ("mse", "relmse", "relmse_trimmed", "mse_reinhard")
+
+
+class Programs:
+    def __init__(self, directory, size, folder):
+        self.directory, self.size, self.folder = directory, size, folder
+
+    def render(self, scene, name, arguments, seconds, seed):
+        """Renders to NAME.exr and returns the statistics."""
+        picture, stats = (os.path.join(self.folder, name + ending) for ending in (".exr", ".json"))
+        command = [os.path.join(self.directory, "wfpg-render"), scene, "--device", "cuda", "--size", self.size]
+        command += ["--nee", SCENES[scene], "--seconds", str(seconds), "--seed", str(seed), *arguments]
+        subprocess.run([*command, "-o", picture, "--stats", stats], check=True, stdout=subprocess.DEVNULL)
+        with open(stats) as file:
+            return json.load(file)
+
+    def compare(self, name, reference):
+        pictures = [os.path.join(self.folder, n + ".exr") for n in (name, reference)]
+        command = [os.path.join(self.directory, "wfpg-compare"), *pictures, "--json"]
+        return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
+
+
+def summary(stats, errors, noise):
+    """One method's line: errors without the references' noise, and what a sample took."""
+    spp = stats["spp"]
+    line = {"spp": spp}
+    for e in ERRORS:
+        line[e] = sum(error[e] for error in errors) / len(errors) - noise[e] / 2
+    line["milliseconds_a_sample"] = {stage: 1e3 * s / spp for stage, s in stats["seconds"].items()}
+    line["segments_a_sample"] = stats["segments"] / spp
+    line["persistent_bytes"] = stats["memory"]["persistent"]
+    line["transient_bytes"] = stats["memory"]["transient"]
+    return line
+
+
+def measure(programs, scene, seconds, reference_seconds):
+    for name, (arguments, seed) in REFERENCES.items():
+        programs.render(scene, name, arguments, reference_seconds, seed)
+    noise = programs.compare("a", "b")
+    methods = {}
+    for name, arguments in METHODS.items():
+        stats = programs.render(scene, name, arguments, seconds, 1)
+        methods[name] = summary(stats, [programs.compare(name, reference) for reference in REFERENCES], noise)
+    for line in methods.values():
+        # None where the references' noise hides what the method leaves.
+        line["ratios"] = {
+            e: methods["pt"][e] / line[e] if line[e] > noise[e] / 20 else None for e in ERRORS
+        }
+    return {"scene": scene, "reference_noise": noise, "methods": methods}
+
+
+def main(directory, out, seconds=10.0, reference_seconds=60.0, size="1920x1080"):
+    gpu = subprocess.run(["nvidia-smi", "--query-gpu=name,driver_version", "--format=csv,noheader"],
+                         check=True, stdout=subprocess.PIPE, text=True).stdout.strip()
+    results = {"command": " ".join(sys.argv), "gpu_and_driver": gpu, "seconds": float(seconds),
+               "reference_seconds": float(reference_seconds), "size": size, "scenes": []}
+    with tempfile.TemporaryDirectory() as folder:
+        programs = Programs(directory, size, folder)
+        for scene in SCENES:
+            print(scene, file=sys.stderr)
+            results["scenes"].append(measure(programs, scene, float(seconds), float(reference_seconds)))
+    with open(out, "w") as file:
+        json.dump(results, file, indent=1)
+        file.write("\n")
+
+
+if __name__ == "__main__":
+    if not 3 <= len(sys.argv) <= 6:
+        sys.exit(__doc__.strip())
+    main(*sys.argv[1:])
