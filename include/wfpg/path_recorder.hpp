@@ -69,8 +69,7 @@ class path_recorder_view {
   WFPG_HD void vertex(std::size_t path, std::uint32_t depth, vec3 position, vec3 outgoing,
                       vec3 throughput) const {
     std::uint32_t place;
-    if (path >= paths_) return drop();
-    if (!runs_.find(path, place)) return;
+    if (!find(path, place)) return;
     if (depth >= max_depth_ || depth != lengths_[place] || !detail::is_finite(outgoing)) return drop();
     const std::size_t slot = depth * recorded_ + place;
     places_[slot] = {position, pack_direction(outgoing)};
@@ -82,8 +81,7 @@ class path_recorder_view {
   /// and MIS weight included, linear RGB. Next-event estimation reports with this.
   WFPG_HD void radiance(std::size_t path, std::uint32_t depth, vec3 contribution) const {
     std::uint32_t place;
-    if (path >= paths_) return drop();
-    if (runs_.find(path, place)) add(place, depth, contribution);
+    if (find(path, place)) add(place, depth, contribution);
   }
 
   /// Radiance of an emitter that the path hit as vertex `depth`, or of the environment that it left for after
@@ -91,8 +89,7 @@ class path_recorder_view {
   /// as leaving the emitter itself where emission is included and the emitter is a recorded vertex.
   WFPG_HD void emission(std::size_t path, std::uint32_t depth, vec3 contribution) const {
     std::uint32_t place;
-    if (path >= paths_) return drop();
-    if (!runs_.find(path, place)) return;
+    if (!find(path, place)) return;
     if (depth > lengths_[place]) return drop();
     if (include_emission_ && depth < lengths_[place])
       add(place, depth, contribution);
@@ -106,6 +103,12 @@ class path_recorder_view {
   friend struct deposit_paths;
 
   WFPG_HD void drop() const { detail::atomic_add(dropped_, 1); }
+  /// Where a path is among the recorded ones; false where it is not, and dropped where there is no such path.
+  WFPG_HD bool find(std::size_t path, std::uint32_t& place) const {
+    if (path < paths_) return runs_.find(path, place);
+    drop();
+    return false;
+  }
   /// `place`: of a path, among the recorded ones.
   WFPG_HD void add(std::uint32_t place, std::uint32_t depth, vec3 contribution) const {
     if (depth >= lengths_[place]) return drop();

@@ -38,7 +38,7 @@ struct alignas(16) two_levels {
   WFPG_HD std::uint32_t at(uvec3 p) const {
     const std::uint32_t i = spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2;
     if (!(present >> i & 1u)) return invalid_node;
-    return first + popcount64(present & ((std::uint64_t(1) << i) - 1u));
+    return first + popcount(present & ((std::uint64_t(1) << i) - 1u));
   }
 
  private:
@@ -72,14 +72,14 @@ class sparse_voxel_octree_view {
   WFPG_HD node_id parent(node_id node) const { return parents_[node]; }
   /// The children of an inner node are `child_count` nodes from `first_child`, in the order of their octants.
   WFPG_HD node_id first_child(node_id node) const { return first_children_[node]; }
-  WFPG_HD std::uint32_t child_count(node_id node) const { return detail::popcount8(child_masks_[node]); }
+  WFPG_HD std::uint32_t child_count(node_id node) const { return detail::popcount(child_masks_[node]); }
   /// The octants that an inner node has children in, a bit each.
   WFPG_HD std::uint32_t child_mask(node_id node) const { return child_masks_[node]; }
   /// The child of an inner node in an octant (bit 0: upper x, 1: y, 2: z), or invalid_node.
   WFPG_HD node_id child(node_id node, std::uint32_t octant) const {
     const std::uint32_t mask = child_masks_[node];
     if (!(mask >> octant & 1u)) return invalid_node;
-    return first_children_[node] + detail::popcount8(mask & ((1u << octant) - 1u));
+    return first_children_[node] + detail::popcount(mask & ((1u << octant) - 1u));
   }
 
   /// The ancestor at a level no deeper than the node's own; the node itself at its own level. O(levels).

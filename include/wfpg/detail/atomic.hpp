@@ -36,10 +36,9 @@ WFPG_HD T atomic_load(const T* target) {
 }
 
 /// *target = value.
-template <class T>
-WFPG_HD void atomic_store(T* target, T value) {
+WFPG_HD inline void atomic_store(std::uint32_t* target, std::uint32_t value) {
 #if defined(__CUDA_ARCH__)
-  *static_cast<volatile T*>(target) = value;
+  *static_cast<volatile std::uint32_t*>(target) = value;
 #else
   __atomic_store_n(target, value, __ATOMIC_RELAXED);
 #endif

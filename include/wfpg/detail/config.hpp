@@ -24,20 +24,9 @@
 
 namespace wfpg::detail {
 
-/// Bits set among the lower 8. On a CPU without the processor's own instruction, for which portable builds
-/// call a function.
-WFPG_HD inline std::uint32_t popcount8(std::uint32_t bits) {
-#if defined(__CUDA_ARCH__)
-  return static_cast<std::uint32_t>(__popc(bits));
-#else
-  bits = bits - (bits >> 1 & 0x55u);
-  bits = (bits & 0x33u) + (bits >> 2 & 0x33u);
-  return (bits + (bits >> 4)) & 0x0fu;
-#endif
-}
-
-/// Bits set among 64.
-WFPG_HD inline std::uint32_t popcount64(std::uint64_t bits) {
+/// Bits that are set. On a CPU without the processor's own instruction, for which portable builds call a
+/// function.
+WFPG_HD inline std::uint32_t popcount(std::uint64_t bits) {
 #if defined(__CUDA_ARCH__)
   return static_cast<std::uint32_t>(__popcll(bits));
 #else
