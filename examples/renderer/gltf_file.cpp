@@ -87,18 +87,9 @@ bool keep_encoded(tinygltf::Image* target, const int, std::string*, std::string*
   return true;
 }
 
-void require_known_extensions(const tinygltf::Model& model) {
-  const char* known[] = {"KHR_materials_diffuse_transmission",
-                         "KHR_materials_emissive_strength",
-                         "KHR_materials_ior",
-                         "KHR_materials_specular",
-                         "KHR_materials_transmission",
-                         "KHR_materials_volume",
-                         "KHR_texture_transform",
-                         "KHR_lights_punctual"};
+void require_supported_extensions(const tinygltf::Model& model) {
   for (const std::string& name : model.extensionsRequired)
-    if (std::find(std::begin(known), std::end(known), name) == std::end(known))
-      fail("requires the extension " + name + ", which is not supported");
+    if (!is_supported_extension(name)) fail("requires the extension " + name + ", which is not supported");
 }
 
 void add_lines(std::vector<std::string>& warnings, const std::string& text) {
@@ -188,6 +179,18 @@ std::uint32_t index_at(const unsigned char* place, int component) {
 
 }  // namespace
 
+bool is_supported_extension(const std::string& name) {
+  const char* supported[] = {"KHR_materials_diffuse_transmission",
+                             "KHR_materials_emissive_strength",
+                             "KHR_materials_ior",
+                             "KHR_materials_specular",
+                             "KHR_materials_transmission",
+                             "KHR_materials_volume",
+                             "KHR_texture_transform",
+                             "KHR_lights_punctual"};
+  return std::find(std::begin(supported), std::end(supported), name) != std::end(supported);
+}
+
 void warn_once(std::vector<std::string>& warnings, const std::string& line) {
   if (std::find(warnings.begin(), warnings.end(), line) == warnings.end()) warnings.push_back(line);
 }
@@ -211,7 +214,7 @@ tinygltf::Model read_model(const std::string& path, std::vector<std::string>& wa
   if (!parsed) fail(one_line(errors));
   if (model.asset.version.rfind("2.", 0) != 0)
     fail("is of glTF version '" + model.asset.version + "', not 2");
-  require_known_extensions(model);
+  require_supported_extensions(model);
   add_lines(warnings, remarks);
   return model;
 }

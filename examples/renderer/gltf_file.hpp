@@ -15,6 +15,9 @@ namespace render::gltf {
 /// Adds a line to `warnings` unless it is there already.
 void warn_once(std::vector<std::string>& warnings, const std::string& line);
 
+/// Whether files that need an extension are read as they are meant.
+bool is_supported_extension(const std::string& name);
+
 /// The model of a .gltf or .glb file (told apart by their first bytes), glTF version 2 only. Images are not
 /// decoded: tinygltf::Image::image holds the encoded bytes of an image from a URI, nothing for one from a
 /// buffer view.

@@ -14,6 +14,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <utility>
 
 namespace render::gltf {
@@ -252,13 +253,7 @@ class material_reader {
   }
 
   void warn_of_extension(const std::string& name) {
-    const char* read_above[] = {"KHR_materials_diffuse_transmission",
-                                "KHR_materials_emissive_strength",
-                                "KHR_materials_ior",
-                                "KHR_materials_specular",
-                                "KHR_materials_transmission",
-                                "KHR_materials_volume"};
-    if (std::find(std::begin(read_above), std::end(read_above), name) == std::end(read_above))
+    if (name.rfind("KHR_materials_", 0) != 0 || !gltf::is_supported_extension(name))
       warn("the extension " + name + " is not supported");
   }
 
@@ -283,33 +278,35 @@ class material_reader {
     return result;
   }
 
-  /// The index into scene::textures, -1 for none.
+  /// The index into scene::textures, -1 for none. Textures that show one image alike share it.
   std::int32_t index_of(int gltf_texture, encoding is) {
     if (std::size_t(gltf_texture) >= model_.textures.size())
       throw std::runtime_error("texture " + std::to_string(gltf_texture) + " does not exist");
-    const auto [entry, is_new] =
-        index_of_texture_.try_emplace({gltf_texture, is}, std::int32_t(target_.textures.size()));
-    if (!is_new) return entry->second;
     const tinygltf::Texture& source = model_.textures[std::size_t(gltf_texture)];
     if (source.source < 0) {
       warn("a texture without a PNG or JPEG image is left out");
-      return entry->second = -1;
+      return -1;
     }
-    texture decoded = image_of(source.source, is);
-    set_wrapping(source.sampler, decoded);
-    target_.textures.push_back(std::move(decoded));
+    const auto [wrap_u, wrap_v] = wrapping_of(source.sampler);
+    const auto [entry, is_new] = index_of_texture_.try_emplace({source.source, is, wrap_u, wrap_v},
+                                                               std::int32_t(target_.textures.size()));
+    if (is_new) {
+      texture decoded = image_of(source.source, is);
+      decoded.wrap_u = wrap_u;
+      decoded.wrap_v = wrap_v;
+      target_.textures.push_back(std::move(decoded));
+    }
     return entry->second;
   }
 
-  void set_wrapping(int sampler, texture& target) {
-    if (sampler < 0) return;
+  std::pair<texture_wrap, texture_wrap> wrapping_of(int sampler) {
+    if (sampler < 0) return {texture_wrap::repeat, texture_wrap::repeat};
     if (std::size_t(sampler) >= model_.samplers.size())
       throw std::runtime_error("sampler " + std::to_string(sampler) + " does not exist");
     const tinygltf::Sampler& source = model_.samplers[std::size_t(sampler)];
-    target.wrap_u = wrap_of(source.wrapS);
-    target.wrap_v = wrap_of(source.wrapT);
     if (source.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST)
       warn("texture filters are not supported: all are bilinear");
+    return {wrap_of(source.wrapS), wrap_of(source.wrapT)};
   }
 
   texture image_of(int index, encoding is) const {
@@ -324,7 +321,7 @@ class material_reader {
 
   const tinygltf::Model& model_;
   scene& target_;
-  std::map<std::pair<int, encoding>, std::int32_t> index_of_texture_;
+  std::map<std::tuple<int, encoding, texture_wrap, texture_wrap>, std::int32_t> index_of_texture_;
 };
 
 }  // namespace
