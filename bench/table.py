@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Prints results of the GPU as a table of docs/performance.md.
 
-usage: bench/table.py bench/results/cuda-stages.json | bench/results/cuda-equal-time.json
+usage: bench/table.py bench/results/NAME.json
 """
 import json
 import sys
@@ -49,10 +49,25 @@ def print_equal_time(scenes):
             )
 
 
+def print_sample_times(scenes):
+    print("| scene | method | million segments | ms |", " | ".join(STAGES), "| ratio to pt | and per segment |")
+    print("| --- " * (6 + len(STAGES)) + "|")
+    for scene in scenes:
+        ratios = {"pt": (1.0, 1.0), "wfpg": (scene["ratio_a_sample"], scene["ratio_a_segment"])}
+        for name, ms in scene["milliseconds"].items():
+            stages = " | ".join(f"{ms[stage]:.2f}" for stage in STAGES)
+            print(
+                f"| {scene['scene']} | {name} | {ms['segments'] * 1e-6:.2f} | {ms['total']:.2f} | {stages} "
+                f"| {ratios[name][0]:.3f} | {ratios[name][1]:.3f} |"
+            )
+
+
 def main(path):
     results = json.load(open(path))
     if "benchmarks" in results:
         print_stages(results["benchmarks"])
+    elif "settled_samples" in results:
+        print_sample_times(results["settled_samples"])
     else:
         print_equal_time(results["scenes"])
 

@@ -56,13 +56,15 @@ void refreshing_slots(benchmark::State& state) {
   const wfpg::kept_field_wave<stored_surfaces> wave{
       pixels, {given}, guide.cache.view(), {}, wfpg::guiding_mode::oriented, 0.7f, 1, {}};
   const wfpg::buffer<std::uint8_t, exec_policy> settled(exec, slot_count);
+  const wfpg::buffer<std::uint64_t, exec_policy> refreshed(exec, 1);
   const wfpg::detail::kept_fields_view kept{{slots.view(), nullptr, 0, settled.data()},
                                             fields.data(),
                                             words.data(),
                                             found.data(),
                                             slot_size,
                                             recast,
-                                            2};
+                                            2,
+                                            refreshed.data()};
   using builder_type = wfpg::detail::kept_field_builder<wfpg::kept_field_wave<stored_surfaces>>;
   const builder_type builder{wave, kept};
   const auto renew = [&] { exec.for_each(slot_count, make_slots{slots.view(), fields.data(), given}); };

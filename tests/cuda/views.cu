@@ -112,10 +112,9 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   d::field_store_state* const state = nullptr;
   d::field_wave_counts* const counts = nullptr;
   launch(d::count_rays<d::wave_rays<surfaces>>{{}, tree, {}, {}});
-  launch(d::begin_store_sample{state, counts});
   launch(d::forget_wave{{}, counts});
   launch(d::list_builds{{}, nullptr, {}, {}, 0});
-  launch(d::evict_fields{slots, nullptr, state, 1, 16});
+  launch(d::begin_slots{slots, nullptr, state, counts, 1, 16});
   launch(d::index_slots{slots, nullptr, nullptr, state});
   launch(d::invalidate_fields{slots, nullptr, tree, {}});
   launch(d::mark_leaves{tree, {}, 3, {}});

@@ -81,8 +81,7 @@ struct field_store_state {
   std::uint32_t free = 0;            ///< slots in the list of free ones, made at the beginning of a sample
   std::uint32_t taken = 0;           ///< of that list
   std::uint32_t refused_births = 0;  ///< in this sample, for want of a free slot
-  std::uint32_t refused_births_before = 0;  ///< in the sample before
-  std::uint32_t delayed_births = 0;         ///< in this sample, for the limit on cones
+  std::uint32_t delayed_births = 0;  ///< in this sample, for the limit on cones
   std::uint32_t refused_since_mark = 0;
   // Since the beginning:
   std::uint64_t born = 0, refreshed = 0;
@@ -92,23 +91,12 @@ struct field_store_state {
 struct build_list {
   std::uint32_t* list = nullptr;
   field_wave_counts* counts = nullptr;
-  field_store_state* state = nullptr;
-  depth_statistics* statistics = nullptr;  // null: none are wanted
-  std::uint32_t cells = 0;                 // cones of a whole build
-  std::uint32_t part = 0;                  // of a refresh
 
   /// In any order: fields do not depend on each other.
   WFPG_HD void add(std::uint32_t slot, bool whole, std::size_t slots) const {
     const std::uint32_t rank = atomic_add(whole ? &counts->all : &counts->part, 1);
     list[(whole ? 0 : slots) + rank] = slot;
-    count(whole ? 1 : 0, whole ? 0 : 1);
-  }
-  WFPG_HD void count(std::uint32_t wholes, std::uint32_t parts) const {
-    atomic_add(&counts->builds, wholes + parts);
-    atomic_add(&state->refreshed, std::uint64_t(parts));
-    if (!statistics) return;
-    atomic_add(&statistics->bins, std::uint64_t(wholes) + parts);
-    atomic_add(&statistics->cones, std::uint64_t(wholes) * cells + std::uint64_t(parts) * part);
+    atomic_add(&counts->builds, 1);
   }
 };
 
@@ -229,6 +217,8 @@ struct use_ancestor {
 /// Finds rays' slots, and counts the rays where `counted`. `Rays`: (std::size_t) -> ray_to_bin.
 template <class Rays>
 struct find_fields {
+  static constexpr bool waits_for_memory = true;
+
   Rays rays;
   ray_runs runs;
   bin_marks_view marks;
@@ -400,7 +390,7 @@ struct list_builds {
     if (i == 0) {
       builds.counts->all = most_wholes;
       builds.counts->part = most_parts;
-      builds.count(most_wholes, most_parts);
+      builds.counts->builds = most_wholes + most_parts;
     }
     if (s.origin == field_slot::unpicked) return;
     const bool whole = s.builds == 0;
@@ -419,18 +409,22 @@ struct list_builds {
   }
 };
 
-/// Frees slots that no ray has used for some samples; where births were refused, for one. No slot is settled.
-struct evict_fields {
+/// A sample begins: frees slots that no ray has used for some samples; where births were refused, for one. No
+/// slot is settled.
+struct begin_slots {
   field_slots_view slots;
   resident_field* fields;
   const field_store_state* state;
+  field_wave_counts* counts;
   std::uint32_t sample;
   std::uint32_t idle_samples;
 
   WFPG_HD void operator()(std::size_t i) const {
+    if (i == 0) *counts = {};
+    if (i >= slots.slots.size()) return;
     field_slot& s = slots.slots[i];
     slots.settled[i] = 0;
-    const std::uint32_t most = state->refused_births_before > 0 ? 1 : idle_samples;
+    const std::uint32_t most = state->refused_births > 0 ? 1 : idle_samples;
     if (s.key == no_key || sample - s.last_used <= most) return;
     s = {};
     fields[i] = {};
@@ -441,14 +435,20 @@ struct is_free {
   WFPG_HD std::uint32_t operator()(const field_slot& s) const { return s.key == no_key ? 1u : 0u; }
 };
 
-/// Live slots into the table, free ones into their list.
+/// Live slots into the table, free ones into their list; the sample's counts begin.
 struct index_slots {
   field_slots_view slots;
   const std::uint32_t* free_through;
   std::uint32_t* free_slots;
   field_store_state* state;
   WFPG_HD void operator()(std::size_t i) const {
-    if (i + 1 == slots.slots.size()) state->free = free_through[i];
+    const std::size_t n = slots.slots.size();
+    if (i == 0) {
+      state->free = n > 0 ? free_through[n - 1] : 0;
+      state->refused_births = state->delayed_births = 0;
+      state->taken = 0;
+    }
+    if (i >= n) return;
     if (slots.slots[i].key == no_key)
       free_slots[free_through[i] - 1] = static_cast<std::uint32_t>(i);
     else

@@ -6,18 +6,6 @@
 namespace wfpg {
 namespace detail {
 
-/// The state as a sample begins.
-struct begin_store_sample {
-  field_store_state* state;
-  field_wave_counts* counts;
-  WFPG_HD void operator()(std::size_t) const {
-    state->refused_births_before = state->refused_births;
-    state->refused_births = state->delayed_births = 0;
-    state->taken = 0;
-    counts[0] = {};
-  }
-};
-
 /// Forgets a wave that ended before its fields were built.
 struct forget_wave {
   array_view<field_slot> slots;
@@ -89,14 +77,14 @@ void field_store<Exec>::begin_sample(const Exec& exec, std::uint32_t sample) {
   sample_ = sample;
   counted_samples_ += counts_rays() ? 1 : 0;
   waves_ = 0;
-  exec.for_each(1, detail::begin_store_sample{state_.data(), counts()});
-  exec.for_each(capacity_,
-                detail::evict_fields{view(), fields_.data(), state_.data(), sample, options_.idle_samples});
+  exec.for_each(
+      detail::max<std::size_t>(capacity_, 1),
+      detail::begin_slots{view(), fields_.data(), state_.data(), counts(), sample, options_.idle_samples});
   exec.fill_bytes(table_.data(), 0xff, table_.bytes());  // no_entry
   const array_view<std::uint32_t> free_through(list_.data(), capacity_);
   ::thrust::transform_inclusive_scan(exec.thrust(), slots_.data(), slots_.data() + capacity_,
                                      free_through.data(), detail::is_free{}, ::thrust::plus<std::uint32_t>());
-  exec.for_each(capacity_,
+  exec.for_each(detail::max<std::size_t>(capacity_, 1),
                 detail::index_slots{view(), free_through.data(), free_slots_.data(), state_.data()});
 }
 
@@ -121,8 +109,9 @@ guide_view field_store<Exec>::prepare(const Exec& exec, const kept_field_wave<Su
     exec.for_each(detail::max<std::size_t>(capacity_, 1), detail::forget_wave{slots_.view(), counts()});
   in_wave_ = true;
   find(exec, wave);
-  const detail::kept_fields_view kept{
-      view(), fields_.data(), words_.data(), hits_.data(), options_.resolution, options_.recast, sample_};
+  const detail::kept_fields_view kept{view(),       fields_.data(),           words_.data(),
+                                      hits_.data(), options_.resolution,      options_.recast,
+                                      sample_,      &state_.data()->refreshed};
   if (builds_in_wave())
     build(exec, detail::kept_field_builder<kept_field_wave<Surfaces>>{wave, kept}, caster,
           caster_buffer_bytes);
@@ -141,8 +130,7 @@ void field_store<Exec>::find(const Exec& exec, const kept_field_wave<Surfaces>& 
   const wanted_builds wanted_now = !builds_in_wave() ? wanted_builds::none
                                    : limits_builds() ? wanted_builds::marked
                                                      : wanted_builds::listed;
-  const detail::build_list builds{list_.data(),    counts(),        state_.data(),
-                                  wave.statistics, cells_a_field(), refresh_cones()};
+  const detail::build_list builds{list_.data(), counts()};
   const detail::use_slot use{view(), field_of_ray_.data(), sample_, wave.seed, wanted_now, builds};
   const detail::ray_runs runs{wave.ray_count, counts(), wave.statistics};
   const detail::use_ancestor ancestor{tree_, use};

@@ -32,6 +32,7 @@ struct kept_fields_view {
   std::uint32_t resolution;
   std::uint32_t recast;
   std::uint32_t sample;
+  std::uint64_t* refreshed;  // counts builds that cast a part of the cones
 };
 
 /// Builds fields for a wave's rays.
@@ -65,7 +66,7 @@ struct kept_field_builder {
 
   /// Reads every cell through its hit, and makes the distribution.
   template <class Block>
-  WFPG_HD void finish(Block& block, std::uint32_t slot, const field_cells& cells) const {
+  WFPG_HD void finish(Block& block, std::uint32_t slot, const field_cells& cells, bool whole) const {
     const auto size = static_cast<int>(kept.resolution);
     const cone_hit* const hits = kept.hits + std::size_t(slot) * kept.resolution * kept.resolution;
     const cell_words words{kept.words + std::size_t(slot) * kept.resolution * kept.resolution};
@@ -83,7 +84,16 @@ struct kept_field_builder {
       ++state.builds;
       state.origin = field_slot::unpicked;
       kept.slots.settled[slot] = 1;
+      count(whole);
     });
+  }
+
+ private:
+  WFPG_HD void count(bool whole) const {
+    if (!whole) atomic_add(kept.refreshed, std::uint64_t(1));
+    if (!wave.statistics) return;
+    atomic_add(&wave.statistics->bins, std::uint64_t(1));
+    atomic_add(&wave.statistics->cones, std::uint64_t(cone_count(whole)));
   }
 };
 
@@ -108,7 +118,7 @@ struct build_kept_fields {
       kept[cell.index(cells.resolution)] = cells.find(builder.wave.cache, r, hits(i, cone, r));
     });
     block.sync();
-    builder.finish(block, slot, cells);
+    builder.finish(block, slot, cells, whole);
   }
 };
 

@@ -22,6 +22,7 @@
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 
 namespace wfpg {
 
@@ -102,8 +103,23 @@ __global__ void for_each_kernel(Count n, F f) {
   for (std::size_t i = std::size_t(blockIdx.x) * blockDim.x + threadIdx.x; i < count; i += stride) f(i);
 }
 
+/// Of 512 threads, the least that registers are to allow a multiprocessor, of the smallest there are. Two, so
+/// that shared memory may be large; all where F says that it `waits_for_memory`.
+template <class F, class = void>
+struct resident_blocks {
+  static constexpr int value = 2;
+};
+template <class F>
+struct resident_blocks<F, std::enable_if_t<F::waits_for_memory>> {
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
+  static constexpr int value = 2;
+#else
+  static constexpr int value = 3;
+#endif
+};
+
 template <class Block, class Count, class F>
-__global__ void __launch_bounds__(Block::threads, 2)
+__global__ void __launch_bounds__(Block::threads, resident_blocks<F>::value)
     for_each_block_kernel(Count n, std::size_t scratch_bytes, F f) {
   extern __shared__ __align__(16) unsigned char block_scratch[];
   const std::size_t count = count_of(n);
