@@ -115,7 +115,7 @@ method_result run_method(const demo_scene& demo, const demo_device& on, const de
   options.method = method.method;
   options.lifetime = method.lifetime;
   options.spp = samples;
-  options.checkpoints = true;
+  options.checkpoints = render::checkpoint_times::powers_of_two;
   method_result result{method.name, render_once(demo, on, method.name, options), {}};
   result.error = without_noise(render::compare(result.rendering.picture, truth.picture), truth.noise);
   return result;
@@ -130,15 +130,6 @@ render::curve error_over_time(const method_result& result, const reference& trut
     curve.points.emplace_back(at.seconds, error.mse_reinhard);
   }
   return curve;
-}
-
-image enlarged(const image& picture, int shown_at) {
-  image result = render::make_image(picture.width * shown_at, picture.height * shown_at);
-  for (int y = 0; y < result.height; ++y)
-    for (int x = 0; x < result.width; ++x)
-      result.pixels[static_cast<std::size_t>(y * result.width + x)] =
-          picture.pixels[static_cast<std::size_t>(y / shown_at * picture.width + x / shown_at)];
-  return result;
 }
 
 double bins_of(const render::render_report& report) {
@@ -196,11 +187,11 @@ nlohmann::ordered_json run_scene(const demo_scene& demo, const demo_device& on,
       pt_seconds = seconds_of(result);
     }
     render::write_exr(path(std::string("-") + method.name + ".exr"), result.rendering.picture);
-    strip.push_back(enlarged(result.rendering.picture, on.shown_at));
+    strip.push_back(render::enlarged(result.rendering.picture, on.shown_at));
     rows.push_back(row(result, pt, pt_seconds));
     plot.curves.push_back(error_over_time(result, truth));
   }
-  strip.push_back(enlarged(truth.picture, on.shown_at));
+  strip.push_back(render::enlarged(truth.picture, on.shown_at));
   render::write_png(path(".png"), render::side_by_side(strip, 4), demo.exposure);
   render::write_svg(path("-error.svg"), plot);
   return {{"scene", demo.name},

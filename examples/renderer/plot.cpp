@@ -6,16 +6,21 @@
 #include <cstdio>
 #include <fstream>
 #include <stdexcept>
+#include <utility>
 
 namespace render {
 namespace {
 
-constexpr double width = 640.0, height = 420.0;                          // pixels
-constexpr double left = 80.0, right = 120.0, top = 40.0, bottom = 55.0;  // margins
+// In pixels. To the right of the frame there is room for the curves' names.
+constexpr double frame_width = 440.0, height = 420.0;
+constexpr double left = 80.0, top = 40.0, bottom = 55.0;  // margins
+constexpr double right_end = left + frame_width;
+constexpr double least_room = 120.0, letter_width = 7.5;
+constexpr double line_height = 15.0;
 constexpr const char* colours[] = {"#777777", "#d95f02", "#1b6ca8", "#2a9d5c", "#8e44ad", "#b8860b"};
 
 bool is_drawn(const std::pair<double, double>& point) {
-  return point.first > 0.0 && point.second > 0.0;
+  return point.first > 0.0 && point.second > 0.0 && std::isfinite(point.first) && std::isfinite(point.second);
 }
 
 /// The decades around some values, and where a value lies between them.
@@ -66,8 +71,8 @@ std::string grid(const log_axis& axis, bool vertical) {
     for (int digit = 1; digit < 10 && (digit == 1 || power < axis.high); ++digit) {
       const double at = axis.position(digit * std::pow(10.0, power));
       const char* colour = digit == 1 ? "<g stroke='#bbb'>" : "<g stroke='#eee'>";
-      result += colour + (vertical ? line(at, top, at, height - bottom) : line(left, at, width - right, at)) +
-                "</g>";
+      result +=
+          colour + (vertical ? line(at, top, at, height - bottom) : line(left, at, right_end, at)) + "</g>";
     }
     char name[32];
     std::snprintf(name, sizeof name, "%g", std::pow(10.0, power));
@@ -78,17 +83,44 @@ std::string grid(const log_axis& axis, bool vertical) {
   return result;
 }
 
-std::string draw(const curve& drawn, const log_axis& x, const log_axis& y, const std::string& colour) {
-  std::string points, dots, name;
+/// A curve's name at its last point.
+struct end_label {
+  std::string name, colour;
+  double x, y;
+};
+
+std::string draw(const curve& drawn, const log_axis& x, const log_axis& y, const std::string& colour,
+                 std::vector<end_label>& labels) {
+  std::string points, dots;
+  double px = 0.0, py = 0.0;
   for (const auto& point : drawn.points) {
     if (!is_drawn(point)) continue;
-    const double px = x.position(point.first), py = y.position(point.second);
+    px = x.position(point.first);
+    py = y.position(point.second);
     points += number(px) + "," + number(py) + " ";
     dots += "<circle cx='" + number(px) + "' cy='" + number(py) + "' r='3' fill='" + colour + "'/>\n";
-    name = label(px + 8.0, py + 4.0, drawn.name, "fill='" + colour + "'");
   }
-  return "<polyline fill='none' stroke-width='2' stroke='" + colour + "' points='" + points + "'/>\n" + dots +
-         name;
+  if (!points.empty()) labels.push_back({drawn.name, colour, px, py});
+  return "<polyline fill='none' stroke-width='2' stroke='" + colour + "' points='" + points + "'/>\n" + dots;
+}
+
+/// Names beside their ends, moved up where they would lie on one another.
+std::string draw(std::vector<end_label> labels) {
+  std::sort(labels.begin(), labels.end(), [](const end_label& a, const end_label& b) { return a.y > b.y; });
+  std::string result;
+  double free_below = height;
+  for (const end_label& l : labels) {
+    const double y = std::min(l.y, free_below);
+    free_below = y - line_height;
+    result += label(l.x + 8.0, y + 4.0, l.name, "fill='" + l.colour + "'");
+  }
+  return result;
+}
+
+double width_of(const plot& drawn) {
+  std::size_t longest = 0;
+  for (const curve& c : drawn.curves) longest = std::max(longest, c.name.size());
+  return right_end + std::max(least_room, 16.0 + letter_width * static_cast<double>(longest));
 }
 
 }  // namespace
@@ -101,19 +133,21 @@ void write_svg(const std::string& path, const plot& drawn) {
         xs.push_back(point.first);
         ys.push_back(point.second);
       }
-  const log_axis x = make_axis(xs, left, width - right);
+  const log_axis x = make_axis(xs, left, right_end);
   const log_axis y = make_axis(ys, height - bottom, top);
   std::ofstream file(path);
-  file << "<svg xmlns='http://www.w3.org/2000/svg' width='" << width << "' height='" << height
+  file << "<svg xmlns='http://www.w3.org/2000/svg' width='" << width_of(drawn) << "' height='" << height
        << "' font-family='sans-serif' font-size='13'>\n<rect width='100%' height='100%' fill='white'/>\n"
        << grid(x, true) << grid(y, false)
        << label(left, top - 15.0, drawn.title, "font-size='15' font-weight='bold'")
-       << label((left + width - right) / 2.0, height - 15.0, drawn.x_label, "text-anchor='middle'")
+       << label((left + right_end) / 2.0, height - 15.0, drawn.x_label, "text-anchor='middle'")
        << label(0.0, 0.0, drawn.y_label,
                 "text-anchor='middle' transform='translate(18 " + number((top + height - bottom) / 2.0) +
                     ") rotate(-90)'");
+  std::vector<end_label> labels;
   for (std::size_t i = 0; i < drawn.curves.size(); ++i)
-    file << draw(drawn.curves[i], x, y, colours[i % (sizeof colours / sizeof colours[0])]);
+    file << draw(drawn.curves[i], x, y, colours[i % (sizeof colours / sizeof colours[0])], labels);
+  file << draw(std::move(labels));
   file << "</svg>\n";
   file.close();
   if (!file) throw std::runtime_error(path + ": cannot be written");

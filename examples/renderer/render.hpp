@@ -18,6 +18,11 @@ namespace render {
 enum class sampling_method { pt, wfpg, wfpg_product };
 enum class guiding { oriented, plain };
 enum class fields { kept, transient };
+enum class checkpoint_times {
+  none,
+  powers_of_two,
+  all
+};                                                 ///< after samples 1, 2, 4, 8, ... and the last; all
 enum class device { cpu, omp, seq, cuda, optix };  ///< TBB, OpenMP, one thread, a GPU, and with OptiX
 
 struct render_options {
@@ -41,8 +46,8 @@ struct render_options {
   std::uint32_t rays_per_bin = 64;                   ///< c_ray
   std::uint32_t min_bin_level = 3;                   ///< l_min, from the root
   float guide_fraction = 0.0f;                       ///< in [0, 1]; 0: the mode's own
-  bool checkpoints = false;                          ///< keep the pictures after samples 1, 2, 4, 8, ...
-  std::optional<wfpg::sample_combination> combine;   ///< unset: pt_linear, and all alike for path tracing
+  checkpoint_times checkpoints = checkpoint_times::none;  ///< when to keep the picture so far
+  std::optional<wfpg::sample_combination> combine;  ///< unset: pt_linear, and all alike for path tracing
 };
 
 /// Bins of one depth, means over the samples that were guided; of kept fields, those made or refreshed.
@@ -94,7 +99,7 @@ inline wfpg::sample_combination combination_of(const render_options& options) {
 /// A picture on the way.
 struct checkpoint {
   int samples = 0;
-  double seconds = 0.0;  ///< of samples so far
+  double seconds = 0.0;  ///< of samples so far; what keeping pictures takes is left out
   image picture;
 };
 
