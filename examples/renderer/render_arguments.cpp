@@ -7,7 +7,6 @@
 #include <CLI/CLI.hpp>
 
 #include <cstdio>
-#include <map>
 #include <stdexcept>
 #include <vector>
 
@@ -36,8 +35,17 @@ void parse_size(const std::string& text, render_options& options) {
 
 }  // namespace
 
-void add_method_options(CLI::App& app, render_options& options) {
+const std::map<std::string, wfpg::sample_combination>& combination_names() {
   using combine = wfpg::sample_combination;
+  static const std::map<std::string, combine> names = {
+      {"pt-linear", combine::pt_linear},        {"pt-first", combine::pt_first},
+      {"constant", combine::constant},          {"linear", combine::linear},
+      {"quadratic", combine::quadratic},        {"one-two", combine::one_two},
+      {"discard-first", combine::discard_first}};
+  return names;
+}
+
+void add_method_options(CLI::App& app, render_options& options) {
   add_choice<sampling_method>(app, "--method", options.method,
                               {{"pt", sampling_method::pt},
                                {"wfpg", sampling_method::wfpg},
@@ -49,15 +57,8 @@ void add_method_options(CLI::App& app, render_options& options) {
   add_choice<fields>(app, "--fields", options.lifetime,
                      {{"kept", fields::kept}, {"transient", fields::transient}},
                      "kept across depths and samples (default), or made anew each time");
-  add_choice<combine>(app, "--combine", options.combine,
-                      {{"pt-linear", combine::pt_linear},
-                       {"pt-first", combine::pt_first},
-                       {"constant", combine::constant},
-                       {"linear", combine::linear},
-                       {"quadratic", combine::quadratic},
-                       {"one-two", combine::one_two},
-                       {"discard-first", combine::discard_first}},
-                      "how samples add up (default: pt-linear; constant for pt)");
+  add_choice<wfpg::sample_combination>(app, "--combine", options.combine, combination_names(),
+                                       "how samples add up (default: pt-linear; constant for pt)");
 }
 
 void add_device_option(CLI::App& app, render_options& options) {
