@@ -221,8 +221,10 @@ TEST_CASE("Errors refuse what cannot be compared", "[renderer][metrics]") {
   CHECK_THROWS_AS(render::compare(grey(4, 4, 1.0f), grey(4, 5, 1.0f)), std::invalid_argument);
   CHECK_THROWS_AS(render::compare(image{}, image{}), std::invalid_argument);
   CHECK(render::noise_of_halves(grey(4, 4, 3.0f), grey(4, 4, 1.0f)).mse == Approx(1.0));
-  CHECK(render::noise_of_halves(grey(4, 4, 3.0f), grey(4, 4, 1.0f)).relmse_robust == Approx(1.0 / 1.01));
-  CHECK(render::noise_of_halves(grey(4, 4, 3.0f), grey(4, 4, 1.0f)).smape == Approx(1.0 / 4.01));
+  // The mean is 2, and each half 1 from it.
+  CHECK(render::noise_of_halves(grey(4, 4, 3.0f), grey(4, 4, 1.0f)).relmse_robust == Approx(1.0 / 4.01));
+  CHECK(render::noise_of_halves(grey(4, 4, 3.0f), grey(4, 4, 1.0f)).smape == Approx(0.5 / 5.01 + 0.5 / 3.01));
+  CHECK_THROWS_AS(render::noise_of_halves(grey(4, 4, 1.0f), grey(4, 5, 1.0f)), std::invalid_argument);
 }
 
 TEST_CASE("Built-in scenes hold together", "[renderer][builtin]") {

@@ -16,7 +16,8 @@ std::string formatted(const char* format, double value) {
 
 /// "1.2e-03 ± 4e-05", with a mark where the reference's noise is large.
 std::string error_cell(const json& error) {
-  std::string cell = error["mean"].is_null() ? "hidden" : formatted("%.3g", error["mean"]);
+  if (error["mean"].is_null()) return "hidden \\*";
+  std::string cell = formatted("%.3g", error["mean"]);
   if (!error["deviation"].is_null()) cell += " ± " + formatted("%.1g", error["deviation"]);
   return error["noise_is_large"].get<bool>() ? cell + " \\*" : cell;
 }
@@ -67,7 +68,7 @@ row cells_of(const json& method) {
   }
   if (errors.contains("flip"))
     cells.insert(cells.end(), {error_cell(errors["flip"]), ratio_cell(errors["flip"])});
-  cells.push_back(formatted("%.1f", 1e-6 * double(method["segments"])));
+  cells.push_back(formatted("%.3g", 1e-6 * double(method["segments"])));
   cells.push_back(formatted("%.2f", double(method["persistent_bytes"]) / mebibyte));
   cells.push_back(formatted("%.2f", double(method["transient_bytes"]) / mebibyte));
   cells.push_back(formatted("%.2f", method["cones_per_segment"]));
@@ -82,7 +83,7 @@ std::string table_of(const json& budget) {
 }
 
 std::string picture(const std::string& text, const std::string& file) {
-  return "![" + text + "](" + file + ")\n\n";
+  return "![" + text + "](" + file + ")\n";
 }
 
 std::string non_finite_warning(const json& budget) {
@@ -108,18 +109,21 @@ std::string section_of(const json& scene, const std::string& methods) {
   text.back() = '.';
   text += "\n\n";
   const json& files = scene["files"];
-  text += picture(title + ", reference and crop", files["reference"]);
+  text += picture(title + ", reference and crop", files["reference"]) + "\n";
   for (std::size_t b = 0; b < scene["summary"].size(); ++b) {
     const json& budget = scene["summary"][b];
     const std::string name = budget["budget"];
     text += "### " + title + ", " + name + "\n\n" + table_of(budget) + non_finite_warning(budget);
-    text +=
-        "\nFrom the left: " + methods + ", reference.\n\n" + picture("crops", files["pictures"][b]["crops"]);
+    text += "\nFrom the left: " + methods + ", reference.\n\n" +
+            picture("crops", files["pictures"][b]["crops"]) + "\n";
     text += "Squared error after c / (1 + c), from the left: " + methods + ".\n\n" +
-            picture("error maps", files["pictures"][b]["errors"]);
+            picture("error maps", files["pictures"][b]["errors"]) + "\n";
   }
   for (const char* const kind : {"plots", "single_samples"})
-    for (const json& file : files[kind]) text += picture(file, file);
+    for (const json& row : files[kind]) {
+      for (const json& file : row) text += picture(file, file);
+      text += "\n\n";
+    }
   return text;
 }
 

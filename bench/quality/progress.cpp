@@ -54,7 +54,7 @@ std::optional<double> run_progress::seconds_left() const {
 
 void run_progress::begin(const planned_run& run) {
   ++begun_;
-  log_ << '[' << begun_ << '/' << count_ << "] " << run.title;
+  log_ << '[' << begun_ << '/' << count_ << "] " << run.title << std::flush;
 }
 
 void run_progress::found(const planned_run& run) {

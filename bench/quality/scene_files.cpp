@@ -2,7 +2,6 @@
 #include "scene_files.hpp"
 
 #include "pictures.hpp"
-#include "plot.hpp"
 
 #include <map>
 #include <stdexcept>
@@ -136,6 +135,11 @@ json scene_files::write_pictures(const std::vector<measured_run>& runs, std::siz
   return {{"crops", crops}, {"errors", maps}};
 }
 
+std::string scene_files::write_plot(const std::string& what, const render::plot& drawn) const {
+  render::write_svg(path(name(what)).string(), drawn);
+  return name(what);
+}
+
 json scene_files::write_plots(const std::vector<measured_run>& runs) const {
   const std::size_t budget = longest_budget(runs);
   json files = json::array();
@@ -166,25 +170,25 @@ json scene_files::write_plots(const std::vector<measured_run>& runs) const {
 
 json scene_files::write_single_samples(const std::vector<single_samples>& single) const {
   json files = json::array();
-  const auto write = [&](const std::string& file, const render::plot& drawn) {
-    files.push_back(name(file));
-    render::write_svg(path(name(file)).string(), drawn);
-  };
   for (const measure& m : measures) {
     if (single.empty()) break;
     const double noise = truth_.noise.*m.value;
+    json row = json::array();
     render::plot alone{scene_.title + ", each sample alone", "sample", m.title, {}};
-    for (std::size_t i = 0; i < single.size(); ++i) {
+    for (std::size_t i = 0; i < single.size(); ++i)
       alone.curves.push_back(
           curve_of(given_.methods[i].name, single[i].alone.by_measure.at(m.name), noise, m.is_squared));
-      render::plot combined{
-          scene_.title + ", " + given_.methods[i].name + ", combined", "samples", m.title, {}};
+    row.push_back(write_plot(std::string(m.name) + "-each-sample.svg", alone));
+    for (std::size_t i = 0; i < single.size(); ++i) {
+      const std::string& method = given_.methods[i].name;
+      render::plot combined{scene_.title + ", " + method + ", combined", "samples", m.title, {}};
       for (const auto& [combination, series] : single[i].combined)
         combined.curves.push_back(curve_of(combination, series.by_measure.at(m.name), noise, m.is_squared));
       if (!combined.curves.empty())
-        write(std::string(m.name) + "-combined-" + file_name_of(given_.methods[i].name) + ".svg", combined);
+        row.push_back(
+            write_plot(std::string(m.name) + "-combined-" + file_name_of(method) + ".svg", combined));
     }
-    write(std::string(m.name) + "-each-sample.svg", alone);
+    files.push_back(row);
   }
   return files;
 }

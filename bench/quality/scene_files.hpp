@@ -1,6 +1,7 @@
 // Pictures and plots of a scene in the output directory.
 #pragma once
 
+#include "plot.hpp"
 #include "reference.hpp"
 #include "single_samples.hpp"
 #include "summary.hpp"
@@ -32,6 +33,7 @@ class scene_files {
   std::string name(const std::string& what) const;
   std::filesystem::path path(const std::string& file) const { return given_.output / file; }
   json write_pictures(const std::vector<measured_run>& runs, std::size_t budget, const window& crop) const;
+  std::string write_plot(const std::string& what, const render::plot& drawn) const;
   json write_plots(const std::vector<measured_run>& runs) const;
   json write_single_samples(const std::vector<single_samples>& single) const;
   window crop_of(const std::vector<measured_run>& runs) const;

@@ -123,13 +123,16 @@ std::vector<double> reinhard_errors(const image& test, const image& reference) {
 }
 
 image_error noise_of_halves(const image& half_a, const image& half_b) {
-  image_error error = compare(half_a, half_b);
-  error.mse /= 4.0;
-  error.relmse /= 4.0;
-  error.relmse_trimmed /= 4.0;
-  error.relmse_robust /= 4.0;
-  error.mse_reinhard /= 4.0;
-  error.smape /= 2.0;
+  require_comparable(half_a, half_b);
+  image mean = half_a;
+  for (std::size_t i = 0; i < mean.pixels.size(); ++i)
+    mean.pixels[i] = 0.5f * (half_a.pixels[i] + half_b.pixels[i]);
+  image_error error = compare(half_a, mean);
+  const image_error other = compare(half_b, mean);
+  for (double image_error::*const value :
+       {&image_error::mse, &image_error::relmse, &image_error::relmse_trimmed, &image_error::relmse_robust,
+        &image_error::mse_reinhard, &image_error::smape})
+    error.*value = 0.5 * (error.*value + other.*value);
   return error;
 }
 

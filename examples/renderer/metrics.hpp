@@ -28,10 +28,10 @@ image_error compare(const image& test, const image& reference);
 /// Throws as compare does.
 std::vector<double> reinhard_errors(const image& test, const image& reference);
 
-/// The error of a reference that is the mean of two independent halves: compare(half_a, half_b) / 4, of
-/// smape, which is not squared, / 2. Each half has twice the variance of the mean, their difference four
-/// times it. Subtract it from a squared error against the mean. `non_finite` and `worst_share` are not
-/// scaled.
+/// The error of a reference that is the mean of two independent halves: what the halves are from their mean,
+/// which they are on opposite sides of, the mean of both. Each half has twice the variance of the mean, half
+/// of which is the mean's own. Subtract it from a squared error against the mean. `non_finite` and
+/// `worst_share` are those of the first half.
 image_error noise_of_halves(const image& half_a, const image& half_b);
 
 }  // namespace render
