@@ -52,7 +52,7 @@ std::optional<std::vector<std::optional<double>>> flip_errors(
   write_whole(files.file(".py"), flip_script);
   write_whole(files.file(".pairs.json"), list.dump());
   if (!output_of("python3 " + quoted(files.file(".py")) + " " + quoted(files.file(".pairs.json")) + " " +
-                 quoted(files.file(".errors.json")) + " 2>/dev/null"))
+                 quoted(files.file(".errors.json"))))
     return std::nullopt;
   std::vector<std::optional<double>> errors;
   for (const json& error : json::parse(content_of(files.file(".errors.json"))))

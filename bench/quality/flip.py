@@ -1,10 +1,12 @@
-"""HDR-FLIP of pairs of pictures. usage: python3 flip.py PAIRS.json OUT.json; exit code 3 without flip-evaluator."""
+"""HDR-FLIP of pairs of pictures. usage: python3 flip.py PAIRS.json OUT.json; exit code 3 where flip-evaluator
+or numpy, which it hands pictures over in, are missing."""
 import json
 import math
 import sys
 
 try:
     import flip_evaluator
+    import numpy  # noqa: F401
 except ImportError:
     sys.exit(3)
 

@@ -75,8 +75,8 @@ void measure_all(const settings& given, std::ostream& log) {
     write_results(given, results);
   }
   if (!has_flip)
-    log << "wfpg-quality: without HDR-FLIP, for which python3 needs the package flip-evaluator: "
-           "pip install flip-evaluator\n";
+    log << "wfpg-quality: without HDR-FLIP, for which python3 needs two packages: "
+           "pip install flip-evaluator numpy\n";
   log << "wfpg-quality: " << (given.output / "results.md").string() << '\n';
 }
 

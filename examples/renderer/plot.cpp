@@ -104,15 +104,21 @@ std::string draw(const curve& drawn, const log_axis& x, const log_axis& y, const
   return "<polyline fill='none' stroke-width='2' stroke='" + colour + "' points='" + points + "'/>\n" + dots;
 }
 
+bool overlap(const end_label& a, const end_label& b) {
+  const end_label& leftmost = a.x < b.x ? a : b;
+  const double end = leftmost.x + letter_width * static_cast<double>(leftmost.name.size());
+  return std::abs(a.y - b.y) < line_height && std::max(a.x, b.x) < end;
+}
+
 /// Names beside their ends, moved up where they would lie on one another.
 std::string draw(std::vector<end_label> labels) {
   std::sort(labels.begin(), labels.end(), [](const end_label& a, const end_label& b) { return a.y > b.y; });
   std::string result;
-  double free_below = height;
-  for (const end_label& l : labels) {
-    const double y = std::min(l.y, free_below);
-    free_below = y - line_height;
-    result += label(l.x + 8.0, y + 4.0, l.name, "fill='" + l.colour + "'");
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    end_label& l = labels[i];
+    for (std::size_t placed = 0; placed < i; ++placed)
+      if (overlap(labels[placed], l)) l.y = labels[placed].y - line_height;
+    result += label(l.x + 8.0, l.y + 4.0, l.name, "fill='" + l.colour + "'");
   }
   return result;
 }
