@@ -111,7 +111,7 @@ TEST_CASE("options: presets hold where nothing is given", "[quality]") {
   const quality::settings quick = parsed({"--preset", "quick"});
   CHECK(quick.scenes.size() == 5);
   CHECK(quick.methods.size() == 3);
-  CHECK(quick.scenes[0].options.width == 96);
+  CHECK(quick.scenes[0].options.width == 112);
   CHECK_FALSE(quick.scenes[0].options.nee);
   CHECK(quick.scenes[1].options.nee);
   const quality::settings own =
@@ -462,6 +462,7 @@ TEST_CASE("a whole run, and one after it that renders nothing", "[quality]") {
   CHECK(scene["reference"]["noise"]["mse_reinhard"].get<double>() > 0.0);
   const std::string markdown = content_of(folder.file("out/results.md"));
   CHECK(contains(markdown, "| small | 2 |"));
+  CHECK(contains(markdown, "| small | pt-linear |"));
   for (const json& row : scene["files"]["plots"])
     for (const json& file : row)
       CHECK(std::filesystem::exists(folder.file("out/" + file.get<std::string>())));
@@ -522,6 +523,7 @@ TEST_CASE("failures are one message and exit code 2", "[quality]") {
   CHECK(contains(message_of({}, "nowhere"), "nowhere"));
   CHECK(contains(message_of({}, folder.file("none.glb")), "none.glb"));
   CHECK(contains(message_of({"--method", "odd=--octree-resolution 100"}), "method odd: "));
+  CHECK(contains(message_of({"--method", "odd=--combine discard-first", "--spp", "1"}), "method odd: "));
   CHECK(contains(message_of({"--crop", "10,10,16x16"}), "--crop"));
   CHECK(run({"--help"}).code == 0);
   CHECK(run({}).code == 2);

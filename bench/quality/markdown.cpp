@@ -95,19 +95,42 @@ std::string non_finite_warning(const json& budget) {
   return text;
 }
 
+/// Errors after all samples, by the way to combine them, with the reference's noise in them.
+std::string combinations_of(const json& single) {
+  std::string table;
+  for (const auto& [method, samples] : single.items())
+    for (const auto& [combination, series] : samples["combined"].items()) {
+      row cells{method, combination};
+      for (const measure& m : measures) cells.push_back(formatted("%.3g", series[m.name].back()));
+      table += line_of(cells);
+    }
+  if (table.empty()) return "";
+  row head{"method", "combination"};
+  for (const measure& m : measures) head.emplace_back(m.title);
+  return "All samples combined; errors contain the reference's noise.\n\n" + line_of(head) +
+         line_of(row(head.size(), "---")) + table + "\n";
+}
+
+std::string describe(const json& scene) {
+  const json& reference = scene["reference"];
+  std::string text =
+      std::to_string(scene["width"].get<int>()) + " x " + std::to_string(scene["height"].get<int>()) +
+      " pixels, depth " + std::to_string(scene["max_depth"].get<int>()) + ", next-event estimation " +
+      (scene["nee"].get<bool>() ? "on" : "off") +
+      ". Reference: " + std::to_string(reference["samples"].get<int>()) + " samples; its own noise: ";
+  for (const measure& m : measures)
+    text += (&m == measures.data() ? "" : ", ") + std::string(m.title) + " " +
+            formatted("%.2g", reference["noise"][m.name]);
+  if (!reference["flip_noise"].is_null()) text += ", HDR-FLIP " + formatted("%.2g", reference["flip_noise"]);
+  text += ".";
+  if (reference["noise"]["non_finite"].get<std::size_t>() > 0)
+    text += " The reference has pixels that are NaN or infinite: all errors are infinite.";
+  return text;
+}
+
 std::string section_of(const json& scene, const std::string& methods) {
   const std::string title = scene["scene"];
-  const json& reference = scene["reference"];
-  std::string text = "## " + title + "\n\n" + std::to_string(scene["width"].get<int>()) + " x " +
-                     std::to_string(scene["height"].get<int>()) + " pixels, depth " +
-                     std::to_string(scene["max_depth"].get<int>()) + ", next-event estimation " +
-                     (scene["nee"].get<bool>() ? "on" : "off") +
-                     ". Reference: " + std::to_string(reference["samples"].get<int>()) +
-                     " samples; its own noise:";
-  for (const measure& m : measures)
-    text += std::string(" ") + m.title + " " + formatted("%.2g", reference["noise"][m.name]) + ";";
-  text.back() = '.';
-  text += "\n\n";
+  std::string text = "## " + title + "\n\n" + describe(scene) + "\n\n";
   const json& files = scene["files"];
   text += picture(title + ", reference and crop", files["reference"]) + "\n";
   for (std::size_t b = 0; b < scene["summary"].size(); ++b) {
@@ -119,6 +142,7 @@ std::string section_of(const json& scene, const std::string& methods) {
     text += "Squared error after c / (1 + c), from the left: " + methods + ".\n\n" +
             picture("error maps", files["pictures"][b]["errors"]) + "\n";
   }
+  text += combinations_of(scene["single_samples"]);
   for (const char* const kind : {"plots", "single_samples"})
     for (const json& row : files[kind]) {
       for (const json& file : row) text += picture(file, file);

@@ -8,6 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <ostream>
 
 namespace quality {
@@ -22,6 +23,8 @@ void try_methods(const settings& given) {
     render::render_options options = options_of(given.scenes.front(), sampled);
     options.width = options.height = 4;
     options.spp = 2;
+    for (const budget& allowed : given.budgets)
+      if (allowed.spp > 0) options.spp = std::min(options.spp, allowed.spp);
     try {
       render::render(furnace, options, {});
     } catch (const std::exception& error) {

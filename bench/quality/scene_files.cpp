@@ -82,7 +82,7 @@ std::vector<render::image> scene_files::pictures_of(const std::vector<measured_r
   return pictures;
 }
 
-window scene_files::crop_of(const std::vector<measured_run>& runs) const {
+window scene_files::crop_window(const std::vector<measured_run>& runs) const {
   const int width = truth_.picture.width, height = truth_.picture.height;
   if (given_.crop) {
     const window& w = *given_.crop;
@@ -97,10 +97,9 @@ window scene_files::crop_of(const std::vector<measured_run>& runs) const {
 
 json scene_files::write(const std::vector<measured_run>& runs,
                         const std::vector<single_samples>& single) const {
-  const window crop = crop_of(runs);
+  const window crop = crop_window(runs);
   json files{{"reference", name("reference.png")},
              {"crop", {crop.left, crop.top, crop.width, crop.height}},
-             {"exposure", exposure_},
              {"pictures", json::array()}};
   render::write_png(path(name("reference.png")).string(),
                     enlarged_to(framed(truth_.picture, crop, exposure_), least_side), exposure_);
@@ -123,13 +122,16 @@ json scene_files::write_pictures(const std::vector<measured_run>& runs, std::siz
   for (const render::image& picture : pictures)
     map_row.push_back(enlarged_to(
         error_map(render::reinhard_errors(picture, truth_.picture), width, height, greatest), least_side));
+  const auto crop_of = [&crop](const render::image& picture) {
+    return render::cropped(picture, crop.left, crop.top, crop.width, crop.height);
+  };
+  const float exposure = given_.exposure > 0.0f ? given_.exposure : exposure_for(crop_of(truth_.picture));
   pictures.push_back(truth_.picture);
-  for (const render::image& picture : pictures)
-    crop_row.push_back(
-        enlarged_to(render::cropped(picture, crop.left, crop.top, crop.width, crop.height), least_side));
-  // Exposed before the white gaps are added.
-  for (render::image& picture : crop_row)
-    for (render::vec3& pixel : picture.pixels) pixel *= exposure_;
+  for (const render::image& picture : pictures) {
+    crop_row.push_back(enlarged_to(crop_of(picture), least_side));
+    // Exposed before the white gaps are added.
+    for (render::vec3& pixel : crop_row.back().pixels) pixel *= exposure;
+  }
   render::write_png(path(crops).string(), render::side_by_side(crop_row, gap));
   render::write_png(path(maps).string(), render::side_by_side(map_row, gap));
   return {{"crops", crops}, {"errors", maps}};

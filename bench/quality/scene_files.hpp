@@ -36,14 +36,14 @@ class scene_files {
   std::string write_plot(const std::string& what, const render::plot& drawn) const;
   json write_plots(const std::vector<measured_run>& runs) const;
   json write_single_samples(const std::vector<single_samples>& single) const;
-  window crop_of(const std::vector<measured_run>& runs) const;
+  window crop_window(const std::vector<measured_run>& runs) const;
   std::vector<render::image> pictures_of(const std::vector<measured_run>& runs, std::size_t budget) const;
 
   const settings& given_;
   const scene_choice& scene_;
   const quality::reference& truth_;
   reference_files reference_;
-  float exposure_;
+  float exposure_;  ///< of the whole reference
 };
 
 }  // namespace quality

@@ -31,7 +31,7 @@ const std::vector<std::string> builtin_scenes = {"cornell-enclosed --nee off", "
                                                  "glossy-room --nee off", "cornell-box"};
 
 const std::map<std::string, preset> presets = {
-    {"quick", {builtin_scenes, {"pt", "wfpg", "wfpg-product"}, {64}, 2, 1024, "96x96"}},
+    {"quick", {builtin_scenes, {"pt", "wfpg", "wfpg-product"}, {64}, 2, 1024, "112x112"}},
     {"standard",
      {builtin_scenes,
       {"pt", "wfpg", "wfpg-product", "wfpg-transient-oriented", "wfpg-transient-plain"},
@@ -103,7 +103,8 @@ void add_measured(CLI::App& app, given_arguments& given) {
   app.add_option("--seeds", given.seeds, "renderings of each, of other random numbers")
       ->check(CLI::Range(1, 1 << 20));
   app.add_option("--per-sample", given.per_sample,
-                 "measure each of the first N samples alone too, and each --combine of wfpg-render")
+                 "measure each of the first N samples alone too, and each --combine of wfpg-render; N "
+                 "pictures in memory")
       ->check(CLI::Range(2, 1 << 20));
 }
 

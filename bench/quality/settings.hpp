@@ -44,7 +44,7 @@ struct settings {
   int reference_spp = 0;    ///< of both halves together, at least 2
   int reference_chunk = 0;  ///< samples after which a reference is saved
   int per_sample = 0;       ///< samples whose variance is measured one by one, 0 or at least 2
-  float exposure = 0.0f;    ///< of pictures; 0: from the reference
+  float exposure = 0.0f;    ///< of pictures; 0: from what is shown of the reference
   std::optional<window> crop;
   std::filesystem::path output, cache;
   std::string command;
