@@ -184,6 +184,19 @@ TEST_CASE("options: what cannot be right is said", "[quality]") {
     CHECK(contains(out.str(), option));
 }
 
+TEST_CASE("options: scenes in files", "[quality]") {
+  temporary_folder folder;
+  const std::string spaced = folder.write("a room --nee off.glb", "");
+  const quality::settings given = parsed({"--scenes", "a/b/room.glb --nee off", "c/hall.gltf", spaced});
+  CHECK(given.scenes[0].source == "a/b/room.glb");
+  CHECK(given.scenes[0].title == "room.glb --nee off");
+  CHECK_FALSE(given.scenes[0].options.nee);
+  CHECK(given.scenes[1].title == "hall.gltf");
+  CHECK(given.scenes[2].source == spaced);
+  CHECK(given.scenes[2].title == "a room --nee off.glb");
+  CHECK(given.scenes[2].options.nee);
+}
+
 TEST_CASE("options: names of files", "[quality]") {
   CHECK(quality::file_name_of("ajar --nee off") == "ajar-nee-off");
   CHECK(quality::file_name_of("a/b: c*") == "a-b-c-");
@@ -463,6 +476,7 @@ TEST_CASE("a whole run, and one after it that renders nothing", "[quality]") {
   const std::string markdown = content_of(folder.file("out/results.md"));
   CHECK(contains(markdown, "| small | 2 |"));
   CHECK(contains(markdown, "| small | pt-linear |"));
+  CHECK(scene["files"]["plots"].size() == 3);
   for (const json& row : scene["files"]["plots"])
     for (const json& file : row)
       CHECK(std::filesystem::exists(folder.file("out/" + file.get<std::string>())));

@@ -146,7 +146,7 @@ std::string section_of(const json& scene, const std::string& methods) {
   for (const char* const kind : {"plots", "single_samples"})
     for (const json& row : files[kind]) {
       for (const json& file : row) text += picture(file, file);
-      text += "\n\n";
+      text += "\n";
     }
   return text;
 }

@@ -161,11 +161,8 @@ json scene_files::write_plots(const std::vector<measured_run>& runs) const {
       by_samples.curves.push_back(std::move(over_samples));
       by_seconds.curves.push_back(std::move(over_seconds));
     }
-    for (const auto& [drawn, what] :
-         {std::pair(&by_samples, "-samples.svg"), std::pair(&by_seconds, "-seconds.svg")}) {
-      files.push_back(name(m.name + std::string(what)));
-      render::write_svg(path(files.back()).string(), *drawn);
-    }
+    files.push_back(json::array({write_plot(m.name + std::string("-samples.svg"), by_samples),
+                                 write_plot(m.name + std::string("-seconds.svg"), by_seconds)}));
   }
   return files;
 }

@@ -23,22 +23,31 @@ bool is_drawn(const std::pair<double, double>& point) {
   return point.first > 0.0 && point.second > 0.0 && std::isfinite(point.first) && std::isfinite(point.second);
 }
 
-/// The decades around some values, and where a value lies between them.
+/// The range around some values, and where a value lies in it.
 struct log_axis {
-  double low = 0.0, high = 1.0;  // powers of ten
-  double begin, end;             // pixels
+  double low, high;   // powers of ten, at digits: 0.3 is twice 10^0
+  double begin, end;  // pixels
 
   double position(double value) const {
     return begin + (std::log10(value) - low) / (high - low) * (end - begin);
   }
+  bool contains(double value) const {
+    constexpr double rounding = 1e-9;
+    return std::log10(value) > low - rounding && std::log10(value) < high + rounding;
+  }
+  /// Too short for the names of powers alone to tell values.
+  bool is_short() const { return high - low < 2.0; }
 };
 
+/// Ends at 1, 2, ... 9 times a power of ten.
 log_axis make_axis(const std::vector<double>& values, double begin, double end) {
   log_axis axis{0.0, 1.0, begin, end};
   if (values.empty()) return axis;
   const auto [least, most] = std::minmax_element(values.begin(), values.end());
-  axis.low = std::floor(std::log10(*least));
-  axis.high = std::max(std::ceil(std::log10(*most)), axis.low + 1.0);
+  const auto power_of = [](double value) { return std::pow(10.0, std::floor(std::log10(value))); };
+  const double below = power_of(*least), above = power_of(*most);
+  axis.low = std::log10(below * std::max(1.0, std::floor(*least / below)));
+  axis.high = std::max(std::log10(above * std::ceil(*most / above)), axis.low + std::log10(2.0));
   return axis;
 }
 
@@ -64,22 +73,28 @@ std::string label(double x, double y, const std::string& text, const std::string
          "</text>\n";
 }
 
-/// Lines at 1, 2, ... 9 times each power of ten, and the powers' names.
+std::string grid_line(const log_axis& axis, bool vertical, double value, bool is_power, bool is_named) {
+  const double at = axis.position(value);
+  std::string result = is_power ? "<g stroke='#bbb'>" : "<g stroke='#eee'>";
+  result +=
+      (vertical ? line(at, top, at, height - bottom) : line(left, at, right_end, at)) + std::string("</g>");
+  if (!is_named) return result;
+  char name[32];
+  std::snprintf(name, sizeof name, "%g", value);
+  return result + (vertical ? label(at, height - bottom + 18.0, name, "text-anchor='middle'")
+                            : label(left - 8.0, at + 4.0, name, "text-anchor='end'"));
+}
+
+/// Lines at 1, 2, ... 9 times each power of ten, and the powers' names, on short axes those of 2 and 5 times
+/// too.
 std::string grid(const log_axis& axis, bool vertical) {
   std::string result;
-  for (double power = axis.low; power <= axis.high; power += 1.0) {
-    for (int digit = 1; digit < 10 && (digit == 1 || power < axis.high); ++digit) {
-      const double at = axis.position(digit * std::pow(10.0, power));
-      const char* colour = digit == 1 ? "<g stroke='#bbb'>" : "<g stroke='#eee'>";
-      result +=
-          colour + (vertical ? line(at, top, at, height - bottom) : line(left, at, right_end, at)) + "</g>";
+  for (double power = std::floor(axis.low); power <= axis.high; power += 1.0)
+    for (int digit = 1; digit < 10; ++digit) {
+      const double value = digit * std::pow(10.0, power);
+      const bool is_named = digit == 1 || (axis.is_short() && (digit == 2 || digit == 5));
+      if (axis.contains(value)) result += grid_line(axis, vertical, value, digit == 1, is_named);
     }
-    char name[32];
-    std::snprintf(name, sizeof name, "%g", std::pow(10.0, power));
-    const double at = axis.position(std::pow(10.0, power));
-    result += vertical ? label(at, height - bottom + 18.0, name, "text-anchor='middle'")
-                       : label(left - 8.0, at + 4.0, name, "text-anchor='end'");
-  }
   return result;
 }
 
