@@ -340,17 +340,20 @@ TEST_CASE("plots: names do not lie on one another, and long ones have room", "[r
 
 TEST_CASE("plots: short axes are named between powers of ten", "[renderer][plot]") {
   temporary_folder folder;
-  render::write_svg(folder.file("a.svg"), {"t", "x", "y", {{"a", {{1.0, 0.0023}, {1000.0, 0.0071}}}}});
+  render::write_svg(folder.file("a.svg"), {"t", "x", "y", {{"a", {{1.0, 0.0023}, {1000.0, 0.0171}}}}});
   const std::string svg = content_of(folder.file("a.svg"));
   CHECK(contains(svg, ">0.002<"));
   CHECK(contains(svg, ">0.005<"));
   CHECK_FALSE(contains(svg, ">0.001<"));
-  CHECK_FALSE(contains(svg, ">0.01<"));
+  CHECK(contains(svg, ">0.02<"));
+  CHECK_FALSE(contains(svg, ">0.003<"));
   CHECK(contains(svg, ">1000<"));
   CHECK_FALSE(contains(svg, ">500<"));
   // One value has an axis too.
   render::write_svg(folder.file("b.svg"), {"t", "x", "y", {{"a", {{1.0, 1.0}}}}});
   CHECK_FALSE(contains(content_of(folder.file("b.svg")), "nan"));
+  render::write_svg(folder.file("c.svg"), {"t", "x", "y", {{"a", {{3.0, 1.0}, {4.0, 100.0}}}}});
+  CHECK(contains(content_of(folder.file("c.svg")), ">4<"));
 }
 
 TEST_CASE("plots: every positive point is drawn inside the frame, names are escaped", "[renderer][plot]") {

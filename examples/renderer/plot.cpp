@@ -17,7 +17,8 @@ constexpr double left = 80.0, top = 40.0, bottom = 55.0;  // margins
 constexpr double right_end = left + frame_width;
 constexpr double least_room = 120.0, letter_width = 7.5;
 constexpr double line_height = 15.0;
-constexpr const char* colours[] = {"#777777", "#d95f02", "#1b6ca8", "#2a9d5c", "#8e44ad", "#b8860b"};
+constexpr const char* colours[] = {"#777777", "#d95f02", "#1b6ca8", "#2a9d5c",
+                                   "#8e44ad", "#b8860b", "#c0392b", "#17a2b8"};
 
 bool is_drawn(const std::pair<double, double>& point) {
   return point.first > 0.0 && point.second > 0.0 && std::isfinite(point.first) && std::isfinite(point.second);
@@ -35,8 +36,12 @@ struct log_axis {
     constexpr double rounding = 1e-9;
     return std::log10(value) > low - rounding && std::log10(value) < high + rounding;
   }
-  /// Too short for the names of powers alone to tell values.
-  bool is_short() const { return high - low < 2.0; }
+  /// Whether a grid line at so many times a power of ten has its value beside it: the fewer powers there are,
+  /// the more often.
+  bool is_named(int digit) const {
+    const double powers = high - low;
+    return digit == 1 || powers < 0.7 || (powers < 2.0 && (digit == 2 || digit == 5));
+  }
 };
 
 /// Ends at 1, 2, ... 9 times a power of ten.
@@ -92,8 +97,7 @@ std::string grid(const log_axis& axis, bool vertical) {
   for (double power = std::floor(axis.low); power <= axis.high; power += 1.0)
     for (int digit = 1; digit < 10; ++digit) {
       const double value = digit * std::pow(10.0, power);
-      const bool is_named = digit == 1 || (axis.is_short() && (digit == 2 || digit == 5));
-      if (axis.contains(value)) result += grid_line(axis, vertical, value, digit == 1, is_named);
+      if (axis.contains(value)) result += grid_line(axis, vertical, value, digit == 1, axis.is_named(digit));
     }
   return result;
 }
