@@ -111,7 +111,7 @@ TEST_CASE("options: presets hold where nothing is given", "[quality]") {
   const quality::settings quick = parsed({"--preset", "quick"});
   CHECK(quick.scenes.size() == 5);
   CHECK(quick.methods.size() == 3);
-  CHECK(quick.scenes[0].options.width == 112);
+  CHECK(quick.scenes[0].options.width == 104);
   CHECK_FALSE(quick.scenes[0].options.nee);
   CHECK(quick.scenes[1].options.nee);
   const quality::settings own =

@@ -41,17 +41,16 @@ std::vector<scene_plan> plan_scenes(const settings& given, std::ostream& log) {
 }
 
 json describe(const settings& given) {
-  const render::device where = given.scenes.front().options.where;
+  bool with_gpu = false;
   json methods = json::array();
-  for (const method& m : given.methods) methods.push_back({{"name", m.name}, {"arguments", m.arguments}});
-  return {{"command", given.command},
-          {"version", version()},
-          {"program", program_hash()},
-          {"machine", machine(where == render::device::cuda || where == render::device::optix)},
-          {"preset", given.preset},
-          {"seeds", given.seeds},
-          {"methods", methods},
-          {"baseline", given.methods[baseline_of(given.methods)].name},
+  for (const method& m : given.methods) {
+    methods.push_back({{"name", m.name}, {"arguments", m.arguments}});
+    with_gpu = with_gpu || is_on_gpu(options_of(given.scenes.front(), m).where);
+  }
+  return {{"command", given.command},  {"version", version()},
+          {"program", program_hash()}, {"machine", machine(with_gpu)},
+          {"preset", given.preset},    {"seeds", given.seeds},
+          {"methods", methods},        {"baseline", given.methods[baseline_of(given.methods)].name},
           {"scenes", json::array()}};
 }
 

@@ -28,11 +28,11 @@ render::image_error error_from_json(const json& object) {
   return error;
 }
 
+}  // namespace
+
 bool is_on_gpu(render::device where) {
   return where == render::device::cuda || where == render::device::optix;
 }
-
-}  // namespace
 
 json to_json(const run_record& record) {
   json points = json::array();

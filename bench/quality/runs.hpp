@@ -54,6 +54,8 @@ json key_of_scene(const scene_choice& scene, const std::string& identity);
 planned_run plan_run(const scene_choice& scene, const std::string& identity, const method& sampled,
                      const budget& allowed, int seed, const std::string& reference_hash);
 
+bool is_on_gpu(render::device where);
+
 /// Adds to a measured rendering's key what its times depend on, beside the options.
 void add_program_and_machine(json& key, render::device where);
 

@@ -31,7 +31,7 @@ const std::vector<std::string> builtin_scenes = {"cornell-enclosed --nee off", "
                                                  "glossy-room --nee off", "cornell-box"};
 
 const std::map<std::string, preset> presets = {
-    {"quick", {builtin_scenes, {"pt", "wfpg", "wfpg-product"}, {64}, 2, 1024, "112x112"}},
+    {"quick", {builtin_scenes, {"pt", "wfpg", "wfpg-product"}, {64}, 2, 1024, "104x104"}},
     {"standard",
      {builtin_scenes,
       {"pt", "wfpg", "wfpg-product", "wfpg-transient-oriented", "wfpg-transient-plain"},

@@ -35,6 +35,13 @@ std::string without_newline(std::string text) {
   return text;
 }
 
+/// Asked for once.
+std::string gpu_and_driver() {
+  static const std::string names = without_newline(
+      output_of("nvidia-smi --query-gpu=name,driver_version --format=csv,noheader 2>/dev/null").value_or(""));
+  return names;
+}
+
 }  // namespace
 
 std::string version() {
@@ -92,10 +99,7 @@ json machine(bool with_gpu) {
               {"threads", std::thread::hardware_concurrency()},
               {"system", system_name()},
               {"compiler", __VERSION__}};
-  if (with_gpu)
-    result["gpu_and_driver"] = without_newline(
-        output_of("nvidia-smi --query-gpu=name,driver_version --format=csv,noheader 2>/dev/null")
-            .value_or(""));
+  if (with_gpu) result["gpu_and_driver"] = gpu_and_driver();
   return result;
 }
 
