@@ -306,7 +306,7 @@ TEST_CASE("pictures: exposure, error maps, frames", "[quality]") {
   image grey = render::make_image(10, 10);
   CHECK(quality::exposure_for(grey) == 1.0f);
   for (vec3& pixel : grey.pixels) pixel = vec3(4.0f);
-  CHECK(quality::exposure_for(grey) == Approx(0.2f));
+  CHECK(quality::exposure_for(grey) == Approx(0.0625f));
   const image map = quality::error_map({0.0, 0.25, 1.0, infinite}, 4, 1, 1.0);
   check_close(map.pixels[0], vec3(0.0f));
   check_close(map.pixels[2], vec3(1.0f));

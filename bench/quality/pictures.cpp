@@ -13,8 +13,8 @@ namespace {
 
 using render::vec3;
 
-constexpr float bright = 0.8f;
-constexpr double bright_share = 0.95, shown_share = 0.99;
+constexpr float middle = 0.25f;  // about half of sRGB's range
+constexpr double shown_share = 0.99;
 constexpr int least_crop = 24;
 
 /// A value of 0 to 1, linear RGB.
@@ -56,9 +56,11 @@ std::vector<double> summed_area(const std::vector<double>& errors, int width, in
 
 float exposure_for(const render::image& reference) {
   std::vector<double> luminances;
-  for (const vec3& pixel : reference.pixels) luminances.push_back(wfpg::luminance(pixel));
-  const double high = percentile(std::move(luminances), bright_share);
-  return high > 0.0 && std::isfinite(high) ? bright / float(high) : 1.0f;
+  for (const vec3& pixel : reference.pixels) {
+    const double luminance = wfpg::luminance(pixel);
+    if (luminance > 0.0 && std::isfinite(luminance)) luminances.push_back(luminance);
+  }
+  return luminances.empty() ? 1.0f : middle / float(percentile(std::move(luminances), 0.5));
 }
 
 window worst_window(const std::vector<double>& errors, int width, int height) {

@@ -8,7 +8,7 @@
 
 namespace quality {
 
-/// What brings the reference's 95th percentile of luminance to 0.8; 1 of a black one.
+/// What brings the median of the reference's positive luminances to 0.25; 1 of a black one.
 float exposure_for(const render::image& reference);
 
 /// A quarter of the picture's width and height, at least 24 pixels where there are so many, where the sum of
