@@ -55,8 +55,14 @@ void refreshing_slots(benchmark::State& state) {
 
   const wfpg::kept_field_wave<stored_surfaces> wave{
       pixels, {given}, guide.cache.view(), {}, wfpg::guiding_mode::oriented, 0.7f, 1, {}};
-  const wfpg::detail::kept_fields_view kept{
-      slots.view(), fields.data(), words.data(), found.data(), slot_size, recast, 2};
+  const wfpg::buffer<std::uint8_t, exec_policy> settled(exec, slot_count);
+  const wfpg::detail::kept_fields_view kept{{slots.view(), nullptr, 0, settled.data()},
+                                            fields.data(),
+                                            words.data(),
+                                            found.data(),
+                                            slot_size,
+                                            recast,
+                                            2};
   using builder_type = wfpg::detail::kept_field_builder<wfpg::kept_field_wave<stored_surfaces>>;
   const builder_type builder{wave, kept};
   const auto renew = [&] { exec.for_each(slot_count, make_slots{slots.view(), fields.data(), given}); };

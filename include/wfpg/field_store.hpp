@@ -6,8 +6,8 @@
 // A sample:  begin_sample, then for each wave prepare, then end_sample. Nothing is read back to the host with
 // an inline caster.
 //
-// Cost of a wave of n rays: O(n · depth) look-ups; F² cones a new slot, F²/R a refreshed one; O(F²) either;
-// scans over the slots. Memory: the budget, 8 bytes a ray, 8 bytes a leaf and 4 an inner node.
+// Cost of a wave of n rays: O(n · depth) look-ups; F² cones a new slot, F²/R a refreshed one; O(F²) either.
+// Memory: the budget, 4 bytes a ray, 8 bytes a leaf and 4 an inner node.
 #pragma once
 
 #include <wfpg/detail/bin_marks.hpp>
@@ -53,9 +53,10 @@ struct kept_field_wave {
   exitance_cache_view cache;
   field_options options;
   guiding_mode mode = guiding_mode::oriented;
-  float fraction = 0.7f;   ///< of guided samples in the mixture
-  std::uint64_t seed = 0;  ///< of the sample and depth
-  product_points points;   ///< P divides the store's resolution
+  float fraction = 0.7f;                   ///< of guided samples in the mixture
+  std::uint64_t seed = 0;                  ///< of the sample and depth
+  product_points points;                   ///< P divides the store's resolution
+  depth_statistics* statistics = nullptr;  ///< on the device: the wave's counts are added; null: nowhere
 };
 
 /// Owns the slots, in the memory of `Exec`. The octree must outlive it. Results do not depend on the number
@@ -65,7 +66,7 @@ class field_store {
  public:
   field_store() = default;
   /// Serves waves of up to `max_rays` rays. Throws out_of_memory; std::invalid_argument where an option is
-  /// out of its range, or the octree has 2²⁹ nodes or more.
+  /// out of its range, or the octree has 2²⁸ nodes or more.
   field_store(const Exec& exec, const sparse_voxel_octree_view& tree, const binning_options& binning,
               const kept_field_options& options, std::size_t max_rays);
 
@@ -79,7 +80,8 @@ class field_store {
   }
 
   /// Finds or makes the fields of a wave's rays, and refreshes those that are due; what kernels sample from,
-  /// until the next call. A ray without room for its field has its nearest ancestor's, or none. A batch
+  /// until the next call. A ray without room for its field has its nearest ancestor's, or none. After 32
+  /// samples little is left to make: then one wave in 4 does, the others use what there is. A batch
   /// caster gets at most `caster_buffer_bytes` of cones at once, and the host reads how many fields are
   /// built. Throws std::invalid_argument beyond max_rays, or where P does not divide; what a caster throws,
   /// and then the wave's fields are built again.
@@ -91,15 +93,18 @@ class field_store {
   void end_sample(const Exec& exec);
 
   /// Geometry moved inside `bounds`, or light in a way that hits do not tell: fields from which they may be
-  /// seen are cast anew when they are next used. Light that changes on surfaces needs no call.
+  /// seen are cast anew when they are next used, or within 4 samples after 32 more. Light that changes on
+  /// surfaces needs no call.
   void invalidate(const Exec& exec, const bounds3& bounds) {
-    exec.for_each(capacity_, detail::invalidate_fields{slots_.view(), fields_.data(), tree_, bounds});
+    expect_builds(32);
+    exec.for_each(capacity_, detail::invalidate_fields{view(), fields_.data(), tree_, bounds});
   }
   void invalidate_all(const Exec& exec) { invalidate(exec, {vec3(-1.0e18f), vec3(1.0e18f)}); }
 
-  /// Counts of the last wave and of all, on the device.
+  /// On the device.
   const detail::field_store_state* state() const { return state_.data(); }
-  std::uint32_t resolution() const { return options_.resolution; }
+  /// Of the last wave, on the device.
+  const detail::field_wave_counts* last_wave() const { return counts_.data() + (waves_ + 1) % 2; }
   /// Cones of a refresh.
   std::uint32_t refresh_cones() const { return detail::refresh_cones(options_.resolution, options_.recast); }
   /// Waits for the work before it.
@@ -109,7 +114,7 @@ class field_store {
   /// Of what decides the level: running counts and bins.
   std::size_t level_bytes() const { return marks_.bytes(); }
   /// Of a wave in flight.
-  std::size_t wave_bytes() const { return field_of_ray_.bytes() + missing_keys_.bytes() + state_.bytes(); }
+  std::size_t wave_bytes() const { return field_of_ray_.bytes() + counts_.bytes() + state_.bytes(); }
 
   /// Bytes of the budget that one slot takes at a resolution.
   static std::size_t bytes_a_slot(std::uint32_t resolution) {
@@ -125,9 +130,18 @@ class field_store {
 
   static const kept_field_options& checked(const kept_field_options& options, std::uint32_t nodes);
   detail::field_slots_view view() const { return {slots_.view(), table_.data(), mask(), settled_.data()}; }
-  detail::wanted_keys wanted() const { return {wanted_.data(), mask()}; }
+  detail::wanted_keys wanted() const {
+    return {wanted_.data(), static_cast<std::uint32_t>(wanted_.size() - 1)};
+  }
+  // Once there is little to build, waves take turns: one field keeps a GPU as long as a hundred.
+  static constexpr std::uint32_t turns = 4;
+  bool builds_in_wave() const { return sample_ <= busy_until_ || (sample_ + waves_) % turns == 0; }
+  void expect_builds(std::uint32_t samples) { busy_until_ = detail::max(busy_until_, sample_ + samples); }
+  bool limits_builds() const { return options_.max_wave_cones != detail::build_limits::none; }
+  std::uint32_t cells_a_field() const { return options_.resolution * options_.resolution; }
+  detail::field_wave_counts* counts() { return counts_.data() + waves_ % 2; }
   // Counts settle soon, and sooner where a leaf has many rays of a wave.
-  bool counts_rays() const { return sample_ <= 8 || sample_ % 4 == 0; }
+  bool counts_rays() const { return sample_ <= 8 || sample_ % (sample_ <= 32 ? 4 : 16) == 0; }
   detail::counted_rays counted() const {
     if (!counts_rays()) return {0, 0};
     return {stride_, sample_ % stride_};
@@ -136,8 +150,8 @@ class field_store {
 
   template <class Surfaces>
   void find(const Exec& exec, const kept_field_wave<Surfaces>& wave);
-  detail::count_births bear(const Exec& exec);
-  void list(const Exec& exec, std::uint64_t seed);
+  void bear(const Exec& exec);
+  void list(const Exec& exec, std::uint64_t seed, const detail::build_list& builds);
   template <class Builder, class Caster>
   void build(const Exec& exec, const Builder& builder, const Caster& caster, std::size_t buffer_bytes);
   template <class Builder, class Caster>
@@ -150,7 +164,10 @@ class field_store {
   std::size_t capacity_ = 0;  // slots
   std::uint32_t sample_ = 0;
   std::uint32_t counted_samples_ = 0;
-  std::uint32_t stride_ = 1;  // of the rays that are counted
+  std::uint32_t stride_ = 1;       // of the rays that are counted
+  std::uint32_t waves_ = 0;        // of the sample
+  std::uint32_t busy_until_ = 32;  // sample
+  bool in_wave_ = false;           // also after one whose caster threw
   detail::bin_marks<Exec> marks_;
   buffer<detail::field_slot, Exec> slots_;
   buffer<resident_field, Exec> fields_;  // a slot
@@ -161,8 +178,9 @@ class field_store {
   buffer<std::uint32_t, Exec> wanted_, wanted_through_;
   buffer<std::uint32_t, Exec> free_slots_, list_;  // list: to cast whole, then to refresh
   buffer<std::uint64_t, Exec> through_;            // a slot: scans
-  buffer<std::uint32_t, Exec> field_of_ray_, missing_keys_;
+  buffer<std::uint32_t, Exec> field_of_ray_;
   buffer<detail::field_store_state, Exec> state_;
+  buffer<detail::field_wave_counts, Exec> counts_;  // of this wave, and of the one before or after
 };
 
 }  // namespace wfpg

@@ -12,15 +12,6 @@
 
 namespace wfpg {
 
-/// Sums over the guided samples so far, of one depth.
-struct depth_statistics {
-  std::uint64_t bins = 0;  ///< whose fields were made; of kept fields, made or refreshed
-  std::uint64_t rays = 0;  ///< in bins
-  std::uint64_t unbinned =
-      0;  ///< active rays outside every voxel or without room for a field: their BSDF alone
-  std::uint64_t cones = 0;
-};
-
 /// Time of one stage, in all.
 struct stage_time {
   const char* name;

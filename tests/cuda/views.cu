@@ -109,18 +109,15 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
 
   // Kept fields.
   const d::field_slots_view slots;
-  const d::use_slot use{slots, nullptr, 1, 0};
   d::field_store_state* const state = nullptr;
-  launch(d::find_fields<d::wave_rays<surfaces>>{{}, tree, {}, use, {}, nullptr, state, 32, {}});
+  d::field_wave_counts* const counts = nullptr;
   launch(d::count_rays<d::wave_rays<surfaces>>{{}, tree, {}, {}});
-  launch(d::bear_fields{slots, {}, nullptr, nullptr, state, 1});
-  launch(d::begin_store_wave{});
-  launch(d::find_missing_fields{tree, use, nullptr, state, {{slots, {}, nullptr, nullptr, state, 1}, state}});
-  launch(d::list_all_builds{{}, nullptr, state});
-  launch(d::list_builds{{}, nullptr, {}, nullptr, state, 0});
-  launch(d::evict_fields{{}, nullptr, state, 1, 16});
+  launch(d::begin_store_sample{state, counts});
+  launch(d::forget_wave{{}, counts});
+  launch(d::list_builds{{}, nullptr, {}, {}, 0});
+  launch(d::evict_fields{slots, nullptr, state, 1, 16});
   launch(d::index_slots{slots, nullptr, nullptr, state});
-  launch(d::invalidate_fields{{}, nullptr, tree, {}});
+  launch(d::invalidate_fields{slots, nullptr, tree, {}});
   launch(d::mark_leaves{tree, {}, 3, {}});
   launch(d::sum_counts{tree, {}});
   launch(d::fill_top{});

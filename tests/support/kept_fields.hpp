@@ -129,6 +129,7 @@ struct kept_box {
 
   wfpg::kept_field_statistics counts() const { return store.statistics(exec()); }
   wfpg::detail::field_store_state state() const { return wfpg::read_element(exec(), store.state()); }
+  wfpg::detail::field_wave_counts last_wave() const { return wfpg::read_element(exec(), store.last_wave()); }
   /// A ray's field; its cells lie in the policy's memory.
   wfpg::directional_field field_of(const wfpg::guide_view& view, std::uint32_t ray) const {
     return evaluate(exec(), [=] WFPG_HD() { return view.mixture(ray).field; });

@@ -35,10 +35,22 @@ WFPG_HD T atomic_load(const T* target) {
 #endif
 }
 
-/// *target = value.
-WFPG_HD inline void atomic_store(std::uint32_t* target, std::uint32_t value) {
+/// *target as it is, or on a device as a multiprocessor's cache remembers it: it may never see what others
+/// write in the same kernel.
+template <class T>
+WFPG_HD T atomic_load_cached(const T* target) {
 #if defined(__CUDA_ARCH__)
-  *static_cast<volatile std::uint32_t*>(target) = value;
+  return *target;
+#else
+  return atomic_load(target);
+#endif
+}
+
+/// *target = value.
+template <class T>
+WFPG_HD void atomic_store(T* target, T value) {
+#if defined(__CUDA_ARCH__)
+  *static_cast<volatile T*>(target) = value;
 #else
   __atomic_store_n(target, value, __ATOMIC_RELAXED);
 #endif
@@ -56,17 +68,18 @@ WFPG_HD inline std::uint64_t atomic_compare_exchange(std::uint64_t* target, std:
 #endif
 }
 
-/// *target = the lesser of itself and value, 32 or 64 bits.
+/// *target = the lesser of itself and value, 32 or 64 bits; returns the value before.
 template <class T>
-WFPG_HD void atomic_min(T* target, T value) {
+WFPG_HD T atomic_min(T* target, T value) {
 #if defined(__CUDA_ARCH__)
   using word = std::conditional_t<sizeof(T) == 8, unsigned long long, unsigned int>;
-  atomicMin(reinterpret_cast<word*>(target), static_cast<word>(value));
+  return static_cast<T>(atomicMin(reinterpret_cast<word*>(target), static_cast<word>(value)));
 #else
   T before = atomic_load(target);
   while (value < before &&
          !__atomic_compare_exchange_n(target, &before, value, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
   }
+  return before;
 #endif
 }
 

@@ -1,6 +1,6 @@
 // The administration of kept fields: which slot holds which field, who uses it, what is to be built. Slots
-// are found through a hash table of (node, orientation) keys; births, builds and evictions are listed by
-// scans in the order of the slots or of the keys' hashes, so that no result depends on the timing of threads.
+// are found through a hash table of (node, orientation) keys. What is scarce, slots and cones, is given out
+// in the order of the slots or of the keys' hashes, so that no result depends on the timing of threads.
 #pragma once
 
 #include <wfpg/detail/atomic.hpp>
@@ -9,6 +9,7 @@
 #include <wfpg/guide_view.hpp>
 #include <wfpg/spatial_binner.hpp>
 #include <wfpg/types.hpp>
+#include <wfpg/wave.hpp>
 
 namespace wfpg::detail {
 
@@ -41,9 +42,9 @@ struct field_slots_view {
   // Keys above their slots, by the keys' hashes, linear probing, at most half full.
   std::uint64_t* table = nullptr;
   std::uint32_t table_mask = 0;
-  // A slot: 1 where the waves before have left nothing to note of it in this sample. Most rays need to read
-  // no more of their slot than this, and what all of them read is few cache lines.
-  const std::uint8_t* settled = nullptr;
+  // A slot: 1 once nothing is left to note of it in this sample. Most rays need to read no more of their slot
+  // than this, and what all of them read is few cache lines.
+  std::uint8_t* settled = nullptr;
 
   WFPG_HD static std::uint32_t hash_key(std::uint32_t key) {
     return static_cast<std::uint32_t>(key * 0x9e3779b97f4a7c15ull >> 32);
@@ -63,6 +64,17 @@ struct field_slots_view {
   }
 };
 
+/// What became of one wave.
+struct field_wave_counts {
+  std::uint32_t missing = 0;   ///< 1 where some ray found no slot at first
+  std::uint32_t unbinned = 0;  ///< rays outside every voxel
+  std::uint32_t unserved = 0;  ///< rays that got no field
+  std::uint32_t served = 0;    ///< rays that got one
+  std::uint32_t all = 0;       ///< builds that cast all cells
+  std::uint32_t part = 0;      ///< builds that cast a part of them
+  std::uint32_t builds = 0;    ///< both
+};
+
 /// What the host never has to read in a sample.
 struct field_store_state {
   std::uint32_t pressure = 2;        ///< see mark_threshold; doubled when births were refused
@@ -72,16 +84,39 @@ struct field_store_state {
   std::uint32_t refused_births_before = 0;  ///< in the sample before
   std::uint32_t delayed_births = 0;         ///< in this sample, for the limit on cones
   std::uint32_t refused_since_mark = 0;
-  // Of the last wave:
-  std::uint32_t missing = 0;   ///< the wave's size where some ray found no slot at first, else 0
-  std::uint32_t unbinned = 0;  ///< rays outside every voxel
-  std::uint32_t unserved = 0;  ///< rays that got no field
-  std::uint32_t served = 0;    ///< rays whose field was there
-  std::uint32_t all = 0;       ///< builds that cast all cells
-  std::uint32_t part = 0;      ///< builds that cast a part of them
-  std::uint32_t builds = 0;    ///< both
   // Since the beginning:
   std::uint64_t born = 0, refreshed = 0;
+};
+
+/// The slots to build in a wave: those to cast whole, from the number of slots on those to refresh.
+struct build_list {
+  std::uint32_t* list = nullptr;
+  field_wave_counts* counts = nullptr;
+  field_store_state* state = nullptr;
+  depth_statistics* statistics = nullptr;  // null: none are wanted
+  std::uint32_t cells = 0;                 // cones of a whole build
+  std::uint32_t part = 0;                  // of a refresh
+
+  /// In any order: fields do not depend on each other.
+  WFPG_HD void add(std::uint32_t slot, bool whole, std::size_t slots) const {
+    const std::uint32_t rank = atomic_add(whole ? &counts->all : &counts->part, 1);
+    list[(whole ? 0 : slots) + rank] = slot;
+    count(whole ? 1 : 0, whole ? 0 : 1);
+  }
+  WFPG_HD void count(std::uint32_t wholes, std::uint32_t parts) const {
+    atomic_add(&counts->builds, wholes + parts);
+    atomic_add(&state->refreshed, std::uint64_t(parts));
+    if (!statistics) return;
+    atomic_add(&statistics->bins, std::uint64_t(wholes) + parts);
+    atomic_add(&statistics->cones, std::uint64_t(wholes) * cells + std::uint64_t(parts) * part);
+  }
+};
+
+/// How a wave's rays ask for builds.
+enum class wanted_builds : std::uint32_t {
+  none,    ///< not in this wave
+  marked,  ///< list_builds() chooses among the slots
+  listed,  ///< all are built
 };
 
 /// A ray of the wave gets a slot.
@@ -90,17 +125,39 @@ struct use_slot {
   std::uint32_t* field_of_ray;
   std::uint32_t sample;
   std::uint64_t seed;
+  wanted_builds wanted;
+  build_list builds;
 
   WFPG_HD void operator()(std::uint32_t slot, std::size_t ray) const {
     field_of_ray[ray] = slot;
-    if (slots.settled[slot] != 0) return;
+    if (atomic_load_cached(slots.settled + slot) != 0) return;
     field_slot& s = slots.slots[slot];
-    if (atomic_load(&s.last_used) != sample) atomic_store(&s.last_used, sample);
-    if (!s.is_due(sample)) return;
-    // The least random number picks the origin, whichever ray comes first.
-    const std::uint64_t candidate = (hash(seed, ray) & ~0xffffffffull) | ray;
-    if (candidate < atomic_load(&s.origin)) atomic_min(&s.origin, candidate);
+    const bool is_due = s.is_due(sample);
+    if (atomic_load(&s.last_used) != sample) {
+      atomic_store(&s.last_used, sample);
+      if (!is_due) atomic_store(slots.settled + slot, std::uint8_t(1));
+    }
+    if (is_due && wanted != wanted_builds::none) want_build(s, slot, ray);
   }
+
+ private:
+  // The least random number picks the origin, whichever ray comes first.
+  WFPG_HD void want_build(field_slot& s, std::uint32_t slot, std::size_t ray) const {
+    const std::uint64_t candidate = (hash(seed, ray) & ~0xffffffffull) | ray;
+    if (candidate >= atomic_load(&s.origin)) return;
+    const bool is_first = atomic_min(&s.origin, candidate) == field_slot::unpicked;
+    if (is_first && wanted == wanted_builds::listed) builds.add(slot, s.builds == 0, slots.slots.size());
+  }
+};
+
+/// Rays whose own field is missing are marked with its key, where others have their slot.
+struct missing_key {
+  static constexpr std::uint32_t mark = 0x80000000u;
+  static constexpr std::uint32_t most_nodes = mark / orientations;
+
+  WFPG_HD static std::uint32_t marked(std::uint32_t key) { return key | mark; }
+  WFPG_HD static bool is_marked(std::uint32_t field) { return field >= mark && field != no_slot; }
+  WFPG_HD static std::uint32_t key(std::uint32_t field) { return field & ~mark; }
 };
 
 /// Keys that want a slot, one a bucket: the least key has it, the others ask again in the next wave.
@@ -114,39 +171,115 @@ struct wanted_keys {
   }
 };
 
+/// Rays of a wave in runs, one a block.
+struct ray_runs {
+  static constexpr std::size_t length = 2048;
+
+  std::size_t rays;
+  field_wave_counts* counts;
+  depth_statistics* statistics;  // null: none are wanted
+
+  std::size_t size() const { return max<std::size_t>((rays + length - 1) / length, 1); }
+
+  /// What `find` gives for the rays of run i is added to the counts: served(), unserved(), or 0.
+  template <class Block, class Find>
+  WFPG_HD void count(Block& block, std::size_t i, const Find& find) const {
+    const std::size_t first = i * length;
+    const auto n = static_cast<int>(min(length, rays - first));
+    const std::uint32_t sum =
+        block.sum(n, [&](int ray) { return find(first + static_cast<std::size_t>(ray)); });
+    block.for_each(1, [&](int) { add(sum & 0xffffu, sum >> 16); });
+  }
+  WFPG_HD static std::uint32_t served() { return 1u; }
+  WFPG_HD static std::uint32_t unserved() { return 1u << 16; }
+
+  WFPG_HD void unbinned() const {
+    atomic_add(&counts->unbinned, 1);
+    if (statistics) atomic_add(&statistics->unbinned, std::uint64_t(1));
+  }
+
+ private:
+  WFPG_HD void add(std::uint32_t served, std::uint32_t unserved) const {
+    if (served > 0) atomic_add(&counts->served, served);
+    if (unserved > 0) atomic_add(&counts->unserved, unserved);
+    if (!statistics) return;
+    if (served > 0) atomic_add(&statistics->rays, std::uint64_t(served));
+    if (unserved > 0) atomic_add(&statistics->unbinned, std::uint64_t(unserved));
+  }
+};
+
+/// The slot of a ray whose own field is missing: its nearest ancestor's with one, or none.
+struct use_ancestor {
+  sparse_voxel_octree_view tree;
+  use_slot use;
+
+  WFPG_HD std::uint32_t operator()(std::uint32_t key, std::size_t ray) const {
+    std::uint32_t slot = no_slot;
+    for (node_id node = key / orientations; slot == no_slot && node != invalid_node; node = tree.parent(node))
+      slot = use.slots.find(node * orientations + key % orientations);
+    if (slot != no_slot) {
+      use(slot, ray);
+      return ray_runs::served();
+    }
+    use.field_of_ray[ray] = no_slot;
+    return ray_runs::unserved();
+  }
+};
+
 /// Finds rays' slots, and counts the rays where `counted`. `Rays`: (std::size_t) -> ray_to_bin.
 template <class Rays>
 struct find_fields {
   Rays rays;
-  sparse_voxel_octree_view tree;
+  ray_runs runs;
   bin_marks_view marks;
-  use_slot use;
+  use_ancestor ancestor;
   wanted_keys wanted;
-  std::uint32_t* missing_keys;
-  field_store_state* state;
-  std::uint32_t wave_size;
   counted_rays counted;
+  field_wave_counts* next;  // of the wave after this one
 
-  WFPG_HD void operator()(std::size_t i) const {
-    use.field_of_ray[i] = no_slot;
-    missing_keys[i] = no_key;
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t i) const {
+    if (i == 0) block.for_each(1, [&](int) { *next = {}; });
+    runs.count(block, i, [&](std::size_t ray) { return find(ray); });
+  }
+
+ private:
+  WFPG_HD std::uint32_t find(std::size_t i) const {
+    const use_slot& use = ancestor.use;
     const ray_to_bin ray = rays(i);
-    if (!ray.active) return;
-    const node_id leaf = leaf_of(tree, ray);
+    const node_id leaf = ray.active ? leaf_of(ancestor.tree, ray) : invalid_node;
     if (leaf == invalid_node) {
-      atomic_add(&state->unbinned, 1);
-      return;
+      use.field_of_ray[i] = no_slot;
+      if (ray.active) runs.unbinned();
+      return 0;
     }
     if (counted.includes(i)) marks.count(leaf, counted.stride);
     const std::uint32_t key = marks.bin(leaf) * orientations + ray.orientation;
     const std::uint32_t slot = use.slots.find(key);
     if (slot != no_slot) {
       use(slot, i);
-      return;
+      return ray_runs::served();
     }
-    missing_keys[i] = key;
+    if (use.wanted == wanted_builds::none) return ancestor(key, i);
+    use.field_of_ray[i] = missing_key::marked(key);
     wanted.ask(key);
-    atomic_store(&state->missing, wave_size);
+    atomic_store(&runs.counts->missing, 1u);
+    return 0;
+  }
+};
+
+/// The rays that find_fields left marked: their fields have been born, or an ancestor's serve, or none do.
+struct find_missing_fields {
+  ray_runs runs;
+  use_ancestor own_or_ancestor;
+
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t i) const {
+    if (runs.counts->missing == 0) return;
+    runs.count(block, i, [&](std::size_t ray) {
+      const std::uint32_t field = own_or_ancestor.use.field_of_ray[ray];
+      return missing_key::is_marked(field) ? own_or_ancestor(missing_key::key(field), ray) : 0u;
+    });
   }
 };
 
@@ -166,72 +299,62 @@ struct count_rays {
   }
 };
 
-struct is_wanted {
-  WFPG_HD std::uint32_t operator()(std::uint32_t key) const { return key != no_key ? 1u : 0u; }
-};
-
-/// Wanted keys that get one of the free slots, in the order of their buckets.
+/// Gives the free slots to wanted keys, in the order of their buckets; one block, in which each of `parts`
+/// parts of the buckets is a warp's. There is nothing to do in most waves.
 struct bear_fields {
+  static constexpr int parts = 16;
+
   field_slots_view slots;
   wanted_keys wanted;
-  const std::uint32_t* wanted_through;  // a bucket: wanted keys up to and with it
+  std::uint32_t* wanted_through;  // a bucket: wanted keys of its part up to and with it
   const std::uint32_t* free_slots;
-  const field_store_state* state;
+  const field_wave_counts* counts;
+  field_store_state* state;
   std::uint64_t most;
 
-  WFPG_HD std::uint32_t allowed() const {
-    return static_cast<std::uint32_t>(min<std::uint64_t>(state->free - state->taken, most));
+  static constexpr std::size_t scratch_bytes() { return sizeof(std::uint32_t) * parts; }
+
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t) const {
+    if (counts->missing == 0) return;
+    const int buckets = static_cast<int>(wanted.mask) + 1, size = max(buckets / parts, 1), n = buckets / size;
+    block.for_each_warp(n, [&](const auto& warp, int part) {
+      warp.inclusive_scan(size, wanted_through + part * size,
+                          [&](int i) { return wanted.buckets[part * size + i] != no_key ? 1u : 0u; });
+    });
+    block.sync();
+    std::uint32_t* const through = block.template scratch<std::uint32_t>(parts);
+    block.for_each_warp(1, [&](const auto& warp, int) {
+      warp.inclusive_scan(n, through, [&](int part) { return wanted_through[(part + 1) * size - 1]; });
+    });
+    block.sync();
+    const std::uint32_t taken = state->taken, room = state->free - taken;
+    const auto allowed = static_cast<std::uint32_t>(min<std::uint64_t>(room, most));
+    block.for_each(buckets, [&](int i) {
+      const std::uint32_t key = wanted.buckets[i];
+      if (key == no_key) return;
+      wanted.buckets[i] = no_key;
+      const int part = i / size;
+      const std::uint32_t rank = wanted_through[i] - 1 + (part > 0 ? through[part - 1] : 0);
+      if (rank < allowed) bear(key, free_slots[taken + rank]);
+    });
+    block.sync();
+    block.for_each(1, [&](int) { count(through[n - 1], room, min(through[n - 1], allowed)); });
   }
-  WFPG_HD void operator()(std::size_t i) const {
-    const std::uint32_t key = wanted.buckets[i];
-    if (key == no_key) return;
-    wanted.buckets[i] = no_key;
-    const std::uint32_t rank = wanted_through[i] - 1;
-    if (rank >= allowed()) return;
-    const std::uint32_t slot = free_slots[state->taken + rank];
+
+ private:
+  WFPG_HD void bear(std::uint32_t key, std::uint32_t slot) const {
     slots.slots[slot] = {};
     slots.slots[slot].key = key;
     slots.insert(slot);
   }
-};
-
-struct count_births {
-  bear_fields births;
-  field_store_state* state;
-  WFPG_HD void operator()() const {
-    const std::uint32_t wanted = births.wanted_through[births.wanted.mask];
-    const std::uint32_t room = state->free - state->taken;
-    const std::uint32_t refused = wanted > room ? wanted - room : 0;
-    const std::uint32_t born = min(wanted, births.allowed());
+  WFPG_HD void count(std::uint32_t asked, std::uint32_t room, std::uint32_t born) const {
+    const std::uint32_t refused = asked > room ? asked - room : 0;
     state->taken += born;
     state->born += born;
     state->refused_births += refused;
-    state->delayed_births += wanted - refused - born;
+    state->delayed_births += asked - refused - born;
     state->refused_since_mark += refused;
-  }
-};
-
-/// Rays whose own field was missing: it has been born, or an ancestor's serves, or none does. Counts the
-/// births: there were none where no field was missing.
-struct find_missing_fields {
-  sparse_voxel_octree_view tree;
-  use_slot use;
-  const std::uint32_t* missing_keys;
-  field_store_state* state;
-  count_births births;
-
-  WFPG_HD void operator()(std::size_t i) const {
-    if (i == 0) births();
-    if (missing_keys[i] == no_key) return;
-    const std::uint32_t orientation = missing_keys[i] % orientations;
-    std::uint32_t slot = no_slot;
-    for (node_id node = missing_keys[i] / orientations; slot == no_slot && node != invalid_node;
-         node = tree.parent(node))
-      slot = use.slots.find(node * orientations + orientation);
-    if (slot == no_slot)
-      atomic_add(&state->unserved, 1);
-    else
-      use(slot, i);
   }
 };
 
@@ -260,30 +383,12 @@ struct is_to_build {
   }
 };
 
-/// The slots to build in this wave, where nothing limits them: those to cast whole, from the number of slots
-/// on those to refresh. In any order: fields do not depend on each other.
-struct list_all_builds {
-  array_view<field_slot> slots;
-  std::uint32_t* list;
-  field_store_state* state;
-
-  WFPG_HD void operator()(std::size_t i) const {
-    if (slots[i].origin == field_slot::unpicked) return;
-    const bool whole = slots[i].builds == 0;
-    const std::uint32_t rank = atomic_add(whole ? &state->all : &state->part, 1);
-    list[(whole ? 0 : slots.size()) + rank] = static_cast<std::uint32_t>(i);
-    atomic_add(&state->builds, 1);
-    if (!whole) atomic_add(&state->refreshed, 1);
-  }
-};
-
-/// The same under a limit. Where it passes over some, others are the first in the next wave.
+/// The slots to build under a limit. Where it passes over some, others are the first in the next wave.
 struct list_builds {
   array_view<field_slot> slots;
   const std::uint64_t* through;  // a slot: slots to build up to and with it
   build_limits limits;
-  std::uint32_t* list;
-  field_store_state* state;
+  build_list builds;
   std::uint64_t seed;
 
   WFPG_HD void operator()(std::size_t i) const {
@@ -293,17 +398,16 @@ struct list_builds {
     const auto wholes = static_cast<std::uint32_t>(total >> 32), parts = static_cast<std::uint32_t>(total);
     const std::uint32_t most_wholes = limits.all(wholes), most_parts = limits.parts(parts, most_wholes);
     if (i == 0) {
-      state->all = most_wholes;
-      state->part = most_parts;
-      state->builds = most_wholes + most_parts;
-      state->refreshed += most_parts;
+      builds.counts->all = most_wholes;
+      builds.counts->part = most_parts;
+      builds.count(most_wholes, most_parts);
     }
     if (s.origin == field_slot::unpicked) return;
     const bool whole = s.builds == 0;
     const std::uint32_t rank = whole ? rotated(static_cast<std::uint32_t>(through[i] >> 32) - 1, wholes)
                                      : rotated(static_cast<std::uint32_t>(through[i]) - 1, parts);
     if (rank < (whole ? most_wholes : most_parts))
-      list[whole ? rank : slots.size() + rank] = static_cast<std::uint32_t>(i);
+      builds.list[whole ? rank : slots.size() + rank] = static_cast<std::uint32_t>(i);
     else
       s.origin = field_slot::unpicked;  // waits
   }
@@ -315,16 +419,17 @@ struct list_builds {
   }
 };
 
-/// Frees slots that no ray has used for some samples; where births were refused, for one.
+/// Frees slots that no ray has used for some samples; where births were refused, for one. No slot is settled.
 struct evict_fields {
-  array_view<field_slot> slots;
+  field_slots_view slots;
   resident_field* fields;
   const field_store_state* state;
   std::uint32_t sample;
   std::uint32_t idle_samples;
 
   WFPG_HD void operator()(std::size_t i) const {
-    field_slot& s = slots[i];
+    field_slot& s = slots.slots[i];
+    slots.settled[i] = 0;
     const std::uint32_t most = state->refused_births_before > 0 ? 1 : idle_samples;
     if (s.key == no_key || sample - s.last_used <= most) return;
     s = {};

@@ -9,27 +9,22 @@ namespace detail {
 /// The state as a sample begins.
 struct begin_store_sample {
   field_store_state* state;
+  field_wave_counts* counts;
   WFPG_HD void operator()(std::size_t) const {
     state->refused_births_before = state->refused_births;
     state->refused_births = state->delayed_births = 0;
     state->taken = 0;
+    counts[0] = {};
   }
 };
 
-/// The state as a wave begins; origins that a wave before left behind, where its caster threw, are void.
-struct begin_store_wave {
+/// Forgets a wave that ended before its fields were built.
+struct forget_wave {
   array_view<field_slot> slots;
-  array_view<std::uint8_t> settled;
-  field_store_state* state;
-  std::uint32_t sample;
+  field_wave_counts* counts;
   WFPG_HD void operator()(std::size_t i) const {
-    if (i < slots.size()) {
-      slots[i].origin = field_slot::unpicked;
-      settled[i] = slots[i].last_used == sample && !slots[i].is_due(sample);
-    }
-    if (i > 0) return;
-    state->missing = state->unbinned = state->unserved = state->served = state->all = state->part =
-        state->builds = 0;
+    if (i == 0) *counts = {};
+    if (i < slots.size()) slots[i].origin = field_slot::unpicked;
   }
 };
 
@@ -39,25 +34,6 @@ struct adapt_pressure {
   WFPG_HD void operator()(std::size_t) const {
     if (state->refused_since_mark > 0) state->pressure = min(2 * state->pressure, 1u << 16);
     state->refused_since_mark = 0;
-  }
-};
-
-/// Counts a run of rays with fields.
-struct count_served {
-  static constexpr std::size_t run = 2048;
-  array_view<const std::uint32_t> field_of_ray;
-  const resident_field* fields;
-  field_store_state* state;
-
-  template <class Block>
-  WFPG_HD void operator()(Block& block, std::size_t i) const {
-    const std::size_t first = i * run;
-    const auto n = static_cast<int>(min(run, field_of_ray.size() - first));
-    const std::uint32_t served = block.sum(n, [&](int ray) {
-      const std::uint32_t field = field_of_ray[first + static_cast<std::size_t>(ray)];
-      return field != no_slot && fields[field].fraction > 0.0f ? 1u : 0u;
-    });
-    block.for_each(1, [&](int) { atomic_add(&state->served, served); });
   }
 };
 
@@ -71,7 +47,8 @@ const kept_field_options& field_store<Exec>::checked(const kept_field_options& o
   require(o.idle_samples >= 1, "kept.idle_samples", o.idle_samples, "at least 1");
   require(o.budget_bytes / bytes_a_slot(o.resolution) < (1u << 30), "kept.budget_bytes", o.budget_bytes,
           "less than 2^30 slots");
-  require(nodes < (1u << 29), "number of octree nodes", nodes, "less than 2^29");
+  static_assert(detail::missing_key::most_nodes == 1u << 28, "the message names it");
+  require(nodes < detail::missing_key::most_nodes, "number of octree nodes", nodes, "less than 2^28");
   return o;
 }
 
@@ -91,27 +68,30 @@ field_store<Exec>::field_store(const Exec& exec, const sparse_voxel_octree_view&
       list_(exec, 2 * capacity_),
       through_(exec, capacity_),
       field_of_ray_(exec, max_rays),
-      missing_keys_(exec, max_rays),
-      state_(exec, std::vector<detail::field_store_state>(1)) {
+      state_(exec, std::vector<detail::field_store_state>(1)),
+      counts_(exec, std::vector<detail::field_wave_counts>(2)) {
   options_.recast = detail::min(options.recast, options.resolution * options.resolution);
   std::size_t entries = 2;
   while (entries < 2 * capacity_) entries *= 2;
   table_ = buffer<std::uint64_t, Exec>(exec, entries);
   settled_ = buffer<std::uint8_t, Exec>(exec, capacity_);
   while (max_rays / stride_ > 8 * std::size_t(tree.leaf_count()) && stride_ < 32) stride_ *= 2;
-  wanted_ = buffer<std::uint32_t, Exec>(exec, entries);
-  wanted_through_ = buffer<std::uint32_t, Exec>(exec, entries);
+  constexpr std::size_t most_births = 1 << 12;  // of a wave: what one block goes through in microseconds
+  wanted_ = buffer<std::uint32_t, Exec>(exec, detail::min(entries, most_births));
+  wanted_through_ = buffer<std::uint32_t, Exec>(exec, wanted_.size());
   exec.fill_bytes(table_.data(), 0xff, table_.bytes());
-  ::thrust::fill_n(exec.thrust(), wanted_.data(), entries, detail::no_key);
+  exec.fill_bytes(settled_.data(), 0, settled_.bytes());
+  ::thrust::fill_n(exec.thrust(), wanted_.data(), wanted_.size(), detail::no_key);
 }
 
 template <class Exec>
 void field_store<Exec>::begin_sample(const Exec& exec, std::uint32_t sample) {
   sample_ = sample;
   counted_samples_ += counts_rays() ? 1 : 0;
-  exec.for_each(1, detail::begin_store_sample{state_.data()});
-  exec.for_each(capacity_, detail::evict_fields{slots_.view(), fields_.data(), state_.data(), sample,
-                                                options_.idle_samples});
+  waves_ = 0;
+  exec.for_each(1, detail::begin_store_sample{state_.data(), counts()});
+  exec.for_each(capacity_,
+                detail::evict_fields{view(), fields_.data(), state_.data(), sample, options_.idle_samples});
   exec.fill_bytes(table_.data(), 0xff, table_.bytes());  // no_entry
   const array_view<std::uint32_t> free_through(list_.data(), capacity_);
   ::thrust::transform_inclusive_scan(exec.thrust(), slots_.data(), slots_.data() + capacity_,
@@ -124,6 +104,7 @@ template <class Exec>
 void field_store<Exec>::end_sample(const Exec& exec) {
   const bool is_power_of_two = (sample_ & (sample_ - 1)) == 0;
   if (sample_ == 0 || !is_power_of_two) return;
+  expect_builds(turns);
   exec.for_each(1, detail::adapt_pressure{state_.data()});
   marks_.mark(exec, counted_samples_, capacity_, &state_.data()->pressure);
 }
@@ -136,16 +117,19 @@ guide_view field_store<Exec>::prepare(const Exec& exec, const kept_field_wave<Su
                 "caster: needs ray_hit operator()(const ray&) const, or cast(exec, rays, hits) const");
   detail::require(wave.ray_count <= field_of_ray_.size(), "ray_count", wave.ray_count, "at most max_rays");
   detail::require_product_resolution(wave.points.resolution, "kept.resolution", options_.resolution);
+  if (in_wave_)
+    exec.for_each(detail::max<std::size_t>(capacity_, 1), detail::forget_wave{slots_.view(), counts()});
+  in_wave_ = true;
   find(exec, wave);
-  list(exec, wave.seed);
-  const detail::kept_fields_view kept{slots_.view(),       fields_.data(),  words_.data(), hits_.data(),
-                                      options_.resolution, options_.recast, sample_};
-  build(exec, detail::kept_field_builder<kept_field_wave<Surfaces>>{wave, kept}, caster, caster_buffer_bytes);
-  const array_view<const std::uint32_t> field_of_ray(field_of_ray_.data(), wave.ray_count);
-  const std::size_t run = detail::count_served::run;
-  exec.for_each_block((wave.ray_count + run - 1) / run, 0,
-                      detail::count_served{field_of_ray, fields_.data(), state_.data()});
-  return {field_of_ray, {fields_.data(), words_.data(), options_.resolution, wave.points}};
+  const detail::kept_fields_view kept{
+      view(), fields_.data(), words_.data(), hits_.data(), options_.resolution, options_.recast, sample_};
+  if (builds_in_wave())
+    build(exec, detail::kept_field_builder<kept_field_wave<Surfaces>>{wave, kept}, caster,
+          caster_buffer_bytes);
+  ++waves_;
+  in_wave_ = false;
+  return {{field_of_ray_.data(), wave.ray_count},
+          {fields_.data(), words_.data(), options_.resolution, wave.points}};
 }
 
 /// Gives rays their slots, new ones where there is room.
@@ -153,53 +137,46 @@ template <class Exec>
 template <class Surfaces>
 void field_store<Exec>::find(const Exec& exec, const kept_field_wave<Surfaces>& wave) {
   using rays_type = detail::wave_rays<Surfaces>;
-  const auto n = static_cast<std::uint32_t>(wave.ray_count);
-  const detail::use_slot use{view(), field_of_ray_.data(), sample_, wave.seed};
-  exec.for_each(detail::max<std::size_t>(capacity_, 1),
-                detail::begin_store_wave{slots_.view(), settled_.view(), state_.data(), sample_});
-  exec.for_each(n, detail::find_fields<rays_type>{{wave.surfaces, wave.mode},
-                                                  tree_,
-                                                  marks_.view(),
-                                                  use,
-                                                  wanted(),
-                                                  missing_keys_.data(),
-                                                  state_.data(),
-                                                  n,
-                                                  counted()});
-  const detail::count_births births = bear(exec);
-  exec.for_each(exec::device_count{&state_.data()->missing, n},
-                detail::find_missing_fields{tree_, use, missing_keys_.data(), state_.data(), births});
+  using detail::wanted_builds;
+  const wanted_builds wanted_now = !builds_in_wave() ? wanted_builds::none
+                                   : limits_builds() ? wanted_builds::marked
+                                                     : wanted_builds::listed;
+  const detail::build_list builds{list_.data(),    counts(),        state_.data(),
+                                  wave.statistics, cells_a_field(), refresh_cones()};
+  const detail::use_slot use{view(), field_of_ray_.data(), sample_, wave.seed, wanted_now, builds};
+  const detail::ray_runs runs{wave.ray_count, counts(), wave.statistics};
+  const detail::use_ancestor ancestor{tree_, use};
+  exec.for_each_block(runs.size(), 0,
+                      detail::find_fields<rays_type>{{wave.surfaces, wave.mode},
+                                                     runs,
+                                                     marks_.view(),
+                                                     ancestor,
+                                                     wanted(),
+                                                     counted(),
+                                                     counts_.data() + (waves_ + 1) % 2});
+  if (!builds_in_wave()) return;
+  bear(exec);
+  exec.for_each_block(runs.size(), 0, detail::find_missing_fields{runs, ancestor});
+  if (limits_builds()) list(exec, wave.seed, builds);
 }
 
-/// Gives free slots to wanted keys; what is left is to count them.
+/// Gives free slots to wanted keys.
 template <class Exec>
-detail::count_births field_store<Exec>::bear(const Exec& exec) {
-  const std::uint32_t cells = options_.resolution * options_.resolution;
-  ::thrust::transform_inclusive_scan(exec.thrust(), wanted_.data(), wanted_.data() + wanted_.size(),
-                                     wanted_through_.data(), detail::is_wanted{},
-                                     ::thrust::plus<std::uint32_t>());
-  const detail::bear_fields births{view(),
-                                   wanted(),
-                                   wanted_through_.data(),
-                                   free_slots_.data(),
-                                   state_.data(),
-                                   options_.max_wave_cones / cells};
-  exec.for_each(wanted_.size(), births);
-  return {births, state_.data()};
+void field_store<Exec>::bear(const Exec& exec) {
+  using detail::bear_fields;
+  exec.for_each_block(1, bear_fields::scratch_bytes(),
+                      bear_fields{view(), wanted(), wanted_through_.data(), free_slots_.data(), counts(),
+                                  state_.data(), options_.max_wave_cones / cells_a_field()});
 }
 
-/// Lists the slots to build.
+/// Lists the slots to build, under a limit.
 template <class Exec>
-void field_store<Exec>::list(const Exec& exec, std::uint64_t seed) {
+void field_store<Exec>::list(const Exec& exec, std::uint64_t seed, const detail::build_list& builds) {
   if (capacity_ == 0) return;
-  if (options_.max_wave_cones == detail::build_limits::none)
-    return exec.for_each(capacity_, detail::list_all_builds{slots_.view(), list_.data(), state_.data()});
   ::thrust::transform_inclusive_scan(exec.thrust(), slots_.data(), slots_.data() + capacity_, through_.data(),
                                      detail::is_to_build{}, ::thrust::plus<std::uint64_t>());
-  const detail::build_limits limits{options_.max_wave_cones, options_.resolution * options_.resolution,
-                                    refresh_cones()};
-  exec.for_each(capacity_, detail::list_builds{slots_.view(), through_.data(), limits, list_.data(),
-                                               state_.data(), seed});
+  const detail::build_limits limits{options_.max_wave_cones, cells_a_field(), refresh_cones()};
+  exec.for_each(capacity_, detail::list_builds{slots_.view(), through_.data(), limits, builds, seed});
 }
 
 /// Builds the listed slots' fields.
@@ -209,20 +186,19 @@ void field_store<Exec>::build(const Exec& exec, const Builder& builder, const Ca
                               std::size_t buffer_bytes) {
   if constexpr (is_inline_caster_v<Caster>) {
     using build_type = detail::build_kept_fields<Builder, detail::inline_hits<Caster>>;
-    exec.for_each_block(exec::device_count{&state_.data()->builds, capacity_},
-                        detail::field_scratch_bytes(options_.resolution, Exec::warps_per_block),
-                        detail::build_listed_fields<build_type>{{builder, {caster}, listed(true), true},
-                                                                {builder, {caster}, listed(false), false},
-                                                                state_.data()});
+    exec.for_each_block(
+        exec::device_count{&counts()->builds, capacity_},
+        detail::field_scratch_bytes(options_.resolution, Exec::warps_per_block),
+        detail::build_listed_fields<build_type>{
+            {builder, {caster}, listed(true), true}, {builder, {caster}, listed(false), false}, counts()});
   } else {
-    const std::uint32_t* const counts[2] = {&state_.data()->part, &state_.data()->all};
     const std::uint32_t cells = builder.cone_count(true);
     const std::size_t room = detail::max<std::size_t>(cells, buffer_bytes / (sizeof(ray) + sizeof(ray_hit)));
     const buffer<ray, Exec> cones(exec, detail::min(room, capacity_ * cells));
     const buffer<ray_hit, Exec> hits(exec, cones.size());
     for (const bool whole : {true, false})
-      build_batches(exec, builder, caster, whole, read_element(exec, counts[whole]), cones.view(),
-                    hits.view());
+      build_batches(exec, builder, caster, whole,
+                    read_element(exec, whole ? &counts()->all : &counts()->part), cones.view(), hits.view());
   }
 }
 

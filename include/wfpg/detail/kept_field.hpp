@@ -25,7 +25,7 @@ WFPG_HD constexpr std::uint32_t refreshed_cell(std::uint32_t cone, std::uint32_t
 
 /// Where the slots' fields are.
 struct kept_fields_view {
-  array_view<field_slot> slots;
+  field_slots_view slots;
   resident_field* fields;
   std::uint32_t* words;
   cone_hit* hits;
@@ -45,13 +45,13 @@ struct kept_field_builder {
   }
   WFPG_HD field_cell cell(std::uint32_t slot, bool whole, std::uint32_t cone) const {
     if (whole) return cell_in_order(cone, kept.resolution);
-    return cell_at(refreshed_cell(cone, kept.slots[slot].builds, kept.resolution, kept.recast),
+    return cell_at(refreshed_cell(cone, kept.slots.slots[slot].builds, kept.resolution, kept.recast),
                    kept.resolution);
   }
 
   /// Cones start from the ray that was picked; a field's frame is that of the ray that it was first cast for.
   WFPG_HD field_cells cells(std::uint32_t slot, bool whole) const {
-    const field_slot& state = kept.slots[slot];
+    const field_slot& state = kept.slots.slots[slot];
     const auto s = wave.surfaces(static_cast<std::uint32_t>(state.origin));
     field_origin origin;
     origin.position = off_surface(s, wave.cache.octree());
@@ -78,10 +78,11 @@ struct kept_field_builder {
     finish_field(block, words, size, hemisphere, wave.options);
     block.for_each(1, [&](int) {
       kept.fields[slot] = {hemisphere ? cells.origin.normal : vec3(0.0f), wave.fraction};
-      field_slot& state = kept.slots[slot];
+      field_slot& state = kept.slots.slots[slot];
       state.last_built = kept.sample;
       ++state.builds;
       state.origin = field_slot::unpicked;
+      kept.slots.settled[slot] = 1;
     });
   }
 };
@@ -115,11 +116,11 @@ struct build_kept_fields {
 template <class Build>
 struct build_listed_fields {
   Build whole, part;
-  const field_store_state* state;
+  const field_wave_counts* counts;
 
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t i) const {
-    const std::uint32_t wholes = state->all;
+    const std::uint32_t wholes = counts->all;
     if (i < wholes)
       whole(block, i);
     else
@@ -149,13 +150,16 @@ struct write_kept_cones {
 /// Marks fields to be cast anew from which `bounds` may be seen: those whose node is inside, and those with a
 /// part of the bounding sphere above their horizon, from anywhere in their node.
 struct invalidate_fields {
-  array_view<field_slot> slots;
+  field_slots_view slots;
   const resident_field* fields;
   sparse_voxel_octree_view tree;
   bounds3 bounds;
 
   WFPG_HD void operator()(std::size_t i) const {
-    if (slots[i].key != no_key && may_see(slots[i].key / orientations, fields[i])) slots[i].builds = 0;
+    field_slot& s = slots.slots[i];
+    if (s.key == no_key || !may_see(s.key / orientations, fields[i])) return;
+    s.builds = 0;
+    slots.settled[i] = 0;
   }
 
  private:

@@ -21,20 +21,6 @@ struct add_counts {
   }
 };
 
-/// The same of a wave whose fields are kept.
-struct add_kept_counts {
-  const field_store_state* wave;
-  std::uint32_t cells;
-  std::uint32_t refresh_cones;
-  depth_statistics* sums;
-  WFPG_HD void operator()(std::size_t) const {
-    sums->bins += wave->all + wave->part;
-    sums->rays += wave->served;
-    sums->unbinned += wave->unbinned + wave->unserved;
-    sums->cones += std::uint64_t(wave->all) * cells + std::uint64_t(wave->part) * refresh_cones;
-  }
-};
-
 }  // namespace detail
 
 template <class Exec>
@@ -218,13 +204,10 @@ guide_view path_guider<Exec>::keep_wave(const wave<Surfaces, Random>& w, const C
     store_.count(exec_, w.ray_count, detail::wave_rays<Surfaces>{w.surfaces, options_.mode});
     return {};
   }
-  const kept_field_wave<Surfaces> wave{w.ray_count,        w.surfaces,        cache_.view(),
-                                       options_.field,     options_.mode,     fraction().with_enough_rays,
-                                       wave_seed(w.depth), points_at(w.depth)};
-  const guide_view view = store_.prepare(exec_, wave, caster, options_.caster_buffer_bytes);
-  exec_.for_each(1, detail::add_kept_counts{store_.state(), store_.resolution() * store_.resolution(),
-                                            store_.refresh_cones(), depth_counts(w.depth)});
-  return view;
+  const kept_field_wave<Surfaces> wave{w.ray_count,        w.surfaces,         cache_.view(),
+                                       options_.field,     options_.mode,      fraction().with_enough_rays,
+                                       wave_seed(w.depth), points_at(w.depth), depth_counts(w.depth)};
+  return store_.prepare(exec_, wave, caster, options_.caster_buffer_bytes);
 }
 
 /// Transient fields in scratch memory.
