@@ -52,9 +52,8 @@ void with_trained_guider(PGL_DIRECTIONAL_DISTRIBUTION_TYPE directional, const F&
 struct drawn_from_field {
   openpgl_field_view field;
   wfpg::surface<bsdf> at;
-  float choice = 0.0f;  // among regions
 
-  openpgl_distribution distribution() const { return field.at(at, choice); }
+  openpgl_distribution distribution() const { return field.at(at); }
   float eval(vec3, vec3 incident) const { return distribution().pdf(incident); }
   float pdf(vec3, vec3 incident) const { return distribution().pdf(incident); }
   wfpg::bsdf_sample sample(vec3, vec2 u) const {
@@ -114,12 +113,12 @@ TEST_CASE("densities are those that Open PGL draws directions with", "[renderer]
       floor.normal = floor.geometric_normal = floor.outgoing = {0.0f, 1.0f, 0.0f};
       for (const material_kind kind : {material_kind::lambert, material_kind::rough_dielectric}) {
         floor.bsdf.kind = kind;
-        REQUIRE_FALSE(guider.view().at(floor, 0.5f).empty());
-        const drawn_from_field drawn{guider.view(), floor, 0.5f};
+        REQUIRE_FALSE(guider.view().at(floor).empty());
+        const drawn_from_field drawn{guider.view(), floor};
         wfpg_test::check_passes(wfpg::testing::check_bsdf(policy(), drawn, options));
       }
       floor.bsdf.kind = material_kind::mirror;
-      CHECK(guider.view().at(floor, 0.5f).empty());
+      CHECK(guider.view().at(floor).empty());
     });
 }
 

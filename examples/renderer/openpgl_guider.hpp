@@ -47,12 +47,13 @@ class openpgl_field_view {
   openpgl_field_view(const openpgl::cpp::Field& field, distributions& workspace)
       : field_(&field), workspace_(&workspace) {}
 
-  /// The distribution at a surface, of one of the regions nearby, which a number in [0, 1) chooses; valid
-  /// until this thread's next call. Has the cosine in it where the field can do that and light comes from
-  /// above the surface alone. Empty on delta BSDFs, and where nothing is learnt yet.
-  openpgl_distribution at(const wfpg::surface<bsdf>& s, float u) const {
+  /// The distribution at a surface, valid until this thread's next call. Has the cosine in it where the field
+  /// can do that and light comes from above the surface alone. Empty on delta BSDFs, and where nothing is
+  /// learnt yet.
+  openpgl_distribution at(const wfpg::surface<bsdf>& s) const {
     if (s.bsdf.is_delta()) return {};
     openpgl::cpp::SurfaceSamplingDistribution& here = workspace_->local();
+    float u = 0.0f;  // chooses among neighbours, where a field is asked for them
     if (!here.Init(field_, to_pgl(s.position), u)) return {};
     if (here.SupportsApplyCosineProduct() && !s.bsdf.transmits()) here.ApplyCosineProduct(to_pgl(s.normal));
     return openpgl_distribution(here);
@@ -82,9 +83,8 @@ struct sample_openpgl {
     directions[i] = {};
     openpgl_mixture mixture;
     if (surface.active) {
-      const vec2 choices = random(ray, 0);
-      mixture = {field.at(surface, choices.y), fraction};
-      directions[i] = mixture.sample(surface, choices.x, random(ray, 1));
+      mixture = {field.at(surface), fraction};
+      directions[i] = mixture.sample(surface, random(ray, 0).x, random(ray, 1));
       recorder.scatter(surfaces.queue[ray], depth, surface, directions[i]);
     }
     if constexpr (!std::is_same_v<Queries, wfpg::no_queries>) {
@@ -153,6 +153,9 @@ class openpgl_guider {
     explicit field_config(const openpgl_options& options) {
       // Deterministic: one seed, one picture.
       config.Init(PGL_SPATIAL_STRUCTURE_KDTREE, options.directional, true, options.samples_per_leaf);
+      // The default, a random one of the four regions nearest, hides borders between regions and costs more
+      // noise than that is worth: the nearest may lie on another wall.
+      config.SetUseKnnLookup(false);
     }
   };
 
