@@ -44,6 +44,8 @@ struct rendering {
     options.rays_per_bin = 128;
     options.min_bin_level = 2;
     options.samples_per_leaf = 500;
+    // What quadtrees have learnt of so little leaves tails of noise that a t-test does not expect.
+    if (method == render::sampling_method::openpgl_dqt) options.guide_fraction = 0.3f;
     return options;
   }
   std::string name() const {
