@@ -7,6 +7,7 @@
 #include <string>
 
 TEST_CASE("without Open PGL its methods say how to get it", "[renderer]") {
+  CHECK_FALSE(render::has_openpgl());
   const render::scene box = render::make_builtin_scene("cornell-box");
   render::render_options options;
   options.spp = 1;

@@ -138,6 +138,9 @@ render_result render_on_optix(const scene& scene, const render_options& options,
 render_result render_with_openpgl(const scene& scene, const render_options& options,
                                   const progress_callback& progress);
 
+/// False where this was built without Open PGL.
+bool has_openpgl();
+
 inline bool is_openpgl(sampling_method method) {
   return method == sampling_method::openpgl_vmm || method == sampling_method::openpgl_dqt;
 }

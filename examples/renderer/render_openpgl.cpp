@@ -71,6 +71,10 @@ void report_openpgl(const openpgl_guider& guider, render_report& report) {
 
 }  // namespace
 
+bool has_openpgl() {
+  return true;
+}
+
 render_result render_with_openpgl(const scene& scene, const render_options& options,
                                   const progress_callback& progress) {
   const wfpg::exec::tbb exec;

@@ -5,6 +5,10 @@
 
 namespace render {
 
+bool has_openpgl() {
+  return false;
+}
+
 render_result render_with_openpgl(const scene&, const render_options&, const progress_callback&) {
   throw std::runtime_error(
       "--method openpgl-vmm and openpgl-dqt: this program was built without Open PGL; install it from the "
