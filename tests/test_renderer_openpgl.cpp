@@ -243,4 +243,7 @@ TEST_CASE("Open PGL where it cannot run, and leaves that it cannot fill, are ref
   options.where = device::cpu;
   options.samples_per_leaf = 7;
   CHECK(refusal(options).find("samples_per_leaf is 7") != std::string::npos);
+  options.samples_per_leaf = 8;
+  options.guide_fraction = 1.5f;
+  CHECK(refusal(options).find("guide_fraction is 1.5") != std::string::npos);
 }

@@ -11,8 +11,8 @@ bool has_openpgl() {
 
 render_result render_with_openpgl(const scene&, const render_options&, const progress_callback&) {
   throw std::runtime_error(
-      "--method openpgl-vmm and openpgl-dqt: this program was built without Open PGL; install it from the "
-      "repository RenderKit/openpgl, configure with -Dopenpgl_DIR=DIRECTORY, which holds its "
+      "--method openpgl-vmm and openpgl-dqt: this program was built without Open PGL; install 0.7 of it or "
+      "later from its repository RenderKit/openpgl, configure with -Dopenpgl_DIR=DIRECTORY, which holds its "
       "openpglConfig.cmake, and build again");
 }
 
