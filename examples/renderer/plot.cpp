@@ -12,7 +12,8 @@ namespace {
 
 constexpr double width = 640.0, height = 420.0;                          // pixels
 constexpr double left = 80.0, right = 120.0, top = 40.0, bottom = 55.0;  // margins
-constexpr const char* colours[] = {"#777777", "#d95f02", "#1b6ca8", "#2a9d5c", "#8e44ad", "#b8860b"};
+constexpr const char* colours[] = {"#777777", "#d95f02", "#1b6ca8", "#2a9d5c",
+                                   "#8e44ad", "#b8860b", "#c0392b"};
 
 bool is_drawn(const std::pair<double, double>& point) {
   return point.first > 0.0 && point.second > 0.0;
