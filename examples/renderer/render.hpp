@@ -15,7 +15,9 @@
 
 namespace render {
 
-enum class sampling_method { pt, wfpg, wfpg_product };
+/// Path tracing; guided by wfpg's fields, or by their products with BSDFs; by Open PGL's mixtures of von
+/// Mises-Fisher lobes, which know of parallax, or by its quadtrees of directions.
+enum class sampling_method { pt, wfpg, wfpg_product, openpgl_vmm, openpgl_dqt };
 enum class guiding { oriented, plain };
 enum class fields { kept, transient };
 enum class checkpoint_times {
@@ -45,7 +47,8 @@ struct render_options {
   std::uint32_t product_resolution = 8;              ///< blocks a side of products, 4, 8 or 16
   std::uint32_t rays_per_bin = 64;                   ///< c_ray
   std::uint32_t min_bin_level = 3;                   ///< l_min, from the root
-  float guide_fraction = 0.0f;                       ///< in [0, 1]; 0: the mode's own
+  float guide_fraction = 0.0f;                       ///< in [0, 1]; 0: the mode's own, 0.5 of Open PGL's
+  std::uint32_t samples_per_leaf = 32000;  ///< after which Open PGL's field splits a leaf, 8 to 2^30
   checkpoint_times checkpoints = checkpoint_times::none;  ///< when to keep the picture so far
   std::optional<wfpg::sample_combination> combine;  ///< unset: pt_linear, and all alike for path tracing
 };
@@ -86,6 +89,7 @@ struct render_report {
   octree_report octree;
   std::vector<bin_report> bins;  ///< by depth
   slot_report slots;
+  std::size_t regions = 0;  ///< of Open PGL's field
   double cones_per_segment = 0.0;
 };
 
@@ -134,5 +138,16 @@ render_result render_on_cuda(const scene& scene, const render_options& options,
                              const progress_callback& progress);
 render_result render_on_optix(const scene& scene, const render_options& options,
                               const progress_callback& progress);
+
+/// The same on exec::tbb, guided by Open PGL. Throws std::runtime_error where this was built without.
+render_result render_with_openpgl(const scene& scene, const render_options& options,
+                                  const progress_callback& progress);
+
+/// False where this was built without Open PGL.
+bool has_openpgl();
+
+inline bool is_openpgl(sampling_method method) {
+  return method == sampling_method::openpgl_vmm || method == sampling_method::openpgl_dqt;
+}
 
 }  // namespace render

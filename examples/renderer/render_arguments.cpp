@@ -49,8 +49,11 @@ void add_method_options(CLI::App& app, render_options& options) {
   add_choice<sampling_method>(app, "--method", options.method,
                               {{"pt", sampling_method::pt},
                                {"wfpg", sampling_method::wfpg},
-                               {"wfpg-product", sampling_method::wfpg_product}},
-                              "path tracing; guided by fields (default), or by their products with BSDFs");
+                               {"wfpg-product", sampling_method::wfpg_product},
+                               {"openpgl-vmm", sampling_method::openpgl_vmm},
+                               {"openpgl-dqt", sampling_method::openpgl_dqt}},
+                              "path tracing; guided by fields (default), or by their products with BSDFs; by "
+                              "Open PGL's mixtures of lobes or quadtrees");
   add_choice<guiding>(app, "--guiding", options.mode,
                       {{"oriented", guiding::oriented}, {"plain", guiding::plain}},
                       "bins by position and normal (default), or by position alone");
@@ -111,11 +114,16 @@ void add_guider_options(CLI::App& app, render_options& options) {
   app.add_option("--guide-fraction", options.guide_fraction,
                  "samples drawn from fields (default: the mode's)")
       ->check(CLI::Range(0.0, 1.0));
+  app.add_option("--samples-per-leaf", options.samples_per_leaf,
+                 "after which Open PGL splits a leaf of its field (default: 32000)")
+      ->check(CLI::Range(8, 1 << 30));
 }
 
 void check_render_options(const CLI::App& app, const render_options& options) {
   if (app.count("--product-resolution") > 0 && options.method != sampling_method::wfpg_product)
     throw CLI::RequiresError("--product-resolution", "--method wfpg-product");
+  if (app.count("--samples-per-leaf") > 0 && !is_openpgl(options.method))
+    throw CLI::RequiresError("--samples-per-leaf", "--method openpgl-vmm or openpgl-dqt");
 }
 
 std::string listed_builtin_scenes() {

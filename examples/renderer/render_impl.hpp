@@ -104,9 +104,13 @@ inline wfpg::guider_options guider_options_of(const render_options& options) {
   return guided;
 }
 
-template <class Accelerated, class Exec>
-render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
-                        const progress_callback& progress) {
+/// Builds what a rendering needs, has its samples taken, and reports. `take` does so with directions from
+/// where it likes:
+///   void operator()(path_tracer<Exec, Caster>&, const scene_view&, const pinhole&, stage_clock& building,
+///                   render_result&) const;
+template <class Accelerated, class Exec, class Take>
+render_result render_by(const Exec& exec, const scene& scene, const render_options& options,
+                        const Take& take) {
   const stopwatch total;
   stage_clock building;
   render_result result;
@@ -122,24 +126,35 @@ render_result render_on(const Exec& exec, const scene& scene, const render_optio
   path_tracer<Exec, decltype(accelerated->caster())> tracer(
       exec, settings, {geometry.view(), lights.view(), options.nee}, accelerated->caster());
   const pinhole camera(scene.view, options.width, options.height);
-  if (options.method == sampling_method::pt) {
-    unguided<Exec> guider(exec);
-    take_samples(tracer, guider, camera, options, progress, result);
-  } else {
-    const wfpg::triangle_mesh_view mesh{geometry.view().positions, geometry.view().triangles};
-    const stopwatch build;
-    wfpg::path_guider<Exec> guider(exec, mesh, guider_options_of(options));
-    building.add("octree", build.seconds());
-    report.octree.build_seconds = build.seconds();
-    take_samples(tracer, guider, camera, options, progress, result);
-    report_guider(guider, tracer.segments(), report);
-  }
+  take(tracer, geometry.view(), camera, building, result);
   report.segments = tracer.segments();
   result.picture = {options.width, options.height, tracer.picture()};
   report.seconds.insert(report.seconds.begin(), tracer.seconds().begin(), tracer.seconds().end());
   report.seconds.insert(report.seconds.begin(), building.seconds().begin(), building.seconds().end());
   report.total_seconds = total.seconds();
   return result;
+}
+
+template <class Accelerated, class Exec>
+render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
+                        const progress_callback& progress) {
+  return render_by<Accelerated>(
+      exec, scene, options,
+      [&](auto& tracer, const scene_view& geometry, const pinhole& camera, stage_clock& building,
+          render_result& result) {
+        if (options.method == sampling_method::pt) {
+          unguided<Exec> guider(exec);
+          take_samples(tracer, guider, camera, options, progress, result);
+        } else {
+          const wfpg::triangle_mesh_view mesh{geometry.positions, geometry.triangles};
+          const stopwatch build;
+          wfpg::path_guider<Exec> guider(exec, mesh, guider_options_of(options));
+          building.add("octree", build.seconds());
+          result.report.octree.build_seconds = build.seconds();
+          take_samples(tracer, guider, camera, options, progress, result);
+          report_guider(guider, tracer.segments(), result.report);
+        }
+      });
 }
 
 }  // namespace render

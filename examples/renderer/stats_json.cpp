@@ -64,6 +64,7 @@ void write_stats(const std::string& path, const render_report& report,
   for (const bin_report& depth : report.bins)
     stats["bins"].push_back({{"count", depth.count}, {"mean_rays", depth.mean_rays}});
   if (report.slots.capacity > 0) stats["slots"] = slots_of(report.slots);
+  if (report.regions > 0) stats["regions"] = report.regions;
   stats["cones_per_segment"] = report.cones_per_segment;
   if (error) stats["error"] = to_json(*error);
 
