@@ -529,7 +529,7 @@ TEST_CASE("checkpoints are the pictures on the way", "[renderer]") {
   options.spp = 4;
   const scene box = make_builtin_scene("cornell-box");
   CHECK(render::render(box, options, {}).checkpoints.empty());
-  options.checkpoints = true;
+  options.checkpoints = checkpoint_times::powers_of_two;
   const render_result result = render::render(box, options, {});
   REQUIRE(result.checkpoints.size() == 3);
   CHECK(result.checkpoints[0].seconds <= result.checkpoints[2].seconds);
@@ -537,6 +537,17 @@ TEST_CASE("checkpoints are the pictures on the way", "[renderer]") {
   CHECK(result.checkpoints[2].picture.pixels == result.picture.pixels);
   options.spp = 2;
   CHECK(render::render(box, options, {}).picture.pixels == result.checkpoints[1].picture.pixels);
+  options.spp = 3;
+  const render_result odd = render::render(box, options, {});
+  REQUIRE(odd.checkpoints.size() == 3);
+  CHECK(odd.checkpoints[2].samples == 3);
+  CHECK(odd.checkpoints[2].picture.pixels == odd.picture.pixels);
+  options.spp = 6;
+  options.checkpoints = checkpoint_times::all;
+  const render_result all = render::render(box, options, {});
+  REQUIRE(all.checkpoints.size() == 6);
+  for (int i = 0; i < 6; ++i) CHECK(all.checkpoints[static_cast<std::size_t>(i)].samples == i + 1);
+  CHECK(all.checkpoints[2].picture.pixels == odd.picture.pixels);
 }
 
 TEST_CASE("later samples count more only where they are better", "[renderer]") {

@@ -126,6 +126,22 @@ TEST_CASE("Pictures side by side", "[renderer][png]") {
   CHECK_THROWS_AS(render::side_by_side({}, 2), std::invalid_argument);
 }
 
+TEST_CASE("Pictures enlarged and cropped", "[renderer][png]") {
+  image picture = grey(3, 2, 0.0f);
+  for (std::size_t i = 0; i < 6; ++i) picture.pixels[i] = vec3(float(i));
+  const image large = render::enlarged(picture, 2);
+  REQUIRE((large.width == 6 && large.height == 4));
+  check_close(large.pixels[0], vec3(0.0f));
+  check_close(large.pixels[7], vec3(0.0f));
+  check_close(large.pixels[23], vec3(5.0f));
+  const image crop = render::cropped(picture, 1, 0, 2, 2);
+  REQUIRE((crop.width == 2 && crop.height == 2));
+  CHECK(crop.pixels == std::vector<vec3>{vec3(1.0f), vec3(2.0f), vec3(4.0f), vec3(5.0f)});
+  CHECK_THROWS_AS(render::cropped(picture, 2, 0, 2, 2), std::invalid_argument);
+  CHECK_THROWS_AS(render::cropped(picture, -1, 0, 2, 2), std::invalid_argument);
+  CHECK_THROWS_AS(render::cropped(picture, 0, 0, 0, 2), std::invalid_argument);
+}
+
 TEST_CASE("Errors of hand-made pictures", "[renderer][metrics]") {
   const render::image_error none = render::compare(grey(4, 4, 2.0f), grey(4, 4, 2.0f));
   CHECK(none.mse == 0.0);
@@ -136,7 +152,11 @@ TEST_CASE("Errors of hand-made pictures", "[renderer][metrics]") {
   CHECK(one.mse == Approx(4.0));
   CHECK(one.relmse == Approx(4.0 / 1.01));
   CHECK(one.relmse_trimmed == Approx(4.0 / 1.01));
+  CHECK(one.relmse_robust == Approx(4.0 / 1.01));
   CHECK(one.mse_reinhard == Approx(0.0625));
+  CHECK(one.smape == Approx(2.0 / 4.01));
+  CHECK(none.smape == 0.0);
+  CHECK(none.worst_share == 0.0);
 
   image channel = grey(2, 1, 0.0f);
   channel.pixels[1].y = 0.3f;
@@ -155,6 +175,33 @@ TEST_CASE("Trimming drops one pixel in a thousand", "[renderer][metrics]") {
   CHECK(render::compare(test, grey(50, 40, 1.0f)).relmse_trimmed > 400.0);
 }
 
+TEST_CASE("One pixel in ten thousand is left out, and its share is said", "[renderer][metrics]") {
+  image test = grey(200, 100, 1.0f);
+  test.pixels[10] = vec3(11.0f);   // relative error 100 / 1.01
+  test.pixels[700] = vec3(21.0f);  // 400 / 1.01
+  test.pixels[5] = vec3(2.0f);     // 1 / 1.01
+  const render::image_error error = render::compare(test, grey(200, 100, 1.0f));
+  CHECK(error.relmse == Approx(501.0 / 1.01 / 20000.0));
+  CHECK(error.relmse_robust == Approx(1.0 / 1.01 / 19998.0));
+  CHECK(error.worst_share == Approx(500.0 / 501.0));
+  // Fewer pixels than ten thousand: none is left out.
+  const render::image_error small = render::compare(grey(4, 4, 3.0f), grey(4, 4, 1.0f));
+  CHECK(small.relmse_robust == small.relmse);
+  CHECK(small.worst_share == Approx(0.0).margin(1e-12));
+}
+
+TEST_CASE("Errors pixel by pixel", "[renderer][metrics]") {
+  image test = grey(3, 1, 1.0f);
+  test.pixels[1] = vec3(3.0f);
+  test.pixels[2].x = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<double> errors = render::reinhard_errors(test, grey(3, 1, 1.0f));
+  REQUIRE(errors.size() == 3);
+  CHECK(errors[0] == 0.0);
+  CHECK(errors[1] == Approx(0.0625));
+  CHECK(std::isinf(errors[2]));
+  CHECK_THROWS_AS(render::reinhard_errors(test, grey(1, 3, 1.0f)), std::invalid_argument);
+}
+
 TEST_CASE("Pixels that are not finite are not hidden", "[renderer][metrics]") {
   image test = grey(50, 40, 1.0f);
   test.pixels[3].x = std::numeric_limits<float>::quiet_NaN();
@@ -162,6 +209,8 @@ TEST_CASE("Pixels that are not finite are not hidden", "[renderer][metrics]") {
   CHECK(error.non_finite == 1);
   CHECK(std::isinf(error.mse));
   CHECK(std::isinf(error.mse_reinhard));
+  CHECK(std::isinf(error.smape));
+  CHECK(error.worst_share == 1.0);
   for (vec3& pixel : test.pixels) pixel.y = std::numeric_limits<float>::infinity();
   error = render::compare(grey(50, 40, 1.0f), test);
   CHECK(error.non_finite == 2000);
@@ -172,6 +221,10 @@ TEST_CASE("Errors refuse what cannot be compared", "[renderer][metrics]") {
   CHECK_THROWS_AS(render::compare(grey(4, 4, 1.0f), grey(4, 5, 1.0f)), std::invalid_argument);
   CHECK_THROWS_AS(render::compare(image{}, image{}), std::invalid_argument);
   CHECK(render::noise_of_halves(grey(4, 4, 3.0f), grey(4, 4, 1.0f)).mse == Approx(1.0));
+  // The mean is 2, and each half 1 from it.
+  CHECK(render::noise_of_halves(grey(4, 4, 3.0f), grey(4, 4, 1.0f)).relmse_robust == Approx(1.0 / 4.01));
+  CHECK(render::noise_of_halves(grey(4, 4, 3.0f), grey(4, 4, 1.0f)).smape == Approx(0.5 / 5.01 + 0.5 / 3.01));
+  CHECK_THROWS_AS(render::noise_of_halves(grey(4, 4, 1.0f), grey(4, 5, 1.0f)), std::invalid_argument);
 }
 
 TEST_CASE("Built-in scenes hold together", "[renderer][builtin]") {
@@ -266,6 +319,41 @@ TEST_CASE("The glass around the enclosed lamp is closed and faces outwards", "[r
 
 TEST_CASE("The conductor box of ajar is closed", "[renderer][builtin]") {
   CHECK(open_edges(render::make_builtin_scene("ajar"), material_kind::conductor) == 0);
+}
+
+TEST_CASE("plots: names do not lie on one another, and long ones have room", "[renderer][plot]") {
+  temporary_folder folder;
+  const std::string name = "a name of many more letters than the others";
+  const render::curve first{name, {{1.0, 0.1}, {2.0, 0.05}}}, second{"b", {{1.0, 0.1}, {2.0, 0.05}}};
+  const double infinite = std::numeric_limits<double>::infinity();
+  render::write_svg(folder.file("a.svg"), {"t", "x", "y", {first, second, {"c", {{1.0, infinite}}}}});
+  const std::string svg = content_of(folder.file("a.svg"));
+  CHECK(std::stod(svg.substr(svg.find("width='") + 7)) > 520.0 + 7.0 * double(name.size()));
+  const auto height_of = [&svg](const std::string& text) {
+    const std::size_t at = svg.rfind("y='", svg.find('>' + text + '<'));
+    return std::stod(svg.substr(at + 3));
+  };
+  CHECK(std::abs(height_of(name) - height_of("b")) >= 12.0);
+  CHECK_FALSE(contains(svg, ">c<"));
+  CHECK_FALSE(contains(svg, "inf"));
+}
+
+TEST_CASE("plots: short axes are named between powers of ten", "[renderer][plot]") {
+  temporary_folder folder;
+  render::write_svg(folder.file("a.svg"), {"t", "x", "y", {{"a", {{1.0, 0.0023}, {1000.0, 0.0171}}}}});
+  const std::string svg = content_of(folder.file("a.svg"));
+  CHECK(contains(svg, ">0.002<"));
+  CHECK(contains(svg, ">0.005<"));
+  CHECK_FALSE(contains(svg, ">0.001<"));
+  CHECK(contains(svg, ">0.02<"));
+  CHECK_FALSE(contains(svg, ">0.003<"));
+  CHECK(contains(svg, ">1000<"));
+  CHECK_FALSE(contains(svg, ">500<"));
+  // One value has an axis too.
+  render::write_svg(folder.file("b.svg"), {"t", "x", "y", {{"a", {{1.0, 1.0}}}}});
+  CHECK_FALSE(contains(content_of(folder.file("b.svg")), "nan"));
+  render::write_svg(folder.file("c.svg"), {"t", "x", "y", {{"a", {{3.0, 1.0}, {4.0, 100.0}}}}});
+  CHECK(contains(content_of(folder.file("c.svg")), ">4<"));
 }
 
 TEST_CASE("plots: every positive point is drawn inside the frame, names are escaped", "[renderer][plot]") {

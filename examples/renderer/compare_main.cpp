@@ -1,6 +1,7 @@
 // wfpg-compare: prints how far a picture is from a reference. Exit code 0, or 2 with a message on failure.
 #include "image_io.hpp"
 #include "metrics.hpp"
+#include "stats_json.hpp"
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -14,22 +15,14 @@ namespace {
 
 constexpr int failure = 2;
 
-void print_json(const render::image_error& error) {
-  nlohmann::ordered_json object;
-  // Infinity, the error of a picture with NaN in it, has no number in JSON and is written as null.
-  object["mse"] = error.mse;
-  object["relmse"] = error.relmse;
-  object["relmse_trimmed"] = error.relmse_trimmed;
-  object["mse_reinhard"] = error.mse_reinhard;
-  object["non_finite"] = error.non_finite;
-  std::cout << object.dump(2) << '\n';
-}
-
 void print_table(const render::image_error& error) {
   std::printf("mse             %.6e\n", error.mse);
   std::printf("relmse          %.6e\n", error.relmse);
   std::printf("relmse trimmed  %.6e   (worst 0.1%% of the pixels dropped)\n", error.relmse_trimmed);
+  std::printf("relmse robust   %.6e   (worst 0.01%% dropped, which are %.1f%% of the sum)\n",
+              error.relmse_robust, 100.0 * error.worst_share);
   std::printf("mse reinhard    %.6e   (after c / (1 + c))\n", error.mse_reinhard);
+  std::printf("smape           %.6e\n", error.smape);
   if (error.non_finite > 0)
     std::printf("pixels with NaN or infinity: %zu, each counted as infinitely wrong\n", error.non_finite);
 }
@@ -50,7 +43,10 @@ int main(int argc, char** argv) {
   }
   try {
     const render::image_error error = render::compare(render::read_exr(test), render::read_exr(reference));
-    json ? print_json(error) : print_table(error);
+    if (json)
+      std::cout << render::to_json(error).dump(2) << '\n';
+    else
+      print_table(error);
   } catch (const std::exception& error) {
     std::cerr << "wfpg-compare: " << error.what() << '\n';
     return failure;

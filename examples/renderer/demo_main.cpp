@@ -1,5 +1,6 @@
 // wfpg-demo: path tracing and path tracing guided by transient fields, by kept ones and by their products
-// with BSDFs at equal samples, beside a reference, as pictures, a table, and plots of error over time.
+// with BSDFs at equal samples, beside a reference, as pictures, a table, and plots of error over time. Where
+// Open PGL is installed it takes part, on CPUs.
 #include "builtin_scenes.hpp"
 #include "image_io.hpp"
 #include "metrics.hpp"
@@ -10,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -52,13 +54,25 @@ constexpr demo_scene demo_scenes[] = {{"cornell-enclosed", false, 1.0f, 1024, 38
 struct demo_method {
   const char* name;
   sampling_method method;
-  render::fields lifetime;
+  render::fields lifetime = render::fields::kept;
+  std::uint32_t samples_per_leaf = 32000;  // Open PGL's own default
 };
-constexpr demo_method demo_methods[] = {
-    {"pt", sampling_method::pt, render::fields::kept},
-    {"transient", sampling_method::wfpg, render::fields::transient},
-    {"wfpg", sampling_method::wfpg, render::fields::kept},
-    {"wfpg-product", sampling_method::wfpg_product, render::fields::kept}};
+constexpr demo_method demo_methods[] = {{"pt", sampling_method::pt},
+                                        {"transient", sampling_method::wfpg, render::fields::transient},
+                                        {"wfpg", sampling_method::wfpg},
+                                        {"wfpg-product", sampling_method::wfpg_product}};
+// Pictures of few samples want leaves smaller than the default: 1000 where time counts, 250 where error does.
+constexpr demo_method openpgl_methods[] = {
+    {"openpgl-vmm-1000", sampling_method::openpgl_vmm, render::fields::kept, 1000},
+    {"openpgl-vmm-250", sampling_method::openpgl_vmm, render::fields::kept, 250},
+    {"openpgl-dqt-250", sampling_method::openpgl_dqt, render::fields::kept, 250}};
+
+std::vector<demo_method> methods_on(const demo_device& on) {
+  std::vector<demo_method> methods(std::begin(demo_methods), std::end(demo_methods));
+  if (render::has_openpgl() && on.where == render::device::cpu)
+    methods.insert(methods.end(), std::begin(openpgl_methods), std::end(openpgl_methods));
+  return methods;
+}
 
 struct method_result {
   const char* method;
@@ -114,8 +128,9 @@ method_result run_method(const demo_scene& demo, const demo_device& on, const de
   render_options options;
   options.method = method.method;
   options.lifetime = method.lifetime;
+  options.samples_per_leaf = method.samples_per_leaf;
   options.spp = samples;
-  options.checkpoints = true;
+  options.checkpoints = render::checkpoint_times::powers_of_two;
   method_result result{method.name, render_once(demo, on, method.name, options), {}};
   result.error = without_noise(render::compare(result.rendering.picture, truth.picture), truth.noise);
   return result;
@@ -130,15 +145,6 @@ render::curve error_over_time(const method_result& result, const reference& trut
     curve.points.emplace_back(at.seconds, error.mse_reinhard);
   }
   return curve;
-}
-
-image enlarged(const image& picture, int shown_at) {
-  image result = render::make_image(picture.width * shown_at, picture.height * shown_at);
-  for (int y = 0; y < result.height; ++y)
-    for (int x = 0; x < result.width; ++x)
-      result.pixels[static_cast<std::size_t>(y * result.width + x)] =
-          picture.pixels[static_cast<std::size_t>(y / shown_at * picture.width + x / shown_at)];
-  return result;
 }
 
 double bins_of(const render::render_report& report) {
@@ -169,7 +175,7 @@ nlohmann::ordered_json row(const method_result& result, const image_error& pt, d
 }
 
 void print_row(const char* scene, const nlohmann::ordered_json& row) {
-  std::printf("%-17s %-12s %4d  %10.3e %6.2f  %10.3e %6.2f  %8.2f %8.2f  %7.1f %6.2f  %6.0f  %6.2f\n", scene,
+  std::printf("%-17s %-16s %4d  %10.3e %6.2f  %10.3e %6.2f  %8.2f %8.2f  %7.1f %6.2f  %6.0f  %6.2f\n", scene,
               row["method"].get<std::string>().c_str(), row["spp"].get<int>(),
               row["mse_reinhard"].get<double>(), row["ratio_to_pt"].get<double>(),
               row["relmse_trimmed"].get<double>(), row["relmse_trimmed_ratio_to_pt"].get<double>(),
@@ -189,18 +195,18 @@ nlohmann::ordered_json run_scene(const demo_scene& demo, const demo_device& on,
   double pt_seconds = 0.0;
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   render::plot plot{demo.name, "seconds", "mean squared error after c / (1 + c)", {}};
-  for (const demo_method& method : demo_methods) {
+  for (const demo_method& method : methods_on(on)) {
     const method_result result = run_method(demo, on, method, truth);
     if (method.method == sampling_method::pt) {
       pt = result.error;
       pt_seconds = seconds_of(result);
     }
     render::write_exr(path(std::string("-") + method.name + ".exr"), result.rendering.picture);
-    strip.push_back(enlarged(result.rendering.picture, on.shown_at));
+    strip.push_back(render::enlarged(result.rendering.picture, on.shown_at));
     rows.push_back(row(result, pt, pt_seconds));
     plot.curves.push_back(error_over_time(result, truth));
   }
-  strip.push_back(enlarged(truth.picture, on.shown_at));
+  strip.push_back(render::enlarged(truth.picture, on.shown_at));
   render::write_png(path(".png"), render::side_by_side(strip, 4), demo.exposure);
   render::write_svg(path("-error.svg"), plot);
   return {{"scene", demo.name},
@@ -216,19 +222,21 @@ void run(const std::filesystem::path& directory, const demo_device& on) {
   nlohmann::ordered_json summary = nlohmann::ordered_json::array();
   for (const demo_scene& demo : demo_scenes) summary.push_back(run_scene(demo, on, directory));
 
-  std::printf("\n%-17s %-12s %4s  %10s %6s  %10s %6s  %8s %8s  %7s %6s  %6s  %6s\n", "scene", "method", "spp",
+  std::printf("\n%-17s %-16s %4s  %10s %6s  %10s %6s  %8s %8s  %7s %6s  %6s  %6s\n", "scene", "method", "spp",
               "error", "ratio", "relmse", "ratio", "held MiB", "temp MiB", "seconds", "equal", "bins",
               "cones");
   for (const auto& scene : summary)
     for (const auto& method : scene["methods"]) print_row(scene["scene"].get<std::string>().c_str(), method);
+  std::string shown;
+  for (const demo_method& method : methods_on(on)) shown += std::string(method.name) + ", ";
   std::printf(
       "\nerror: MSE after c / (1 + c); relmse: relative MSE without the worst 0.1%% of pixels; both less "
       "the\n"
       "reference's own noise. ratio: error of pt / error; equal: the same at equal time. held, temp: memory\n"
       "for guiding, across samples and while one is in flight. bins: a sample, all depths, whose fields\n"
-      "were made. cones: a path segment. Pictures, left to right pt, transient, wfpg, wfpg-product,\n"
-      "reference, and plots of error over time: %s\n",
-      directory.string().c_str());
+      "were made. cones: a path segment. Pictures, left to right %sreference,\n"
+      "and plots of error over time: %s\n",
+      shown.c_str(), directory.string().c_str());
   std::ofstream file(directory / "summary.json");
   file << summary.dump(2) << '\n';
   if (!file) throw std::runtime_error((directory / "summary.json").string() + ": cannot be written");

@@ -186,6 +186,29 @@ image side_by_side(const std::vector<image>& pictures, int gap) {
   return row;
 }
 
+image enlarged(const image& picture, int times) {
+  image result = make_image(picture.width * times, picture.height * times);
+  for (int y = 0; y < result.height; ++y)
+    for (int x = 0; x < result.width; ++x)
+      result.pixels[std::size_t(y) * std::size_t(result.width) + std::size_t(x)] =
+          picture.pixels[std::size_t(y / times) * std::size_t(picture.width) + std::size_t(x / times)];
+  return result;
+}
+
+image cropped(const image& picture, int left, int top, int width, int height) {
+  if (left < 0 || top < 0 || width > picture.width - left || height > picture.height - top)
+    throw std::invalid_argument("a crop of " + std::to_string(width) + " x " + std::to_string(height) +
+                                " from " + std::to_string(left) + ", " + std::to_string(top) +
+                                " on is not within " + std::to_string(picture.width) + " x " +
+                                std::to_string(picture.height));
+  image result = make_image(width, height);
+  for (int y = 0; y < height; ++y) {
+    const auto source = picture.pixels.begin() + std::ptrdiff_t(top + y) * picture.width + left;
+    std::copy(source, source + width, result.pixels.begin() + std::ptrdiff_t(y) * width);
+  }
+  return result;
+}
+
 float srgb_to_linear(float encoded) {
   return encoded <= 0.04045f ? encoded / 12.92f : std::pow((encoded + 0.055f) / 1.055f, 2.4f);
 }

@@ -36,6 +36,13 @@ void write_png(const std::string& path, const image& picture, float exposure = 1
 /// Pictures from left to right with `gap` >= 0 white columns between them; lower ones are filled up in white.
 image side_by_side(const std::vector<image>& pictures, int gap);
 
+/// Each pixel as a square of `times` by `times`, which is positive.
+image enlarged(const image& picture, int times);
+
+/// The `width` by `height` pixels from column `left` and row `top` on. Throws std::invalid_argument where
+/// they are not within the picture.
+image cropped(const image& picture, int left, int top, int width, int height);
+
 /// The radiance that an sRGB-encoded value in [0, 1] stands for (IEC 61966-2-1), and back.
 float srgb_to_linear(float encoded);
 float linear_to_srgb(float linear);

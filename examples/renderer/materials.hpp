@@ -143,10 +143,15 @@ struct bsdf {
     if (is_delta()) return wfpg::luminance(colour);
     const float density = pdf(outgoing, incident);
     if (!(density > 0.0f)) return 0.0f;
+    const float eta = ior_beyond(outgoing, incident);
+    return eta * eta * eval(outgoing, incident) / density;
+  }
+
+  /// The index of refraction where light of `incident` comes from, over that where it goes to.
+  WFPG_HD float ior_beyond(vec3 outgoing, vec3 incident) const {
     const float above = glm::dot(outgoing, normal);
     const bool enters = !is_thin() && above * glm::dot(incident, normal) < 0.0f;
-    const float eta = enters ? relative_ior(above) : 1.0f;
-    return eta * eta * eval(outgoing, incident) / density;
+    return enters ? relative_ior(above) : 1.0f;
   }
 
  private:

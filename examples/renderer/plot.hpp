@@ -9,7 +9,7 @@ namespace render {
 
 struct curve {
   std::string name;
-  std::vector<std::pair<double, double>> points;  ///< both positive; others are left out
+  std::vector<std::pair<double, double>> points;  ///< both positive and finite; others are left out
 };
 
 struct plot {

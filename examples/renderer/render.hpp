@@ -15,9 +15,16 @@
 
 namespace render {
 
-enum class sampling_method { pt, wfpg, wfpg_product };
+/// Path tracing; guided by wfpg's fields, or by their products with BSDFs; by Open PGL's mixtures of von
+/// Mises-Fisher lobes, which know of parallax, or by its quadtrees of directions.
+enum class sampling_method { pt, wfpg, wfpg_product, openpgl_vmm, openpgl_dqt };
 enum class guiding { oriented, plain };
 enum class fields { kept, transient };
+enum class checkpoint_times {
+  none,
+  powers_of_two,
+  all
+};                                                 ///< after samples 1, 2, 4, 8, ... and the last; all
 enum class device { cpu, omp, seq, cuda, optix };  ///< TBB, OpenMP, one thread, a GPU, and with OptiX
 
 struct render_options {
@@ -40,9 +47,10 @@ struct render_options {
   std::uint32_t product_resolution = 8;              ///< blocks a side of products, 4, 8 or 16
   std::uint32_t rays_per_bin = 64;                   ///< c_ray
   std::uint32_t min_bin_level = 3;                   ///< l_min, from the root
-  float guide_fraction = 0.0f;                       ///< in [0, 1]; 0: the mode's own
-  bool checkpoints = false;                          ///< keep the pictures after samples 1, 2, 4, 8, ...
-  std::optional<wfpg::sample_combination> combine;   ///< unset: pt_linear, and all alike for path tracing
+  float guide_fraction = 0.0f;                       ///< in [0, 1]; 0: the mode's own, 0.5 of Open PGL's
+  std::uint32_t samples_per_leaf = 32000;  ///< after which Open PGL's field splits a leaf, 8 to 2^30
+  checkpoint_times checkpoints = checkpoint_times::none;  ///< when to keep the picture so far
+  std::optional<wfpg::sample_combination> combine;  ///< unset: pt_linear, and all alike for path tracing
 };
 
 /// Bins of one depth, means over the samples that were guided; of kept fields, those made or refreshed.
@@ -81,6 +89,7 @@ struct render_report {
   octree_report octree;
   std::vector<bin_report> bins;  ///< by depth
   slot_report slots;
+  std::size_t regions = 0;  ///< of Open PGL's field
   double cones_per_segment = 0.0;
 };
 
@@ -94,7 +103,7 @@ inline wfpg::sample_combination combination_of(const render_options& options) {
 /// A picture on the way.
 struct checkpoint {
   int samples = 0;
-  double seconds = 0.0;  ///< of samples so far
+  double seconds = 0.0;  ///< of samples so far; what keeping pictures takes is left out
   image picture;
 };
 
@@ -129,5 +138,16 @@ render_result render_on_cuda(const scene& scene, const render_options& options,
                              const progress_callback& progress);
 render_result render_on_optix(const scene& scene, const render_options& options,
                               const progress_callback& progress);
+
+/// The same on exec::tbb, guided by Open PGL. Throws std::runtime_error where this was built without.
+render_result render_with_openpgl(const scene& scene, const render_options& options,
+                                  const progress_callback& progress);
+
+/// False where this was built without Open PGL.
+bool has_openpgl();
+
+inline bool is_openpgl(sampling_method method) {
+  return method == sampling_method::openpgl_vmm || method == sampling_method::openpgl_dqt;
+}
 
 }  // namespace render

@@ -34,37 +34,49 @@ class sample_budget {
         least_(combination_of(options) == wfpg::sample_combination::discard_first ? 2 : 1) {}
 
   int samples() const { return samples_; }
-  double seconds() const { return clock_.seconds(); }
+  double seconds() const { return clock_.seconds() - left_out_; }
   bool is_spent() const { return samples_ >= least_ && fraction() >= 1.0; }
   void count() { ++samples_; }
-  render_progress progress() const { return {samples_, std::min(1.0, fraction()), clock_.seconds()}; }
+  void leave_out(double seconds) { left_out_ += seconds; }
+  render_progress progress() const { return {samples_, std::min(1.0, fraction()), seconds()}; }
 
  private:
   double fraction() const {
-    return seconds_ > 0.0 ? clock_.seconds() / seconds_ : static_cast<double>(samples_) / spp_;
+    return seconds_ > 0.0 ? seconds() / seconds_ : static_cast<double>(samples_) / spp_;
   }
 
   stopwatch clock_;
   int spp_;
   double seconds_;
+  double left_out_ = 0.0;
   int least_;  ///< the picture of fewer has no weight
   int samples_ = 0;
 };
+
+inline bool is_kept(checkpoint_times times, int samples, bool is_last) {
+  const bool is_power_of_two = (samples & (samples - 1)) == 0;
+  return times == checkpoint_times::all ||
+         (times == checkpoint_times::powers_of_two && (is_power_of_two || is_last));
+}
 
 /// The samples of one rendering, whatever their directions come from.
 template <class Exec, class Caster, class Guider>
 void take_samples(path_tracer<Exec, Caster>& tracer, Guider& guider, const pinhole& camera,
                   const render_options& options, const progress_callback& progress, render_result& result) {
   sample_budget budget(options);
-  while (!budget.is_spent()) {
+  for (bool is_last = false; !is_last;) {
     const auto sample = static_cast<std::uint32_t>(budget.samples());
     const float weight = wfpg::sample_weight(combination_of(options), sample + 1);
     tracer.render_sample(guider, camera, sample, weight);
     budget.count();
-    const bool is_power_of_two = (budget.samples() & (budget.samples() - 1)) == 0;
-    if (options.checkpoints && is_power_of_two)
+    is_last = budget.is_spent();
+    if (is_kept(options.checkpoints, budget.samples(), is_last)) {
+      const double seconds = budget.seconds();
+      const stopwatch keeping;
       result.checkpoints.push_back(
-          {budget.samples(), budget.seconds(), {options.width, options.height, tracer.picture()}});
+          {budget.samples(), seconds, {options.width, options.height, tracer.picture()}});
+      budget.leave_out(keeping.seconds());
+    }
     if (progress) progress(budget.progress());
   }
   result.report.spp = budget.samples();
@@ -92,9 +104,13 @@ inline wfpg::guider_options guider_options_of(const render_options& options) {
   return guided;
 }
 
-template <class Accelerated, class Exec>
-render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
-                        const progress_callback& progress) {
+/// Builds what a rendering needs, has its samples taken, and reports. `take` does so with directions from
+/// where it likes:
+///   void operator()(path_tracer<Exec, Caster>&, const scene_view&, const pinhole&, stage_clock& building,
+///                   render_result&) const;
+template <class Accelerated, class Exec, class Take>
+render_result render_by(const Exec& exec, const scene& scene, const render_options& options,
+                        const Take& take) {
   const stopwatch total;
   stage_clock building;
   render_result result;
@@ -110,24 +126,35 @@ render_result render_on(const Exec& exec, const scene& scene, const render_optio
   path_tracer<Exec, decltype(accelerated->caster())> tracer(
       exec, settings, {geometry.view(), lights.view(), options.nee}, accelerated->caster());
   const pinhole camera(scene.view, options.width, options.height);
-  if (options.method == sampling_method::pt) {
-    unguided<Exec> guider(exec);
-    take_samples(tracer, guider, camera, options, progress, result);
-  } else {
-    const wfpg::triangle_mesh_view mesh{geometry.view().positions, geometry.view().triangles};
-    const stopwatch build;
-    wfpg::path_guider<Exec> guider(exec, mesh, guider_options_of(options));
-    building.add("octree", build.seconds());
-    report.octree.build_seconds = build.seconds();
-    take_samples(tracer, guider, camera, options, progress, result);
-    report_guider(guider, tracer.segments(), report);
-  }
+  take(tracer, geometry.view(), camera, building, result);
   report.segments = tracer.segments();
   result.picture = {options.width, options.height, tracer.picture()};
   report.seconds.insert(report.seconds.begin(), tracer.seconds().begin(), tracer.seconds().end());
   report.seconds.insert(report.seconds.begin(), building.seconds().begin(), building.seconds().end());
   report.total_seconds = total.seconds();
   return result;
+}
+
+template <class Accelerated, class Exec>
+render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
+                        const progress_callback& progress) {
+  return render_by<Accelerated>(
+      exec, scene, options,
+      [&](auto& tracer, const scene_view& geometry, const pinhole& camera, stage_clock& building,
+          render_result& result) {
+        if (options.method == sampling_method::pt) {
+          unguided<Exec> guider(exec);
+          take_samples(tracer, guider, camera, options, progress, result);
+        } else {
+          const wfpg::triangle_mesh_view mesh{geometry.positions, geometry.triangles};
+          const stopwatch build;
+          wfpg::path_guider<Exec> guider(exec, mesh, guider_options_of(options));
+          building.add("octree", build.seconds());
+          result.report.octree.build_seconds = build.seconds();
+          take_samples(tracer, guider, camera, options, progress, result);
+          report_guider(guider, tracer.segments(), result.report);
+        }
+      });
 }
 
 }  // namespace render

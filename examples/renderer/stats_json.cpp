@@ -39,14 +39,18 @@ json slots_of(const slot_report& slots) {
           {"freed_per_sample", slots.freed}, {"refreshed_per_sample", slots.refreshed}};
 }
 
-json error_of(const image_error& error) {
+}  // namespace
+
+json to_json(const image_error& error) {
   return {{"mse", error.mse},
           {"relmse", error.relmse},
           {"relmse_trimmed", error.relmse_trimmed},
-          {"mse_reinhard", error.mse_reinhard}};
+          {"relmse_robust", error.relmse_robust},
+          {"worst_share", error.worst_share},
+          {"mse_reinhard", error.mse_reinhard},
+          {"smape", error.smape},
+          {"non_finite", error.non_finite}};
 }
-
-}  // namespace
 
 void write_stats(const std::string& path, const render_report& report,
                  const std::optional<image_error>& error) {
@@ -60,8 +64,9 @@ void write_stats(const std::string& path, const render_report& report,
   for (const bin_report& depth : report.bins)
     stats["bins"].push_back({{"count", depth.count}, {"mean_rays", depth.mean_rays}});
   if (report.slots.capacity > 0) stats["slots"] = slots_of(report.slots);
+  if (report.regions > 0) stats["regions"] = report.regions;
   stats["cones_per_segment"] = report.cones_per_segment;
-  if (error) stats["error"] = error_of(*error);
+  if (error) stats["error"] = to_json(*error);
 
   std::ofstream file(path);
   file << stats.dump(2) << '\n';

@@ -4,10 +4,15 @@
 #include "metrics.hpp"
 #include "render.hpp"
 
+#include <nlohmann/json_fwd.hpp>
+
 #include <optional>
 #include <string>
 
 namespace render {
+
+/// Every measure by its name. JSON has no infinity: it is written as null.
+nlohmann::ordered_json to_json(const image_error& error);
 
 /// Writes scene, method, device, spp, seconds, memory, octree, bins, cones_per_segment, and with an error
 /// `error`. Infinities and NaN become null. Throws std::runtime_error that names the path.

@@ -43,13 +43,18 @@ struct rendering {
     options.recast = 4;
     options.rays_per_bin = 128;
     options.min_bin_level = 2;
+    options.samples_per_leaf = 500;
+    // What quadtrees have learnt of so little leaves tails of noise that a t-test does not expect.
+    if (method == render::sampling_method::openpgl_dqt) options.guide_fraction = 0.3f;
     return options;
   }
   std::string name() const {
     return scene + (where == render::device::cuda ? " on cuda" : "") + ", next-event estimation " +
            (nee ? "on" : "off") + ", " + (mode == render::guiding::plain ? "plain" : "oriented") + ", " +
            (lifetime == render::fields::kept ? "kept" : "transient") + " fields" +
-           (method == render::sampling_method::wfpg_product ? ", products" : "");
+           (method == render::sampling_method::wfpg_product ? ", products" : "") +
+           (method == render::sampling_method::openpgl_vmm ? ", Open PGL's mixtures" : "") +
+           (method == render::sampling_method::openpgl_dqt ? ", Open PGL's quadtrees" : "");
   }
 };
 

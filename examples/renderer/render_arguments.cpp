@@ -1,0 +1,148 @@
+// Options of the command line, by CLI11.
+#include "render_arguments.hpp"
+
+#include "builtin_scenes.hpp"
+#include "gltf_loader.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <stdexcept>
+#include <vector>
+
+namespace render {
+namespace {
+
+// CLI11's own checked transformer accepts the numbers behind the names too; names are all that is documented.
+template <class T, class Value>
+CLI::Option* add_choice(CLI::App& app, const std::string& name, Value& value,
+                        const std::map<std::string, T>& choices, const std::string& help) {
+  std::vector<std::string> names;
+  for (const auto& choice : choices) names.push_back(choice.first);
+  return app
+      .add_option_function<std::string>(
+          name, [&value, choices](const std::string& chosen) { value = choices.at(chosen); }, help)
+      ->check(CLI::IsMember(names))
+      ->type_name("NAME");
+}
+
+void parse_size(const std::string& text, render_options& options) {
+  char end = 0;
+  if (std::sscanf(text.c_str(), "%5dx%5d%c", &options.width, &options.height, &end) != 2 ||
+      options.width <= 0 || options.height <= 0)
+    throw CLI::ValidationError("--size is " + text + ", expected WIDTHxHEIGHT, such as 640x360");
+}
+
+}  // namespace
+
+const std::map<std::string, wfpg::sample_combination>& combination_names() {
+  using combine = wfpg::sample_combination;
+  static const std::map<std::string, combine> names = {
+      {"pt-linear", combine::pt_linear},        {"pt-first", combine::pt_first},
+      {"constant", combine::constant},          {"linear", combine::linear},
+      {"quadratic", combine::quadratic},        {"one-two", combine::one_two},
+      {"discard-first", combine::discard_first}};
+  return names;
+}
+
+void add_method_options(CLI::App& app, render_options& options) {
+  add_choice<sampling_method>(app, "--method", options.method,
+                              {{"pt", sampling_method::pt},
+                               {"wfpg", sampling_method::wfpg},
+                               {"wfpg-product", sampling_method::wfpg_product},
+                               {"openpgl-vmm", sampling_method::openpgl_vmm},
+                               {"openpgl-dqt", sampling_method::openpgl_dqt}},
+                              "path tracing; guided by fields (default), or by their products with BSDFs; by "
+                              "Open PGL's mixtures of lobes or quadtrees");
+  add_choice<guiding>(app, "--guiding", options.mode,
+                      {{"oriented", guiding::oriented}, {"plain", guiding::plain}},
+                      "bins by position and normal (default), or by position alone");
+  add_choice<fields>(app, "--fields", options.lifetime,
+                     {{"kept", fields::kept}, {"transient", fields::transient}},
+                     "kept across depths and samples (default), or made anew each time");
+  add_choice<wfpg::sample_combination>(app, "--combine", options.combine, combination_names(),
+                                       "how samples add up (default: pt-linear; constant for pt)");
+}
+
+void add_device_option(CLI::App& app, render_options& options) {
+  add_choice<device>(app, "--device", options.where,
+                     {{"cpu", device::cpu},
+                      {"omp", device::omp},
+                      {"seq", device::seq},
+                      {"cuda", device::cuda},
+                      {"optix", device::optix}},
+                     "TBB (default), OpenMP, one thread, or a GPU");
+}
+
+void add_nee_option(CLI::App& app, render_options& options) {
+  add_choice<bool>(app, "--nee", options.nee, {{"on", true}, {"off", false}},
+                   "next-event estimation toward area lights (default: on)");
+}
+
+void add_budget_options(CLI::App& app, render_options& options) {
+  CLI::Option* const spp =
+      app.add_option("--spp", options.spp, "samples a pixel (default: 64)")->check(CLI::Range(1, 1 << 30));
+  app.add_option("--seconds", options.seconds, "render for so long instead")
+      ->check(CLI::PositiveNumber)
+      ->excludes(spp);
+  app.add_option("--seed", options.seed, "of the random numbers (default: 0)");
+}
+
+void add_picture_options(CLI::App& app, render_options& options) {
+  app.add_option_function<std::string>(
+      "--size", [&options](const std::string& text) { parse_size(text, options); },
+      "picture, WIDTHxHEIGHT (default: the scene's)");
+  app.add_option("--max-depth", options.max_depth, "segments of a path (default: the scene's)")
+      ->check(CLI::Range(1, 1 << 30));
+}
+
+void add_guider_options(CLI::App& app, render_options& options) {
+  app.add_option("--octree-resolution", options.octree_resolution,
+                 "voxels a side, a power of two (default: 128)");
+  app.add_option("--field-resolution", options.field_resolution,
+                 "cells a side of transient fields at the first vertex (default: 32)");
+  app.add_option("--slot-resolution", options.slot_resolution, "cells a side of kept fields (default: 24)");
+  app.add_option("--recast", options.recast, "a refresh casts one cone in so many again (default: 8)")
+      ->check(CLI::Range(1, 1 << 20));
+  app.add_option("--field-budget", options.field_budget, "memory of kept fields, such as 16MiB (the default)")
+      ->transform(CLI::AsSizeValue(false));
+  app.add_option("--product-resolution", options.product_resolution,
+                 "blocks a side of wfpg-product's products: 4, 8 or 16 (default: 8)")
+      ->check(CLI::IsMember({4, 8, 16}));
+  app.add_option("--rays-per-bin", options.rays_per_bin, "rays that a bin should have (default: 64)");
+  app.add_option("--min-bin-level", options.min_bin_level, "octree level of the largest bins (default: 3)");
+  app.add_option("--guide-fraction", options.guide_fraction,
+                 "samples drawn from fields (default: the mode's)")
+      ->check(CLI::Range(0.0, 1.0));
+  app.add_option("--samples-per-leaf", options.samples_per_leaf,
+                 "after which Open PGL splits a leaf of its field (default: 32000)")
+      ->check(CLI::Range(8, 1 << 30));
+}
+
+void check_render_options(const CLI::App& app, const render_options& options) {
+  if (app.count("--product-resolution") > 0 && options.method != sampling_method::wfpg_product)
+    throw CLI::RequiresError("--product-resolution", "--method wfpg-product");
+  if (app.count("--samples-per-leaf") > 0 && !is_openpgl(options.method))
+    throw CLI::RequiresError("--samples-per-leaf", "--method openpgl-vmm or openpgl-dqt");
+}
+
+std::string listed_builtin_scenes() {
+  return CLI::detail::join(builtin_scene_names(), ", ");
+}
+
+scene load_scene(const std::string& name) {
+  if (is_builtin_scene(name)) return make_builtin_scene(name);
+  const std::size_t dot = name.rfind('.');
+  const std::string extension = dot == std::string::npos ? "" : name.substr(dot);
+  if (extension == ".glb" || extension == ".gltf") return load_gltf(name);
+  throw std::invalid_argument("SCENE is " + name + ", expected a .glb or .gltf file or one of " +
+                              listed_builtin_scenes());
+}
+
+bool is_dark(const scene& scene) {
+  for (const material& m : scene.materials)
+    if (m.emission != vec3(0.0f)) return false;
+  return scene.punctual_lights.empty() && scene.sky.texels.empty() && scene.environment == vec3(0.0f);
+}
+
+}  // namespace render

@@ -1,0 +1,41 @@
+// The renderer's options on command lines, the same names and checks in each program.
+#pragma once
+
+#include "render.hpp"
+#include "scene.hpp"
+
+#include <map>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace render {
+
+/// Options that write to `options`, which outlives the parsing; what is not given keeps its value.
+void add_method_options(CLI::App& app,
+                        render_options& options);                ///< --method, --guiding, --fields, --combine
+void add_device_option(CLI::App& app, render_options& options);  ///< --device
+void add_nee_option(CLI::App& app, render_options& options);     ///< --nee
+void add_budget_options(CLI::App& app, render_options& options);   ///< --spp, --seconds, --seed
+void add_picture_options(CLI::App& app, render_options& options);  ///< --size, --max-depth
+void add_guider_options(CLI::App& app, render_options& options);   ///< resolutions, budgets, bins
+
+/// The choices of --combine.
+const std::map<std::string, wfpg::sample_combination>& combination_names();
+
+/// What no option can check alone, after parsing. Throws CLI::ParseError.
+void check_render_options(const CLI::App& app, const render_options& options);
+
+/// The names of the built-in scenes, comma-separated, for messages.
+std::string listed_builtin_scenes();
+
+/// A built-in scene, or a .glb or .gltf file's. Throws std::invalid_argument for other names,
+/// std::runtime_error for files that cannot be read.
+scene load_scene(const std::string& name);
+
+/// Nothing in the scene emits: its picture is black.
+bool is_dark(const scene& scene);
+
+}  // namespace render
