@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints results of the GPU as a table of docs/performance.md.
+"""Prints results as a table of docs/performance.md or docs/quality.md.
 
 usage: bench/table.py bench/results/NAME.json
 """
@@ -62,10 +62,27 @@ def print_sample_times(scenes):
             )
 
 
+def print_gains(scenes):
+    print("| scene | samples | method | gain in MSE after c / (1 + c) | at equal time | gain in relative MSE | seconds | MiB kept |")
+    print("| --- " * 8 + "|")
+    for scene in scenes:
+        name = scene["scene"].split("/")[-1]
+        for budget in scene["summary"]:
+            for m in budget["methods"]:
+                mse, relative = (m["errors"][e] for e in ("mse_reinhard", "relmse_robust"))
+                print(
+                    f"| {name} | {m['samples']['mean']:.0f} | {m['method']} | {ratio(mse['ratio'])} "
+                    f"| {ratio(mse.get('equal_time_ratio'))} | {ratio(relative['ratio'])} | {m['seconds']['mean']:.2f} "
+                    f"| {m['persistent_bytes'] / 2**20:.1f} |"
+                )
+
+
 def main(path):
     results = json.load(open(path))
     if "benchmarks" in results:
         print_stages(results["benchmarks"])
+    elif "baseline" in results:
+        print_gains(results["scenes"])
     elif "settled_samples" in results:
         print_sample_times(results["settled_samples"])
     else:
