@@ -4,5 +4,7 @@
 #include <wfpg/wfpg.hpp>
 
 std::uint32_t nodes_of_second_unit() {
-  return wfpg::path_guider<wfpg::exec::seq>(wfpg::exec::seq(), wfpg::triangle_mesh_view{}).octree().node_count();
+  return wfpg::path_guider<wfpg::exec::seq>(wfpg::exec::seq(), wfpg::triangle_mesh_view{})
+      .octree()
+      .node_count();
 }

@@ -24,6 +24,7 @@ struct evaluate_each {
 template <class Exec, class F, class Result = result_of<decltype(std::declval<const F&>()(std::size_t(0)))>>
 std::vector<Result> evaluate(const Exec& exec, std::size_t n, const F& f) {
   const wfpg::buffer<Result, Exec> results(exec, n);
+  exec.fill_bytes(results.data(), 0, results.bytes());  // what lies between members is copied back too
   exec.for_each(n, evaluate_each<F, Result>{f, results.view()});
   return results.to_host(exec);
 }
@@ -45,9 +46,7 @@ struct call_once {
 /// f().
 template <class Exec, class F, class Result = result_of<decltype(std::declval<const F&>()())>>
 Result evaluate(const Exec& exec, const F& f) {
-  const wfpg::buffer<Result, Exec> result(exec, 1);
-  exec.for_each(1, evaluate_each<call_once<F>, Result>{{f}, result.view()});
-  return wfpg::read_element(exec, result.data());
+  return evaluate(exec, std::size_t(1), call_once<F>{f})[0];
 }
 
 template <class F, class T>
