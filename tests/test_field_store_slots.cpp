@@ -69,7 +69,7 @@ std::size_t guided_otherwise(const kept_box<Exec>& box, const guide_view& view,
 
 WFPG_TEST_CASE("field store: budgets of nothing, less than a slot, one slot, and 1 MiB", "[field_store]") {
   const auto wave = wall_surfaces(600, 1);
-  const std::size_t a_slot = field_store<Exec>::bytes_a_slot(24);
+  const std::size_t a_slot = field_store<Exec>::bytes_a_slot(24, false);
   for (std::size_t budget : {std::size_t(0), a_slot - 1, a_slot, 3 * a_slot + 7, std::size_t(1) << 20}) {
     kept_field_options options;
     options.budget_bytes = budget;
@@ -96,12 +96,17 @@ WFPG_TEST_CASE("field store: budgets of nothing, less than a slot, one slot, and
 WFPG_TEST_CASE("field store: a budget is spent on its slots and on nothing else", "[field_store]") {
   for (std::uint32_t resolution : {2u, 16u, 24u, 33u, 128u})
     for (std::size_t slots : {1u, 2u, 3u, 64u, 65u}) {
-      const kept_box<Exec> box(slots_of(resolution, slots));
-      const std::size_t budget = slots * field_store<Exec>::bytes_a_slot(resolution);
-      CHECK(box.counts().capacity == slots);
-      CHECK(box.counts().bytes_a_slot * slots == budget);
-      CHECK(box.store.slot_bytes() <= budget);
-      CHECK(field_store<Exec>::bytes_a_slot(resolution) >= 8 * resolution * resolution);
+      for (const bool learns : {false, true}) {
+        const kept_box<Exec> box(slots_of(resolution, slots, 4, learns), wfpg::guiding_mode::oriented, 0,
+                                 learns ? 100 : 0);
+        const std::size_t budget = slots * field_store<Exec>::bytes_a_slot(resolution, learns);
+        CHECK(box.counts().capacity == slots);
+        CHECK(box.counts().bytes_a_slot * slots == budget);
+        CHECK(box.store.slot_bytes() <= budget);
+        CHECK(budget / slots >= (learns ? 12 : 8) * resolution * resolution);
+        CHECK(box.store.learnt().empty() == !learns);
+        CHECK((box.store.value_bytes() >= 800) == learns);
+      }
     }
 }
 

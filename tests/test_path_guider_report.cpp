@@ -45,7 +45,7 @@ WFPG_TEST_CASE("path guider: memory() is what it holds of its resource, by part"
                                            "binning", "fields", "scratch"});
       CHECK(memory.persistent() <= most_persistent(guider));
       for (const wfpg::memory_part& part : memory.parts) {
-        if (part.name == std::string("paths")) CHECK(part.bytes <= 300 * 3 * 40 + 300 * 4 + 64);
+        if (part.name == std::string("paths")) CHECK(part.bytes <= 300 * 3 * 48 + 300 * 4 + 64);
         if (part.name == std::string("kept fields"))
           CHECK((part.bytes > 0) == (lifetime == field_lifetime::kept));
       }
@@ -73,7 +73,7 @@ WFPG_TEST_CASE("path guider: what recording takes is bounded by the leaves, not 
     options.deposits_per_leaf = 0;
     const wfpg::path_guider<Exec> all(exec, mesh.view(), options);
     const std::size_t wanted = 16 * some.octree().leaf_count() / 3;  // paths of 3 vertices
-    const std::size_t a_path = 3 * 40 + 4;
+    const std::size_t a_path = 3 * 48 + 4;
     INFO(paths << " paths, " << wanted << " wanted");
     CHECK(bytes_of(all, "paths") >= paths * a_path);
     CHECK(bytes_of(some, "paths") >= std::min(paths, wanted) * a_path);

@@ -1,6 +1,7 @@
 // Equation 5 on hand-made paths: what the recorder deposits at each vertex, and what it drops.
 #include "support/cached_scene.hpp"
 #include "support/catch.hpp"
+#include "support/evaluate.hpp"
 #include "support/policies.hpp"
 
 #include <wfpg/path_recorder.hpp>
@@ -9,6 +10,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -63,6 +65,56 @@ struct recording {
   }
   std::uint32_t dropped() const { return recorder.dropped(scene.exec); }
 };
+
+/// A recording for one path that fields learn from: 16 fields over the sphere, each of 2 x 2 cells, of which
+/// up is one.
+template <class Exec>
+struct learning : recording<Exec> {
+  static constexpr std::uint32_t fields = 16, cells = 4;
+
+  wfpg::buffer<wfpg::resident_field, Exec> spheres;
+  wfpg::detail::value_queue<Exec> queue;
+
+  explicit learning(bool include_emission = true, std::uint32_t max_depth = 4)
+      : recording<Exec>(1, max_depth, include_emission),
+        spheres(this->scene.exec, std::vector<wfpg::resident_field>(fields)),
+        queue(this->scene.exec, 100, fields * cells) {
+    this->recorder =
+        wfpg::path_recorder<Exec>(this->scene.exec, 1, max_depth, include_emission, 0, /*fields_learn=*/true);
+  }
+  void scatter(std::uint32_t depth, std::uint32_t field, vec3 direction) const {
+    const wfpg::path_recorder_view paths = this->view();
+    const wfpg::sampled_direction drawn{direction, 1.0f, wfpg::sampling_technique::guide, field};
+    this->scene.exec.for_each(1, [=] WFPG_HD(std::size_t) { paths.scatter(0, depth, drawn); });
+  }
+  void escape(std::uint32_t depth, vec3 throughput) const {
+    const wfpg::path_recorder_view paths = this->view();
+    this->scene.exec.for_each(1, [=] WFPG_HD(std::size_t) { paths.escape(0, depth, throughput); });
+  }
+  void finish() {
+    const wfpg::learnt_radiance_view learnt{const_view<wfpg::resident_field>(spheres), 2, queue.view()};
+    this->recorder.deposit(this->scene.exec, this->scene.view(), learnt);
+    this->scene.cache.update(this->scene.exec);
+    queue.sum(this->scene.exec);
+  }
+  /// Sum and number of what a field has learnt in all of its cells.
+  std::pair<double, std::uint32_t> learnt(std::uint32_t field) const {
+    const wfpg::detail::value_queue_view values = queue.view();
+    std::pair<double, std::uint32_t> all{0.0, 0};
+    for (std::uint32_t cell = 0; cell < cells; ++cell) {
+      const std::vector<double> found = evaluate(this->scene.exec, std::size_t(1), [=] WFPG_HD(std::size_t) {
+        double sum = 0.0;
+        const std::uint32_t n = values.take(field * cells + cell, sum);
+        return sum + 1.0e9 * n;
+      });
+      const double n = std::floor(found[0] / 1.0e9);
+      all.first += found[0] - 1.0e9 * n;
+      all.second += static_cast<std::uint32_t>(n);
+    }
+    return all;
+  }
+};
+using values = std::pair<double, std::uint32_t>;
 
 /// A path of vertices at places 0, 1, ... with these throughputs.
 template <class Exec>
@@ -294,6 +346,88 @@ WFPG_TEST_CASE("paths are recorded in parallel, by kernels", "[path_recorder]") 
       CHECK(r.leaving(depth, side) == Approx(float(length - depth) * float(1u << depth)));
   CHECK(r.scene.cache.dropped(r.scene.exec).total() == 0);
   CHECK(r.recorder.bytes() <= 200 * length * 40 + 200 * 4 + 64);
+}
+
+WFPG_TEST_CASE("fields learn what leaves the next vertex, and no more than the path tells",
+               "[path_recorder]") {
+  learning<Exec> r;
+  write_vertices(r, 0, {vec3(1.0f), vec3(0.5f)});
+  r.scatter(1, 3, up);
+  r.vertex(0, 2, place(2), up, vec3(0.25f));
+  r.scatter(2, 5, -up);  // the path ends there
+  r.radiance(0, 2, vec3(1.0f));
+  r.radiance(0, 1, vec3(8.0f));
+  r.finish();
+  CHECK(r.learnt(3) == values{4.0, 1});
+  CHECK(r.learnt(5) == values{0.0, 0});  // nothing tells what arrives from there
+  CHECK(r.learnt(0) == values{0.0, 0});  // vertex 0 had no field
+  CHECK(r.leaving(1) == Approx(18.0f));
+  CHECK(r.dropped() == 0);
+}
+
+WFPG_TEST_CASE("fields learn the environment, dark or not", "[path_recorder]") {
+  learning<Exec> r;
+  write_vertices(r, 0, {vec3(1.0f)});
+  r.scatter(0, 2, up);
+  r.escape(1, vec3(0.5f));
+  r.emission(0, 1, vec3(3.0f));
+  r.finish();
+  CHECK(r.learnt(2) == values{6.0, 1});
+  CHECK(r.leaving(0) == Approx(3.0f));
+  write_vertices(r, 0, {vec3(1.0f)});
+  r.scatter(0, 2, up);
+  r.escape(1, vec3(0.5f));
+  r.finish();
+  CHECK(r.learnt(2) == values{0.0, 1});
+  CHECK(r.dropped() == 0);
+}
+
+WFPG_TEST_CASE("fields learn no emission where it is left out", "[path_recorder]") {
+  learning<Exec> r(false);
+  write_vertices(r, 0, {vec3(1.0f)});
+  r.scatter(0, 1, up);
+  r.vertex(0, 1, place(1), up, vec3(0.5f));
+  r.emission(0, 1, vec3(7.0f));
+  r.scatter(1, 2, up);
+  r.escape(2, vec3(0.25f));
+  r.emission(0, 2, vec3(5.0f));
+  r.finish();
+  CHECK(r.learnt(1) == values{10.0, 1});  // of the environment, scattered by vertex 1
+  CHECK(r.learnt(2) == values{0.0, 1});
+  CHECK(r.leaving(0) == Approx(12.0f));
+}
+
+WFPG_TEST_CASE("directions out of order are dropped and counted", "[path_recorder]") {
+  learning<Exec> r(true, 2);
+  r.scatter(0, 1, up);  // no vertex yet
+  CHECK(r.dropped() == 1);
+  write_vertices(r, 0, {vec3(1.0f), vec3(0.5f)});
+  r.scatter(0, 1, up);  // not the last
+  CHECK(r.dropped() == 2);
+  r.scatter(1, 1, {nan, 0.0f, 0.0f});
+  CHECK(r.dropped() == 3);
+  r.escape(1, vec3(1.0f));  // there is a surface
+  CHECK(r.dropped() == 4);
+  r.escape(2, vec3(1.0f));  // beyond what is recorded: known to come, and not learnt from
+  r.emission(0, 2, vec3(1.0f));
+  r.scatter(1, wfpg::no_field, up);
+  CHECK(r.dropped() == 4);
+  r.finish();
+  CHECK(r.learnt(1) == values{0.0, 0});
+  CHECK(r.leaving(1) == Approx(2.0f));
+}
+
+WFPG_TEST_CASE("a recorder that no field learns from takes directions and escapes for nothing",
+               "[path_recorder]") {
+  const recording<Exec> r(1, 3, true);
+  const wfpg::path_recorder_view paths = r.view();
+  r.vertex(0, 0, place(0), up, vec3(1.0f));
+  r.scene.exec.for_each(1, [=] WFPG_HD(std::size_t) {
+    paths.scatter(0, 0, {up, 1.0f, wfpg::sampling_technique::guide, 0});
+    paths.escape(0, 1, vec3(0.5f));
+    paths.scatter(9, 9, {up, 1.0f, wfpg::sampling_technique::guide, 0});
+  });
+  CHECK(r.dropped() == 0);
 }
 
 }  // namespace

@@ -188,7 +188,7 @@ made_fields make_fields(const lit_box<Exec>& box, const std::vector<test_surface
   const wfpg::buffer<std::uint32_t, Exec> words(exec, n * resolution * resolution);
   const wfpg::buffer<wfpg::resident_field, Exec> resident(exec, n);
   const wfpg::buffer<std::uint32_t, Exec> field_of_ray(
-      exec, std::vector<std::uint32_t>(wave.size(), wfpg::guide_view::no_field));
+      exec, std::vector<std::uint32_t>(wave.size(), wfpg::no_field));
   wfpg::detail::for_each_field(
       exec, fields, caster,
       wfpg::detail::resident_sink{

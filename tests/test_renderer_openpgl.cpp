@@ -141,19 +141,19 @@ TEST_CASE("Open PGL learns the light that drawn directions bring", "[renderer][o
   // A lamp and a lit surface, seen through what takes half of the light; the first vertex is lit too.
   recorder.vertex(0, 0, vec3(0.0f), up, white);
   recorder.radiance(0, 0, vec3(7.0f));
-  recorder.scatter(0, 0, diffuse, drawn);
+  recorder.drawn(0, 0, diffuse, drawn);
   recorder.vertex(0, 1, 2.0f * up, -up, 0.5f * scattered);
   recorder.emission(0, 1, 0.5f * scattered * 3.0f);
   recorder.radiance(0, 1, 0.5f * scattered * 1.0f);
   // The environment.
   recorder.vertex(1, 0, vec3(1.0f), up, white);
-  recorder.scatter(1, 0, diffuse, drawn);
+  recorder.drawn(1, 0, diffuse, drawn);
   recorder.emission(1, 1, scattered * 4.0f);
   // A lamp in a mirror.
   recorder.vertex(2, 0, vec3(2.0f), up, white);
-  recorder.scatter(2, 0, diffuse, drawn);
+  recorder.drawn(2, 0, diffuse, drawn);
   recorder.vertex(2, 1, vec3(2.0f) + 3.0f * up, -up, scattered);
-  recorder.scatter(2, 1, mirror, mirrored);
+  recorder.drawn(2, 1, mirror, mirrored);
   recorder.vertex(2, 2, vec3(2.0f) + 8.0f * up, -up, 0.5f * scattered);
   recorder.emission(2, 2, 0.5f * scattered * 6.0f);
   paths.make_samples(exec);

@@ -85,7 +85,7 @@ struct sample_openpgl {
     if (surface.active) {
       mixture = {field.at(surface), fraction};
       directions[i] = mixture.sample(surface, random(ray, 0).x, random(ray, 1));
-      recorder.scatter(surfaces.queue[ray], depth, surface, directions[i]);
+      recorder.drawn(surfaces.queue[ray], depth, surface, directions[i]);
     }
     if constexpr (!std::is_same_v<Queries, wfpg::no_queries>) {
       const vec3 direction = queries.query(ray);

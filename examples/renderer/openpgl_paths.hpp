@@ -69,20 +69,24 @@ class openpgl_recorder {
     }
   }
 
+  // What it wants of these, drawn() and emission() tell.
+  void scatter(std::uint32_t, std::uint32_t, const wfpg::sampled_direction&) const {}
+  void escape(std::uint32_t, std::uint32_t, vec3) const {}
+
   /// How the path goes on from vertex `depth`, a point of surface s.
-  void scatter(std::uint32_t path, std::uint32_t depth, const wfpg::surface<bsdf>& s,
-               const wfpg::sampled_direction& drawn) const {
-    if (!(drawn.pdf > 0.0f)) return;  // it does not
-    const bool delta = drawn.technique == wfpg::sampling_technique::delta;
+  void drawn(std::uint32_t path, std::uint32_t depth, const wfpg::surface<bsdf>& s,
+             const wfpg::sampled_direction& next) const {
+    if (!(next.pdf > 0.0f)) return;  // it does not
+    const bool delta = next.technique == wfpg::sampling_technique::delta;
     const wfpg::glossy_part glossy = s.bsdf.glossy(s.outgoing);
     segment& here = at(path, depth);
     here.normal = to_pgl(s.normal);
-    here.directionIn = to_pgl(drawn.direction);
-    here.pdfDirectionIn = drawn.pdf;
+    here.directionIn = to_pgl(next.direction);
+    here.pdfDirectionIn = next.pdf;
     here.isDelta = delta;
-    here.scatteringWeight = to_pgl(delta ? s.bsdf.delta_weight_rgb(s.outgoing, drawn.direction)
-                                         : s.bsdf.eval_rgb(s.outgoing, drawn.direction) / drawn.pdf);
-    here.eta = s.bsdf.ior_beyond(s.outgoing, drawn.direction);
+    here.scatteringWeight = to_pgl(delta ? s.bsdf.delta_weight_rgb(s.outgoing, next.direction)
+                                         : s.bsdf.eval_rgb(s.outgoing, next.direction) / next.pdf);
+    here.eta = s.bsdf.ior_beyond(s.outgoing, next.direction);
     here.roughness = 1.0f + glossy.share * (glossy.alpha - 1.0f);
   }
 

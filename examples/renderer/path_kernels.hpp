@@ -117,6 +117,7 @@ struct trace_paths {
     ++segments[id];
     const triangle_hit hit = answers.hit(slot, path.ray());
     if (!hit.is_hit()) {
+      recorder.escape(id, at.depth, path.throughput);
       gather(id,
              path.throughput * world.scene.environment.radiance(path.direction) * environment_weight(path));
       return end(id);
@@ -246,6 +247,7 @@ struct shade_paths {
     if (!queue.holds(slot)) return;
     const std::uint32_t id = queue[slot];
     if (!queries.empty()) add_light(slot, id);
+    recorder.scatter(id, at.depth, directions[slot]);
     paths.update(id, [&](path_state& path) {
       const bool goes_on = scatter(vertices[id], directions[slot], path) &&
                            survive_roulette(path, at.draw(id, dimension::roulette).x);

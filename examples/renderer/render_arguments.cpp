@@ -104,6 +104,8 @@ void add_guider_options(CLI::App& app, render_options& options) {
   app.add_option("--slot-resolution", options.slot_resolution, "cells a side of kept fields (default: 24)");
   app.add_option("--recast", options.recast, "a refresh casts one cone in so many again (default: 8)")
       ->check(CLI::Range(1, 1 << 20));
+  add_choice<bool>(app, "--learn", options.learn, {{"on", true}, {"off", false}},
+                   "kept fields learn from paths, beside their cones (default: on)");
   app.add_option("--field-budget", options.field_budget, "memory of kept fields, such as 16MiB (the default)")
       ->transform(CLI::AsSizeValue(false));
   app.add_option("--product-resolution", options.product_resolution,

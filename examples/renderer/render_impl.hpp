@@ -96,7 +96,9 @@ inline wfpg::guider_options guider_options_of(const render_options& options) {
   guided.min_bin_level = options.min_bin_level;
   guided.mode = options.mode == guiding::plain ? wfpg::guiding_mode::plain : wfpg::guiding_mode::oriented;
   guided.guide_fraction = options.guide_fraction;
-  guided.include_emission = !options.nee;
+  guided.kept.learn = options.learn;
+  // With next-event estimation emission is worth its MIS weight, which fields that learn find out.
+  guided.include_emission = !options.nee || (options.lifetime == fields::kept && options.learn);
   guided.unguided_samples = wfpg::unguided_samples(combination_of(options));
   guided.seed = options.seed;
   guided.max_paths = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);

@@ -14,6 +14,8 @@ struct null_recorder {
   WFPG_HD void vertex(std::uint32_t, std::uint32_t, wfpg::vec3, wfpg::vec3, wfpg::vec3) const {}
   WFPG_HD void radiance(std::uint32_t, std::uint32_t, wfpg::vec3) const {}
   WFPG_HD void emission(std::uint32_t, std::uint32_t, wfpg::vec3) const {}
+  WFPG_HD void scatter(std::uint32_t, std::uint32_t, const wfpg::sampled_direction&) const {}
+  WFPG_HD void escape(std::uint32_t, std::uint32_t, wfpg::vec3) const {}
 };
 
 /// Draws a direction for each ray from its BSDF, with the numbers that a guider would use for that: a

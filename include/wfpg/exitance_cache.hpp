@@ -10,6 +10,7 @@
 #include <wfpg/detail/atomic.hpp>
 #include <wfpg/detail/bottom_up.hpp>
 #include <wfpg/detail/thrust.hpp>
+#include <wfpg/detail/value_queue.hpp>
 #include <wfpg/detail/voxel_normals.hpp>
 #include <wfpg/sparse_voxel_octree.hpp>
 #include <wfpg/types.hpp>
@@ -28,16 +29,6 @@ struct dropped_deposits {
 };
 
 namespace detail {
-
-/// An entry of the queue that is nobody's.
-inline constexpr std::uint64_t dropped_deposit = 0xffffffffull;
-
-/// What a leaf's side has received since the last update.
-struct pending_deposits {
-  std::uint64_t sum = 0;  ///< in units of exact_sum, while an update is made
-  std::uint32_t count = 0;
-  std::uint32_t largest = 0;  ///< bits of the largest radiance
-};
 
 /// What a leaf has received, by side; together, since they are read together.
 struct leaf_exitance {
@@ -103,112 +94,46 @@ class exitance_cache_view {
   /// The same for several deposits of one thread: reserve() gives the first of n entries in a row; all are
   /// written, then all are counted. Writing first lets a processor overlap look-ups, which the atomics of
   /// counting would put in order.
-  WFPG_HD std::uint32_t reserve(std::uint32_t n) const {
-    return detail::atomic_add(counters_ + counter_queued, n);
-  }
+  WFPG_HD std::uint32_t reserve(std::uint32_t n) const { return queue_.reserve(n); }
   WFPG_HD void write(std::uint32_t entry, vec3 position, vec3 direction, float radiance) const {
     const bool valid = detail::is_finite(radiance) && radiance >= 0.0f && detail::is_finite(position) &&
                        detail::is_finite(direction);
     const node_id leaf = valid ? tree_.nearest_leaf(position) : invalid_node;
-    const bool fits = entry < capacity_;
-    std::uint64_t word = detail::dropped_deposit;
-    if (leaf != invalid_node && fits) {
-      const std::uint32_t key = 2 * (leaf - tree_.first_leaf()) + side_facing(leaf, direction);
-      word = std::uint64_t(detail::float_bits(radiance + 0.0f)) << 32 | key;  // + 0: no negative zero
-    } else {
-      const auto reason = !valid                 ? counter_invalid
-                          : leaf == invalid_node ? counter_outside
-                                                 : counter_overflow;
-      detail::atomic_add(counters_ + reason, 1);
-    }
-    if (fits) queue_[entry] = word;
+    const bool fits = queue_.fits(entry);
+    if (leaf != invalid_node && fits)
+      return queue_.write(entry, 2 * (leaf - tree_.first_leaf()) + side_facing(leaf, direction), radiance);
+    const auto reason = !valid ? counter_invalid : leaf == invalid_node ? counter_outside : counter_overflow;
+    detail::atomic_add(counters_ + reason, 1);
+    if (fits) queue_.drop(entry);
   }
-  WFPG_HD void count(std::uint32_t entry) const {
-    if (entry >= capacity_ || queue_[entry] == detail::dropped_deposit) return;
-    detail::pending_deposits& pending = pending_[static_cast<std::uint32_t>(queue_[entry])];
-    const auto bits = static_cast<std::uint32_t>(queue_[entry] >> 32);
-    detail::atomic_add(&pending.count, 1);
-    if (detail::atomic_load(&pending.largest) < bits) detail::atomic_max(&pending.largest, bits);
-  }
+  WFPG_HD void count(std::uint32_t entry) const { queue_.count(entry); }
 
  private:
   template <class Exec>
   friend class exitance_cache;
-  enum : std::uint32_t { counter_invalid, counter_outside, counter_overflow, counter_queued, counters };
+  enum : std::uint32_t { counter_invalid, counter_outside, counter_overflow, counters };
 
   sparse_voxel_octree_view tree_;
   const std::uint16_t* normals_ = nullptr;       // a node
   const std::uint8_t* swapped_sides_ = nullptr;  // an inner node: a bit a child
   const detail::leaf_exitance* leaves_ = nullptr;
-  const float* inner_radiance_ = nullptr;        // an inner node and side; negative: no data
-  std::uint64_t* queue_ = nullptr;               // bits of the radiance above, the leaf and side below
-  detail::pending_deposits* pending_ = nullptr;  // a leaf and side
+  const float* inner_radiance_ = nullptr;  // an inner node and side; negative: no data
+  detail::value_queue_view queue_;         // a leaf and side
   std::uint32_t* counters_ = nullptr;
-  std::uint32_t capacity_ = 0;
 };
 
 namespace detail {
 
-/// Adds `n` values that sum to `sum` to a mean of `count` values. The count stays at its largest value when
-/// it is reached: from then on old values fade, and nothing overflows.
-WFPG_HD inline void add_to_mean(double& mean, std::uint32_t& count, double sum, std::uint64_t n) {
-  const std::uint64_t total = count + n;
-  mean += (sum - static_cast<double>(n) * mean) / static_cast<double>(total);
-  count = static_cast<std::uint32_t>(min<std::uint64_t>(total, 0xffffffffull));
-}
-
-/// The exact sum of non-negative finite floats in any order: integers in units of the largest one's last
-/// bits, of which 39 lie below its own and make room for n to carry.
-class exact_sum {
- public:
-  /// `largest`: the bits of the largest value; n > 0 values follow.
-  WFPG_HD exact_sum(std::uint32_t largest, std::uint32_t n)
-      : exponent_(exponent(largest)), shift_(39 - bits_of(n - 1)) {}
-  /// A value in these units.
-  WFPG_HD std::uint64_t term(std::uint32_t bits) const {
-    const std::uint64_t mantissa = bits >> 23 ? (bits & 0x7fffffu) | 0x800000u : bits;
-    const int left = shift_ + exponent(bits) - exponent_;
-    return left >= 0 ? mantissa << left : (left > -32 ? mantissa >> -left : 0);
-  }
-  WFPG_HD double value(std::uint64_t sum) const {
-    const std::uint64_t unit = static_cast<std::uint64_t>(1023 + exponent_ - 150 - shift_)
-                               << 52;  // a power of 2
-    double scale;
-    memcpy(&scale, &unit, sizeof scale);
-    return static_cast<double>(sum) * scale;
-  }
-
- private:
-  WFPG_HD static int exponent(std::uint32_t bits) { return max(static_cast<int>(bits >> 23), 1); }
-
-  int exponent_;
-  int shift_;
-};
-
-/// Adds each deposit to its side's sum.
-struct sum_deposits {
-  array_view<const std::uint64_t> queue;
-  pending_deposits* pending;
-
-  WFPG_HD void operator()(std::size_t i) const {
-    if (queue[i] == dropped_deposit) return;
-    pending_deposits& to = pending[static_cast<std::uint32_t>(queue[i])];
-    atomic_add(&to.sum, exact_sum(to.largest, to.count).term(static_cast<std::uint32_t>(queue[i] >> 32)));
-  }
-};
-
 /// Adds the sums of a leaf's sides to its means.
 struct fold_deposits {
-  pending_deposits* pending;
+  value_queue_view queue;
   leaf_exitance* leaves;
 
   WFPG_HD void operator()(std::size_t leaf) const {
     for (std::uint32_t side = 0; side < 2; ++side) {
-      pending_deposits& from = pending[2 * leaf + side];
-      if (from.count == 0) continue;
-      const double sum = exact_sum(from.largest, from.count).value(from.sum);
-      add_to_mean(leaves[leaf].means[side], leaves[leaf].counts[side], sum, from.count);
-      from = {};
+      double sum;
+      const std::uint32_t n = queue.take(2 * leaf + side, sum);
+      if (n > 0) add_to_mean(leaves[leaf].means[side], leaves[leaf].counts[side], sum, n);
     }
   }
 };
@@ -249,18 +174,15 @@ class exitance_cache {
         swapped_sides_(exec, tree.node_count() - checked_leaves(tree.leaf_count())),
         leaves_(exec, tree.leaf_count()),
         inner_radiance_(exec, 2 * std::size_t(tree.node_count() - tree.leaf_count())),
-        queue_(exec, checked(queue_capacity)),
-        pending_(exec, queue_capacity > 0 ? 2 * std::size_t(tree.leaf_count()) : 0),
+        queue_(exec, checked(queue_capacity), 2 * std::size_t(tree.leaf_count())),
         counters_(exec, exitance_cache_view::counters) {
     view_.tree_ = tree.view();
     view_.normals_ = normals_.data();
     view_.leaves_ = leaves_.data();
     view_.inner_radiance_ = inner_radiance_.data();
     view_.swapped_sides_ = swapped_sides_.data();
-    view_.queue_ = queue_.data();
-    view_.pending_ = pending_.data();
+    view_.queue_ = queue_.view();
     view_.counters_ = counters_.data();
-    view_.capacity_ = static_cast<std::uint32_t>(queue_capacity);
     detail::build_voxel_normals(exec, tree, fragments, normals_.view(), swapped_sides_.view());
     ::thrust::fill_n(exec.thrust(), counters_.data(), counters_.size(), 0u);
     clear(exec);
@@ -270,26 +192,22 @@ class exitance_cache {
   std::size_t persistent_bytes() const {
     return normals_.bytes() + swapped_sides_.bytes() + leaves_.bytes() + inner_radiance_.bytes();
   }
-  std::size_t transient_bytes() const { return queue_.bytes() + pending_.bytes() + counters_.bytes(); }
+  std::size_t transient_bytes() const { return queue_.bytes() + counters_.bytes(); }
 
   /// Forgets all light, and what is queued.
   void clear(const Exec& exec) {
     exec.fill_bytes(leaves_.data(), 0, leaves_.bytes());  // means and counts of zero
     ::thrust::fill_n(exec.thrust(), inner_radiance_.data(), inner_radiance_.size(), -1.0f);
-    exec.fill_bytes(pending_.data(), 0, pending_.bytes());
-    ::thrust::fill_n(exec.thrust(), counters_.data() + exitance_cache_view::counter_queued, 1, 0u);
+    queue_.clear(exec);
   }
 
   /// Folds queued deposits into the leaves and averages bottom-up. O(deposits + nodes), however many deposits
   /// one leaf has. Nothing to do without a queue.
   void update(const Exec& exec) {
-    if (queue_.size() == 0) return;
-    const std::uint32_t* const queued = counters_.data() + exitance_cache_view::counter_queued;
-    exec.for_each(exec::device_count{queued, queue_.size()},
-                  detail::sum_deposits{queue_.view(), pending_.data()});
-    exec.for_each(leaves_.size(), detail::fold_deposits{pending_.data(), leaves_.data()});
+    if (queue_.capacity() == 0) return;
+    queue_.sum(exec);
+    exec.for_each(leaves_.size(), detail::fold_deposits{queue_.view(), leaves_.data()});
     detail::for_each_bottom_up(exec, view_.tree_, 0, detail::average_children{view_, inner_radiance_.data()});
-    ::thrust::fill_n(exec.thrust(), counters_.data() + exitance_cache_view::counter_queued, 1, 0u);
   }
 
   /// Deposits dropped since the cache was built; waits for the work before it.
@@ -314,8 +232,7 @@ class exitance_cache {
   buffer<std::uint8_t, Exec> swapped_sides_;
   buffer<detail::leaf_exitance, Exec> leaves_;
   buffer<float, Exec> inner_radiance_;
-  buffer<std::uint64_t, Exec> queue_;
-  buffer<detail::pending_deposits, Exec> pending_;
+  detail::value_queue<Exec> queue_;  // a leaf and side
   buffer<std::uint32_t, Exec> counters_;
   exitance_cache_view view_;
 };

@@ -1,18 +1,21 @@
 // Kept fields: incident radiance fields that live on across depths and samples, in slots under a byte budget,
-// keyed by (octree node, orientation). A slot remembers what each cell's cone hit; a refresh reads the cache
-// anew through those hits and casts only a part of the cones again. Fields are the paper's (section 3.3), and
-// their nodes are chosen as its bins are (Algorithm 2); that they are kept is wfpg's own.
+// keyed by (octree node, orientation). A slot remembers what each cell's cone hit, and what paths found along
+// its directions; a refresh reads the cache anew through those hits and casts only a part of the cones again.
+// Fields are the paper's (section 3.3), and their nodes are chosen as its bins are (Algorithm 2); that they
+// are kept and that they learn is wfpg's own.
 //
 // A sample:  begin_sample, then for each wave prepare, then end_sample. Nothing is read back to the host with
 // an inline caster.
 //
 // Cost of a wave of n rays: O(n · depth) look-ups; F² cones a new slot, F²/R a refreshed one; O(F²) either.
-// Memory: the budget, 4 bytes a ray, 8 bytes a leaf and 4 an inner node.
+// Memory: the budget, 4 bytes a ray, 8 bytes a leaf and 4 an inner node; where fields learn, in a sample, 16
+// bytes a cell and 8 a value.
 #pragma once
 
 #include <wfpg/detail/bin_marks.hpp>
 #include <wfpg/detail/field_slots.hpp>
 #include <wfpg/detail/kept_field.hpp>
+#include <wfpg/detail/learnt_radiance.hpp>
 #include <wfpg/detail/serve_rays.hpp>
 #include <wfpg/guide_view.hpp>
 #include <wfpg/radiance_field.hpp>
@@ -27,7 +30,9 @@ namespace wfpg {
 struct kept_field_options {
   std::uint32_t resolution = 24;  ///< cells along a field's side, in [2, 128]
   std::uint32_t recast = 8;       ///< R: a refresh casts one cone in so many again, at least 1
-  std::size_t budget_bytes = std::size_t(16) << 20;  ///< of the slots; one takes about 8 F² bytes
+  std::size_t budget_bytes = std::size_t(16) << 20;  ///< of the slots; one takes about 12 F² bytes, or 8
+  bool learn = true;          ///< from paths: where path_recorder_view::scatter() is called, or by itself
+  float cone_samples = 1.0f;  ///< what a cell's cone counts for beside so many paths, positive and finite
   std::uint64_t max_wave_cones =
       detail::build_limits::none;   ///< cones of a wave; what would need more waits, or goes unguided
   std::uint32_t idle_samples = 16;  ///< a slot that no ray used for so many is freed, at least 1
@@ -65,10 +70,11 @@ template <class Exec>
 class field_store {
  public:
   field_store() = default;
-  /// Serves waves of up to `max_rays` rays. Throws out_of_memory; std::invalid_argument where an option is
-  /// out of its range, or the octree has 2²⁸ nodes or more.
+  /// Serves waves of up to `max_rays` rays, and learns up to `max_values`, at most 2³¹, in a sample. Throws
+  /// out_of_memory; std::invalid_argument where an option is out of its range, or the octree has 2²⁸ nodes or
+  /// more.
   field_store(const Exec& exec, const sparse_voxel_octree_view& tree, const binning_options& binning,
-              const kept_field_options& options, std::size_t max_rays);
+              const kept_field_options& options, std::size_t max_rays, std::size_t max_values = 0);
 
   /// Begins a sample, counted from 1: frees slots that are no longer used.
   void begin_sample(const Exec& exec, std::uint32_t sample);
@@ -89,8 +95,21 @@ class field_store {
   guide_view prepare(const Exec& exec, const kept_field_wave<Surfaces>& wave, const Caster& caster,
                      std::size_t caster_buffer_bytes);
 
-  /// Ends the sample; after samples 1, 2, 4, 8, ... chooses the nodes anew by the rays counted so far.
+  /// Where the sample's paths tell what they found; empty where fields do not learn.
+  learnt_radiance_view learnt() const {
+    if (!learns()) return {};
+    return {array_view<const resident_field>(fields_.data(), capacity_), options_.resolution, queue_.view()};
+  }
+
+  /// Ends the sample: fields learn; after samples 1, 2, 4, 8, ... chooses the nodes anew by the rays counted
+  /// so far.
   void end_sample(const Exec& exec);
+
+  /// Forgets what fields learnt.
+  void forget(const Exec& exec) {
+    exec.fill_bytes(learnt_.data(), 0, learnt_.bytes());
+    if (learns()) queue_.clear(exec);
+  }
 
   /// Geometry moved inside `bounds`, or light in a way that hits do not tell: fields from which they may be
   /// seen are cast anew when they are next used, or within 4 samples after 32 more. Light that changes on
@@ -104,7 +123,7 @@ class field_store {
   /// On the device.
   const detail::field_store_state* state() const { return state_.data(); }
   /// Of the last wave, on the device.
-  const detail::field_wave_counts* last_wave() const { return counts_.data() + (waves_ + 1) % 2; }
+  const detail::field_wave_counts* last_wave() const { return other_counts(); }
   /// Cones of a refresh.
   std::uint32_t refresh_cones() const { return detail::refresh_cones(options_.resolution, options_.recast); }
   /// Waits for the work before it.
@@ -116,11 +135,16 @@ class field_store {
   /// Of a wave in flight.
   std::size_t wave_bytes() const { return field_of_ray_.bytes() + counts_.bytes() + state_.bytes(); }
 
+  /// Of what a sample learns.
+  std::size_t value_bytes() const { return queue_.bytes(); }
+
   /// Bytes of the budget that one slot takes at a resolution.
-  static std::size_t bytes_a_slot(std::uint32_t resolution) {
+  static std::size_t bytes_a_slot(std::uint32_t resolution, bool learns = true) {
     const std::size_t cells = std::size_t(resolution) * resolution;
-    return (sizeof(detail::cone_hit) + sizeof(std::uint32_t)) * cells + sizeof(detail::field_slot) +
-           sizeof(resident_field) + words_a_slot * sizeof(std::uint32_t);
+    const std::size_t a_cell =
+        sizeof(detail::cone_hit) + sizeof(std::uint32_t) + (learns ? sizeof(detail::learnt_mean) : 0);
+    return a_cell * cells + sizeof(detail::field_slot) + sizeof(resident_field) +
+           words_a_slot * sizeof(std::uint32_t);
   }
 
  private:
@@ -129,6 +153,7 @@ class field_store {
   static constexpr std::size_t words_a_slot = 2 + 2 + 1 + 1 + 8 + 4 + 4;
 
   static const kept_field_options& checked(const kept_field_options& options, std::uint32_t nodes);
+  static kept_field_options completed(kept_field_options options, std::size_t max_values);
   detail::field_slots_view view() const { return {slots_.view(), table_.data(), mask(), settled_.data()}; }
   detail::wanted_keys wanted() const {
     return {wanted_.data(), static_cast<std::uint32_t>(wanted_.size() - 1)};
@@ -137,9 +162,12 @@ class field_store {
   static constexpr std::uint32_t turns = 4;
   bool builds_in_wave() const { return sample_ <= busy_until_ || (sample_ + waves_) % turns == 0; }
   void expect_builds(std::uint32_t samples) { busy_until_ = detail::max(busy_until_, sample_ + samples); }
+  bool learns() const { return learnt_.size() > 0; }
   bool limits_builds() const { return options_.max_wave_cones != detail::build_limits::none; }
   std::uint32_t cells_a_field() const { return options_.resolution * options_.resolution; }
+  // Of the wave that is made, and of the one before or after it.
   detail::field_wave_counts* counts() { return counts_.data() + waves_ % 2; }
+  detail::field_wave_counts* other_counts() const { return counts_.data() + (waves_ + 1) % 2; }
   // Counts settle soon, and sooner where a leaf has many rays of a wave.
   bool counts_rays() const { return sample_ <= 8 || sample_ % (sample_ <= 32 ? 4 : 16) == 0; }
   detail::counted_rays counted() const {
@@ -151,6 +179,7 @@ class field_store {
   template <class Surfaces>
   void find(const Exec& exec, const kept_field_wave<Surfaces>& wave);
   void bear(const Exec& exec);
+  void learn(const Exec& exec);
   void list(const Exec& exec, std::uint64_t seed, const detail::build_list& builds);
   template <class Builder, class Caster>
   void build(const Exec& exec, const Builder& builder, const Caster& caster, std::size_t buffer_bytes);
@@ -170,9 +199,11 @@ class field_store {
   bool in_wave_ = false;           // also after one whose caster threw
   detail::bin_marks<Exec> marks_;
   buffer<detail::field_slot, Exec> slots_;
-  buffer<resident_field, Exec> fields_;  // a slot
-  buffer<std::uint32_t, Exec> words_;    // a slot: its distribution
-  buffer<detail::cone_hit, Exec> hits_;  // a slot: its cells
+  buffer<resident_field, Exec> fields_;       // a slot
+  buffer<std::uint32_t, Exec> words_;         // a slot: its distribution
+  buffer<detail::cone_hit, Exec> hits_;       // a slot: its cells
+  buffer<detail::learnt_mean, Exec> learnt_;  // the same, where fields learn
+  detail::value_queue<Exec> queue_;
   buffer<std::uint64_t, Exec> table_;
   buffer<std::uint8_t, Exec> settled_;
   buffer<std::uint32_t, Exec> wanted_, wanted_through_;
@@ -180,7 +211,7 @@ class field_store {
   buffer<std::uint64_t, Exec> through_;            // a slot: scans
   buffer<std::uint32_t, Exec> field_of_ray_;
   buffer<detail::field_store_state, Exec> state_;
-  buffer<detail::field_wave_counts, Exec> counts_;  // of this wave, and of the one before or after
+  buffer<detail::field_wave_counts, Exec> counts_;
 };
 
 }  // namespace wfpg

@@ -36,8 +36,6 @@ struct resident_fields {
 /// from its field times its BSDF.
 class guide_view {
  public:
-  static constexpr std::uint32_t no_field = 0xffffffffu;
-
   guide_view() = default;
   WFPG_HD guide_view(array_view<const std::uint32_t> field_of_ray, const resident_fields& fields)
       : field_of_ray_(field_of_ray), fields_(fields) {}
@@ -52,7 +50,7 @@ class guide_view {
   WFPG_HD guide_mixture mixture(std::uint32_t ray) const {
     const resident_field found = info(ray);
     if (!(found.fraction > 0.0f)) return {};
-    return {fields_.field(field_of_ray_[ray], found), found.fraction};
+    return {fields_.field(field_of_ray_[ray], found), found.fraction, field_of_ray_[ray]};
   }
   /// The ray's mixture of product and BSDF: P² to 2 P² evaluations of the BSDF into `words`, P² of them,
   /// which it reads as long as it lives. Precondition: product_resolution() > 0.
@@ -61,7 +59,7 @@ class guide_view {
     const resident_field found = info(ray);
     if (!(found.fraction > 0.0f)) return {};
     return {detail::multiply(fields_.field(field_of_ray_[ray], found), fields_.points, s, words),
-            found.fraction};
+            found.fraction, field_of_ray_[ray]};
   }
 
   /// A direction and its density from the field alone. Precondition: guides(ray).
@@ -69,6 +67,7 @@ class guide_view {
     sampled_direction result;
     result.direction = mixture(ray).field.sample(u, result.pdf);
     result.technique = sampling_technique::guide;
+    result.field = field_of_ray_[ray];
     return result;
   }
   /// The field's density of a unit direction, per steradian. Precondition: guides(ray).

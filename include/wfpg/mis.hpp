@@ -31,11 +31,15 @@ enum class sampling_technique : std::uint32_t {
   delta,  ///< a delta BSDF: pdf is its lobe's probability
 };
 
+/// Where a number of a field would be.
+inline constexpr std::uint32_t no_field = 0xffffffffu;
+
 /// The next direction of a path.
 struct sampled_direction {
   vec3 direction{0.0f};  ///< unit length, away from the surface
   float pdf = 0.0f;  ///< of the whole mixture, per steradian; of a delta lobe its probability; 0 with none
   sampling_technique technique = sampling_technique::none;
+  std::uint32_t field = no_field;  ///< the kept field in the mixture, for path_recorder_view::scatter()
 };
 
 /// The shares of what a mixture draws from; their sum is 1. A BSDF whose parts cannot be drawn alone is all
@@ -60,6 +64,7 @@ template <class Field>
 struct basic_guide_mixture {
   Field field;
   float fraction = 0.0f;
+  std::uint32_t number = no_field;  ///< of the field, which directions carry with them
 
   /// A direction from a number in [0,1) that chooses the technique and u in [0,1)². O(log F) and the BSDF.
   template <class Bsdf>
@@ -68,6 +73,7 @@ struct basic_guide_mixture {
     if (!guides()) return from_bsdf(s.bsdf.sample(s.outgoing, u), sampling_technique::bsdf);
     const mixture_shares shares = shares_of(s);
     sampled_direction result;
+    result.field = number;
     float of_field;
     if (u_technique < shares.guide) {
       result.direction = field.sample(u, of_field);
@@ -113,7 +119,7 @@ struct basic_guide_mixture {
 
   WFPG_HD static sampled_direction from_bsdf(const bsdf_sample& drawn, sampling_technique technique) {
     if (!(drawn.pdf > 0.0f)) return {};
-    return {drawn.direction, drawn.pdf, technique};
+    return {drawn.direction, drawn.pdf, technique, no_field};
   }
 
   template <class Bsdf>

@@ -56,8 +56,9 @@ struct guider_options {
   /// Share of guided samples, (0, 1], less than 1 with products; 0: 0.5 in plain mode, 0.7 in oriented mode,
   /// 0.5 in transient oriented bins of less than c_ray rays.
   float guide_fraction = 0.0f;
-  bool include_emission =
-      true;  ///< guide toward emitters themselves; false where next-event estimation finds them
+  /// Guide toward emitters themselves. Beside next-event estimation they count with their MIS weight, and false
+  /// leaves them to it: better where fields do not learn.
+  bool include_emission = true;
   std::uint32_t unguided_samples =
       1;  ///< samples at the beginning that only record ("PT first", section 3.7)
   std::uint64_t seed = 0;
@@ -118,13 +119,19 @@ class path_guider {
   void invalidate_all() {
     if (keeps_fields()) store_.invalidate_all(exec_);
   }
-  /// Forgets all cached light: for lights that moved. Kept fields follow without being cast anew.
-  void forget_light() { cache_.clear(exec_); }
+  /// Forgets all cached light, and what kept fields learnt: for lights that moved. Fields follow without
+  /// being cast anew.
+  void forget_light() {
+    cache_.clear(exec_);
+    if (keeps_fields()) store_.forget(exec_);
+  }
 
   /// Where the renderer's kernels record their paths.
   path_recorder_view recorder() const { return recorder_.view(); }
   /// Where they deposit, and what they read, without it.
   exitance_cache_view cache() const { return cache_.view(); }
+  /// Where they tell kept fields what their directions found, without it; empty where fields do not learn.
+  learnt_radiance_view learnt() const { return store_.learnt(); }
   const sparse_voxel_octree<Exec>& octree() const { return octree_; }
   const guider_options& options() const { return options_; }
   /// Whether the sample that has begun is guided, and how many cells transient fields have at a depth.

@@ -1,14 +1,17 @@
 // The vertices of the paths in flight, and the radiance that leaves each of them, by back-propagation (paper,
 // Eq. 5): what arrives at a path's origin, divided by the throughput up to a vertex, left that vertex. Of
-// large waves a part is recorded, another in each sample, which is wfpg's own: leaves need no more.
+// large waves a part is recorded, another in each sample, which is wfpg's own: leaves need no more. So is
+// that kept fields learn from paths what their directions found.
 //
-// Memory: 40 bytes a vertex, recorded paths × depths of them, and 4 a recorded path.
+// Memory: 40 bytes a vertex, 48 where fields learn, recorded paths × depths of them, and 4 a recorded path.
 #pragma once
 
 #include <wfpg/buffer.hpp>
 #include <wfpg/detail/atomic.hpp>
+#include <wfpg/detail/learnt_radiance.hpp>
 #include <wfpg/detail/math.hpp>
 #include <wfpg/exitance_cache.hpp>
+#include <wfpg/mis.hpp>
 #include <wfpg/octahedral_map.hpp>
 #include <wfpg/types.hpp>
 
@@ -28,6 +31,12 @@ struct alignas(16) recorded_place {
 struct alignas(8) recorded_light {
   vec3 throughput;
   vec3 contribution;
+};
+
+/// Where the path goes from there, and the kept field that knew.
+struct alignas(8) recorded_direction {
+  std::uint32_t field;
+  std::uint32_t direction;  // pack_direction
 };
 
 /// Which paths are recorded: of each 2^shift runs of 32 paths one, drawn anew for each sample. Neighbours are
@@ -74,7 +83,29 @@ class path_recorder_view {
     const std::size_t slot = depth * recorded_ + place;
     places_[slot] = {position, pack_direction(outgoing)};
     light_[slot] = {throughput, vec3(0.0f)};
+    if (learns()) directions_[slot].field = no_field;
     lengths_[place] = depth + 1;
+  }
+
+  /// How the path goes on from vertex `depth`, its last so far, so that the kept field that the direction was
+  /// drawn beside learns what it finds. Not needed, and does nothing, where fields do not learn.
+  WFPG_HD void scatter(std::size_t path, std::uint32_t depth, const sampled_direction& drawn) const {
+    std::uint32_t place;
+    if (!learns() || drawn.field == no_field || !find(path, place)) return;
+    if (depth >= max_depth_ || depth + 1 != lengths_[place] || !detail::is_finite(drawn.direction))
+      return drop();
+    directions_[depth * recorded_ + place] = {drawn.field, pack_direction(drawn.direction)};
+  }
+
+  /// The environment as vertex `depth`, with the throughput that the path leaves the scene with; also where
+  /// it is dark. What it sends is then its emission(). Not needed where fields do not learn.
+  WFPG_HD void escape(std::size_t path, std::uint32_t depth, vec3 throughput) const {
+    std::uint32_t place;
+    if (!learns() || depth == 0 || !find(path, place)) return;
+    if (depth != lengths_[place]) return drop();
+    if (depth >= max_depth_) return;
+    light_[depth * recorded_ + place] = {throughput, vec3(0.0f)};
+    lengths_[place] = (depth + 1) | escaped;
   }
 
   /// Radiance that vertex `depth` scatters toward the path's origin, as it arrives there: throughput, BSDF
@@ -90,8 +121,9 @@ class path_recorder_view {
   WFPG_HD void emission(std::size_t path, std::uint32_t depth, vec3 contribution) const {
     std::uint32_t place;
     if (!find(path, place)) return;
-    if (depth > lengths_[place]) return drop();
-    if (include_emission_ && depth < lengths_[place])
+    const std::uint32_t length = lengths_[place] & ~escaped;
+    if (depth > length) return drop();
+    if (include_emission_ && depth < length)
       add(place, depth, contribution);
     else if (depth > 0)
       add(place, depth - 1, contribution);
@@ -102,6 +134,9 @@ class path_recorder_view {
   friend class path_recorder;
   friend struct deposit_paths;
 
+  static constexpr std::uint32_t escaped = 0x80000000u;  // of a length: its last vertex is the environment
+
+  WFPG_HD bool learns() const { return directions_ != nullptr; }
   WFPG_HD void drop() const { detail::atomic_add(dropped_, 1); }
   /// Where a path is among the recorded ones; false where it is not, and dropped where there is no such path.
   WFPG_HD bool find(std::size_t path, std::uint32_t& place) const {
@@ -111,7 +146,7 @@ class path_recorder_view {
   }
   /// `place`: of a path, among the recorded ones.
   WFPG_HD void add(std::uint32_t place, std::uint32_t depth, vec3 contribution) const {
-    if (depth >= lengths_[place]) return drop();
+    if (depth >= (lengths_[place] & ~escaped)) return drop();
     light_[depth * recorded_ + place].contribution += contribution;
   }
 
@@ -120,31 +155,47 @@ class path_recorder_view {
   detail::recorded_runs runs_;
   std::uint32_t max_depth_ = 0;
   bool include_emission_ = true;
-  std::uint32_t* lengths_ = nullptr;          // a recorded path: its vertices
+  std::uint32_t* lengths_ = nullptr;          // a recorded path: its vertices, and `escaped`
   detail::recorded_place* places_ = nullptr;  // a vertex, all recorded paths of a depth together
   detail::recorded_light* light_ = nullptr;
+  detail::recorded_direction* directions_ = nullptr;  // null: fields do not learn
   std::uint32_t* dropped_ = nullptr;
 };
 
-/// Deposits one path's vertices: L(k) = (sum of contributions at k and after) / throughput(k), Eq. 5.
+/// Deposits one path's vertices: L(k) = (sum of contributions at k and after) / throughput(k), Eq. 5. It is
+/// what leaves a vertex, for the cache, and what arrives along the direction before it, for kept fields.
 struct deposit_paths {
   path_recorder_view paths;
   exitance_cache_view cache;
+  learnt_radiance_view learnt;
+
   WFPG_HD void operator()(std::size_t path) const {
-    const std::uint32_t length = paths.lengths_[path];
-    if (length == 0) return;
-    const std::uint32_t first = cache.reserve(length);
+    const bool escapes = (paths.lengths_[path] & path_recorder_view::escaped) != 0;
+    const std::uint32_t vertices = paths.lengths_[path] & ~path_recorder_view::escaped;
+    const std::uint32_t surfaces = vertices - (escapes ? 1u : 0u);
+    if (surfaces == 0) return;
+    const std::uint32_t first = cache.reserve(surfaces);
+    const std::uint32_t found = learnt.empty() || vertices < 2 ? 0 : vertices - 1;
+    const std::uint32_t first_found = found > 0 ? learnt.reserve(found) : 0;
     vec3 arriving(0.0f);
-    for (std::uint32_t depth = length; depth-- > 0;) {
+    for (std::uint32_t depth = vertices; depth-- > 0;) {
       const std::size_t slot = depth * paths.recorded_ + path;
       const detail::recorded_light light = paths.light_[slot];
       arriving += light.contribution;
       const vec3 t = light.throughput;
-      const vec3 leaving{divided(arriving.x, t.x), divided(arriving.y, t.y), divided(arriving.z, t.z)};
-      const detail::recorded_place place = paths.places_[slot];
-      cache.write(first + depth, place.position, unpack_direction(place.outgoing), luminance(leaving));
+      const float leaving =
+          luminance({divided(arriving.x, t.x), divided(arriving.y, t.y), divided(arriving.z, t.z)});
+      if (depth < surfaces) {
+        const detail::recorded_place place = paths.places_[slot];
+        cache.write(first + depth, place.position, unpack_direction(place.outgoing), leaving);
+      }
+      if (found > 0 && depth > 0) {
+        const detail::recorded_direction before = paths.directions_[slot - paths.recorded_];
+        learnt.write(first_found + depth - 1, before.field, unpack_direction(before.direction), leaving);
+      }
     }
-    for (std::uint32_t depth = 0; depth < length; ++depth) cache.count(first + depth);
+    for (std::uint32_t depth = 0; depth < surfaces; ++depth) cache.count(first + depth);
+    for (std::uint32_t i = 0; i < found; ++i) learnt.count(first_found + i);
   }
 
  private:
@@ -162,12 +213,14 @@ class path_recorder {
  public:
   path_recorder() = default;
   /// `include_emission`: emitters' own radiance is cached too, so that guiding looks for them; false where
-  /// next-event estimation does that. Of 2^`share_shift` paths one is recorded. Throws out_of_memory.
+  /// next-event estimation does that. Of 2^`share_shift` paths one is recorded. `fields_learn`: directions
+  /// are recorded too. Throws out_of_memory.
   path_recorder(const Exec& exec, std::size_t paths, std::uint32_t max_depth, bool include_emission,
-                std::uint32_t share_shift = 0)
+                std::uint32_t share_shift = 0, bool fields_learn = false)
       : lengths_(exec, detail::recorded_runs{share_shift}.size(paths)),
         places_(exec, lengths_.size() * max_depth),
         light_(exec, lengths_.size() * max_depth),
+        directions_(exec, fields_learn ? lengths_.size() * max_depth : 0),
         dropped_(exec, 1) {
     view_.paths_ = paths;
     view_.recorded_ = lengths_.size();
@@ -177,13 +230,16 @@ class path_recorder {
     view_.lengths_ = lengths_.data();
     view_.places_ = places_.data();
     view_.light_ = light_.data();
+    view_.directions_ = directions_.data();
     view_.dropped_ = dropped_.data();
     ::thrust::fill_n(exec.thrust(), dropped_.data(), 1, 0u);
     clear(exec);
   }
 
   path_recorder_view view() const { return view_; }
-  std::size_t bytes() const { return lengths_.bytes() + places_.bytes() + light_.bytes() + dropped_.bytes(); }
+  std::size_t bytes() const {
+    return lengths_.bytes() + places_.bytes() + light_.bytes() + directions_.bytes() + dropped_.bytes();
+  }
 
   /// Paths that one sample records, at most.
   std::size_t recorded() const { return view_.recorded_; }
@@ -196,9 +252,11 @@ class path_recorder {
   /// Forgets all paths.
   void clear(const Exec& exec) { exec.fill_bytes(lengths_.data(), 0, lengths_.bytes()); }
 
-  /// Queues the radiance of every recorded vertex in the cache and forgets the paths. O(paths · depth).
-  void deposit(const Exec& exec, const exitance_cache_view& cache) {
-    exec.for_each(view_.recorded_, deposit_paths{view_, cache});
+  /// Queues the radiance of every recorded vertex in the cache, tells kept fields what their directions
+  /// found, and forgets the paths. O(paths · depth).
+  void deposit(const Exec& exec, const exitance_cache_view& cache, const learnt_radiance_view& learnt = {}) {
+    exec.for_each(view_.recorded_,
+                  deposit_paths{view_, cache, view_.learns() ? learnt : learnt_radiance_view()});
     clear(exec);
   }
 
@@ -209,6 +267,7 @@ class path_recorder {
   buffer<std::uint32_t, Exec> lengths_;
   buffer<detail::recorded_place, Exec> places_;
   buffer<detail::recorded_light, Exec> light_;
+  buffer<detail::recorded_direction, Exec> directions_;
   buffer<std::uint32_t, Exec> dropped_;
   path_recorder_view view_;
 };

@@ -41,6 +41,12 @@ __global__ void use_recorder(wfpg::path_recorder_view recorder) {
   recorder.vertex(threadIdx.x, 0, wfpg::vec3(0.0f), wfpg::vec3(0, 0, 1), wfpg::vec3(1.0f));
   recorder.radiance(threadIdx.x, 0, wfpg::vec3(1.0f));
   recorder.emission(threadIdx.x, 1, wfpg::vec3(1.0f));
+  recorder.scatter(threadIdx.x, 0, {wfpg::vec3(0, 0, 1), 1.0f, wfpg::sampling_technique::guide, 0});
+  recorder.escape(threadIdx.x, 1, wfpg::vec3(1.0f));
+}
+
+__global__ void use_learnt(wfpg::learnt_radiance_view learnt) {
+  if (!learnt.empty()) learnt.deposit(0, wfpg::vec3(0, 0, 1), 1.0f);
 }
 
 __global__ void use_bins(wfpg::bins_view bins, float* out) {
@@ -78,6 +84,7 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   use_octree<<<1, 1>>>(tree, wfpg::vec3(0.0f), out);
   use_cache<<<1, 1>>>(cache, wfpg::vec3(0.0f), out);
   use_recorder<<<1, 32>>>(recorder);
+  use_learnt<<<1, 1>>>({});
   use_bins<<<1, 32>>>(wfpg::bins_view{}, out);
   use_guide<<<1, 32>>>(wfpg::guide_view{}, directions, out);
   use_caster<<<1, 1>>>(wfpg::svo_ray_caster(tree), wfpg::ray{}, nullptr);
@@ -96,9 +103,10 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(d::find_child_masks{});
   launch(d::leaf_normals{});
   launch(d::inner_normals{});
+  launch(d::add_queued_values{});
   launch(d::fold_deposits{});
   launch(d::average_children{});
-  launch(wfpg::deposit_paths{recorder, cache});
+  launch(wfpg::deposit_paths{recorder, cache, {}});
   launch(d::starts_key_group{});
   launch(d::write_group_offsets{});
   launch(d::count_at_leaves<d::wave_rays<surfaces>>{});

@@ -216,6 +216,7 @@ struct follow_path {
     if (!surface.active) return;
     surface.active = d.pdf > 0.0f;
     if (!surface.active) return;
+    recorder.scatter(path, depth, d);
     step.throughput *= surface.bsdf.eval(surface.outgoing, d.direction) / d.pdf;
     wfpg::ray ray;
     ray.origin = surface.position;

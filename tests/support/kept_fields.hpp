@@ -60,11 +60,12 @@ inline float patch_light(std::uint32_t face, float u, float v) {
 
 /// Options whose budget holds so many slots.
 inline wfpg::kept_field_options slots_of(std::uint32_t resolution, std::size_t slots,
-                                         std::uint32_t recast = 4) {
+                                         std::uint32_t recast = 4, bool learns = false) {
   wfpg::kept_field_options options;
+  options.learn = learns;
   options.resolution = resolution;
   options.recast = recast;
-  options.budget_bytes = slots * wfpg::field_store<one_policy>::bytes_a_slot(resolution);
+  options.budget_bytes = slots * wfpg::field_store<one_policy>::bytes_a_slot(resolution, learns);
   return options;
 }
 
@@ -82,8 +83,11 @@ struct kept_box {
   static constexpr std::size_t max_rays = 1024;
 
   explicit kept_box(const wfpg::kept_field_options& options,
-                    wfpg::guiding_mode guiding = wfpg::guiding_mode::oriented, std::size_t noted = 0)
-      : store(box.exec, box.tree.view(), {2, 32}, options, max_rays), mode(guiding), log(box.exec, noted) {}
+                    wfpg::guiding_mode guiding = wfpg::guiding_mode::oriented, std::size_t noted = 0,
+                    std::size_t max_values = 0)
+      : store(box.exec, box.tree.view(), {2, 32}, options, max_rays, max_values),
+        mode(guiding),
+        log(box.exec, noted) {}
 
   const Exec& exec() const { return box.exec; }
   void begin() { store.begin_sample(exec(), ++sample); }

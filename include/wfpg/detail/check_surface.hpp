@@ -15,17 +15,19 @@
 
 namespace wfpg::detail {
 
-/// A surface without its BSDF, and whether the octree knows of it.
+/// A surface without its BSDF, and whether the octree knows of it. Without padding, which would be memory
+/// that nobody wrote.
 struct surface_probe {
   vec3 position, geometric_normal, normal, outgoing;
-  bool active, at_leaf;
+  std::uint16_t active, at_leaf;
 };
 
 template <class Bsdf>
 WFPG_HD surface_probe probe_of(const surface<Bsdf>& s, const sparse_voxel_octree_view& tree) {
   const bool look_up = s.active && !tree.empty() && is_finite(s.position);
-  return {s.position, s.geometric_normal, s.normal,
-          s.outgoing, s.active,           !look_up || tree.nearest_leaf(s.position) != invalid_node};
+  const bool at_leaf = !look_up || tree.nearest_leaf(s.position) != invalid_node;
+  return {s.position, s.geometric_normal,      s.normal,
+          s.outgoing, std::uint16_t(s.active), std::uint16_t(at_leaf)};
 }
 
 template <class Surfaces>
@@ -40,7 +42,7 @@ struct probe_surfaces {
 
 /// The first violation in words, or nothing.
 inline std::string violation_of(const surface_probe& s) {
-  if (!s.active) return {};
+  if (s.active == 0) return {};
   const std::pair<const char*, vec3> vectors[] = {
       {"geometric_normal", s.geometric_normal}, {"normal", s.normal}, {"outgoing", s.outgoing}};
   if (!is_finite(s.position)) return sentence("position is ", in_words{s.position}, ", expected finite");
@@ -56,7 +58,7 @@ inline std::string violation_of(const surface_probe& s) {
     return sentence("normal ", in_words{s.normal}, " and geometric_normal ", in_words{s.geometric_normal},
                     " have dot product ", glm::dot(s.normal, s.geometric_normal),
                     ", expected on the same side");
-  if (!s.at_leaf)
+  if (s.at_leaf == 0)
     return sentence("position ", in_words{s.position},
                     " lies in no leaf of the octree nor beside one, expected a leaf in its voxel or the 26 "
                     "around it");

@@ -13,7 +13,7 @@
 
 namespace wfpg::detail {
 
-inline constexpr std::uint32_t no_slot = guide_view::no_field;
+inline constexpr std::uint32_t no_slot = no_field;
 inline constexpr std::uint32_t no_key = 0xffffffffu;
 
 /// What is known of a slot, beside its field.

@@ -33,32 +33,44 @@ const kept_field_options& field_store<Exec>::checked(const kept_field_options& o
   require(o.resolution >= 2 && o.resolution <= 128, "kept.resolution", o.resolution, "in [2, 128]");
   require(o.recast >= 1, "kept.recast", o.recast, "at least 1");
   require(o.idle_samples >= 1, "kept.idle_samples", o.idle_samples, "at least 1");
-  require(o.budget_bytes / bytes_a_slot(o.resolution) < (1u << 30), "kept.budget_bytes", o.budget_bytes,
-          "less than 2^30 slots");
+  require(detail::is_finite(o.cone_samples) && o.cone_samples > 0.0f, "kept.cone_samples", o.cone_samples,
+          "positive and finite");
+  const std::size_t slots = o.budget_bytes / bytes_a_slot(o.resolution, o.learn);
+  require(slots < (1u << 30), "kept.budget_bytes", o.budget_bytes, "less than 2^30 slots");
+  require(!o.learn || slots * o.resolution * o.resolution < 0xffffffffull, "kept.budget_bytes",
+          o.budget_bytes, "less than 2^32 - 1 cells where fields learn");
   static_assert(detail::missing_key::most_nodes == 1u << 28, "the message names it");
   require(nodes < detail::missing_key::most_nodes, "number of octree nodes", nodes, "less than 2^28");
   return o;
 }
 
 template <class Exec>
+kept_field_options field_store<Exec>::completed(kept_field_options o, std::size_t max_values) {
+  o.recast = detail::min(o.recast, o.resolution * o.resolution);
+  o.learn = o.learn && max_values > 0;
+  return o;
+}
+
+template <class Exec>
 field_store<Exec>::field_store(const Exec& exec, const sparse_voxel_octree_view& tree,
                                const binning_options& binning, const kept_field_options& options,
-                               std::size_t max_rays)
+                               std::size_t max_rays, std::size_t max_values)
     : tree_(tree),
-      options_(checked(options, tree.node_count())),
-      capacity_(tree.empty() ? 0 : options.budget_bytes / bytes_a_slot(options.resolution)),
+      options_(completed(checked(options, tree.node_count()), max_values)),
+      capacity_(tree.empty() ? 0 : options.budget_bytes / bytes_a_slot(options.resolution, options_.learn)),
       marks_(exec, tree, binning),
       slots_(exec, std::vector<detail::field_slot>(capacity_)),
       fields_(exec, std::vector<resident_field>(capacity_)),
       words_(exec, capacity_ * options.resolution * options.resolution),
-      hits_(exec, capacity_ * options.resolution * options.resolution),
+      hits_(exec, words_.size()),
+      learnt_(exec, options_.learn ? words_.size() : 0),
+      queue_(exec, learnt_.size() > 0 ? max_values : 0, learnt_.size()),
       free_slots_(exec, capacity_),
       list_(exec, 2 * capacity_),
       through_(exec, capacity_),
       field_of_ray_(exec, max_rays),
       state_(exec, std::vector<detail::field_store_state>(1)),
       counts_(exec, std::vector<detail::field_wave_counts>(2)) {
-  options_.recast = detail::min(options.recast, options.resolution * options.resolution);
   std::size_t entries = 2;
   while (entries < 2 * capacity_) entries *= 2;
   table_ = buffer<std::uint64_t, Exec>(exec, entries);
@@ -90,11 +102,22 @@ void field_store<Exec>::begin_sample(const Exec& exec, std::uint32_t sample) {
 
 template <class Exec>
 void field_store<Exec>::end_sample(const Exec& exec) {
+  learn(exec);
   const bool is_power_of_two = (sample_ & (sample_ - 1)) == 0;
   if (sample_ == 0 || !is_power_of_two) return;
   expect_builds(turns);
   exec.for_each(1, detail::adapt_pressure{state_.data()});
   marks_.mark(exec, counted_samples_, capacity_, &state_.data()->pressure);
+}
+
+/// Adds what the sample's paths found to the fields' means.
+template <class Exec>
+void field_store<Exec>::learn(const Exec& exec) {
+  if (!learns()) return;
+  queue_.sum(exec);
+  exec.for_each_block(
+      capacity_, 0,
+      detail::fold_learnt{slots_.view(), sample_, cells_a_field(), queue_.view(), learnt_.data()});
 }
 
 template <class Exec>
@@ -109,9 +132,10 @@ guide_view field_store<Exec>::prepare(const Exec& exec, const kept_field_wave<Su
     exec.for_each(detail::max<std::size_t>(capacity_, 1), detail::forget_wave{slots_.view(), counts()});
   in_wave_ = true;
   find(exec, wave);
-  const detail::kept_fields_view kept{view(),       fields_.data(),           words_.data(),
-                                      hits_.data(), options_.resolution,      options_.recast,
-                                      sample_,      &state_.data()->refreshed};
+  const detail::kept_fields_view kept{
+      view(),         fields_.data(),           words_.data(),       hits_.data(),
+      learnt_.data(), options_.cone_samples,    options_.resolution, options_.recast,
+      sample_,        &state_.data()->refreshed};
   if (builds_in_wave())
     build(exec, detail::kept_field_builder<kept_field_wave<Surfaces>>{wave, kept}, caster,
           caster_buffer_bytes);
@@ -134,14 +158,10 @@ void field_store<Exec>::find(const Exec& exec, const kept_field_wave<Surfaces>& 
   const detail::use_slot use{view(), field_of_ray_.data(), sample_, wave.seed, wanted_now, builds};
   const detail::ray_runs runs{wave.ray_count, counts(), wave.statistics};
   const detail::use_ancestor ancestor{tree_, use};
-  exec.for_each_block(runs.size(), 0,
-                      detail::find_fields<rays_type>{{wave.surfaces, wave.mode},
-                                                     runs,
-                                                     marks_.view(),
-                                                     ancestor,
-                                                     wanted(),
-                                                     counted(),
-                                                     counts_.data() + (waves_ + 1) % 2});
+  exec.for_each_block(
+      runs.size(), 0,
+      detail::find_fields<rays_type>{
+          {wave.surfaces, wave.mode}, runs, marks_.view(), ancestor, wanted(), counted(), other_counts()});
   if (!builds_in_wave()) return;
   bear(exec);
   exec.for_each_block(runs.size(), 0, detail::find_missing_fields{runs, ancestor});
@@ -216,7 +236,7 @@ kept_field_statistics field_store<Exec>::statistics(const Exec& exec) const {
   kept_field_statistics result;
   result.capacity = static_cast<std::uint32_t>(capacity_);
   result.live = sample_ > 0 ? result.capacity - (state.free - state.taken) : 0;
-  result.bytes_a_slot = bytes_a_slot(options_.resolution);
+  result.bytes_a_slot = bytes_a_slot(options_.resolution, options_.learn);
   result.born = state.born;
   result.freed = state.born - result.live;
   result.refreshed = state.refreshed;
@@ -226,9 +246,9 @@ kept_field_statistics field_store<Exec>::statistics(const Exec& exec) const {
 
 template <class Exec>
 std::size_t field_store<Exec>::slot_bytes() const {
-  return slots_.bytes() + fields_.bytes() + words_.bytes() + hits_.bytes() + table_.bytes() +
-         settled_.bytes() + wanted_.bytes() + wanted_through_.bytes() + free_slots_.bytes() + list_.bytes() +
-         through_.bytes();
+  return slots_.bytes() + fields_.bytes() + words_.bytes() + hits_.bytes() + learnt_.bytes() +
+         table_.bytes() + settled_.bytes() + wanted_.bytes() + wanted_through_.bytes() + free_slots_.bytes() +
+         list_.bytes() + through_.bytes();
 }
 
 }  // namespace wfpg

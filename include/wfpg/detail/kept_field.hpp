@@ -2,6 +2,7 @@
 #pragma once
 
 #include <wfpg/detail/field_slots.hpp>
+#include <wfpg/detail/learnt_radiance.hpp>
 #include <wfpg/guide_view.hpp>
 #include <wfpg/radiance_field.hpp>
 
@@ -29,6 +30,8 @@ struct kept_fields_view {
   resident_field* fields;
   std::uint32_t* words;
   cone_hit* hits;
+  learnt_mean* learnt;  // null: fields do not learn
+  float cone_samples;
   std::uint32_t resolution;
   std::uint32_t recast;
   std::uint32_t sample;
@@ -64,14 +67,15 @@ struct kept_field_builder {
     return {origin, kept.resolution};
   }
 
-  /// Reads every cell through its hit, and makes the distribution.
+  /// Reads every cell through its hit and what was learnt of it, and makes the distribution. What was learnt
+  /// is forgotten where all cones are cast: the field is new, or geometry moved.
   template <class Block>
   WFPG_HD void finish(Block& block, std::uint32_t slot, const field_cells& cells, bool whole) const {
     const auto size = static_cast<int>(kept.resolution);
-    const cone_hit* const hits = kept.hits + std::size_t(slot) * kept.resolution * kept.resolution;
-    const cell_words words{kept.words + std::size_t(slot) * kept.resolution * kept.resolution};
+    const std::size_t first = std::size_t(slot) * kept.resolution * kept.resolution;
+    const cell_words words{kept.words + first};
     block.for_each(size * size, [&](int cell) {
-      const float radiance = hits[cell].radiance(wave.cache);
+      const float radiance = radiance_of(first + static_cast<std::size_t>(cell), whole);
       words.set(cell, radiance * cells.central_cosine(static_cast<std::uint32_t>(cell)));
     });
     block.sync();
@@ -89,6 +93,14 @@ struct kept_field_builder {
   }
 
  private:
+  /// Of a cell of all fields.
+  WFPG_HD float radiance_of(std::size_t cell, bool whole) const {
+    const float seen = kept.hits[cell].radiance(wave.cache);
+    if (!kept.learnt) return seen;
+    if (whole) kept.learnt[cell] = {};
+    return kept.learnt[cell].mixed_with(seen, kept.cone_samples);
+  }
+
   WFPG_HD void count(bool whole) const {
     if (!whole) atomic_add(kept.refreshed, std::uint64_t(1));
     if (!wave.statistics) return;

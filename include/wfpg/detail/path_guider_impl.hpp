@@ -87,12 +87,14 @@ path_guider<Exec>::path_guider(const Exec& exec, voxel_fragments<Exec> fragments
       cache_(exec, octree_, fragments, deposits_of_sample()),
       working_memory_(std::make_unique<retaining_resource>(exec.resource())),
       exec_(exec.with_resource(working_memory_.get())),
-      recorder_(exec_, options_.max_paths, options_.max_depth, options_.include_emission, share_shift()),
+      recorder_(exec_, options_.max_paths, options_.max_depth, options_.include_emission, share_shift(),
+                keeps_fields() && options_.kept.learn),
       product_points_(exec_, std::size_t(2) * options_.product_resolution * options_.product_resolution),
       counts_(exec_, options_.max_depth) {
   const binning_options binning{options_.min_bin_level, options_.rays_per_bin};
   if (keeps_fields())
-    store_ = field_store<Exec>(exec_, octree_.view(), binning, options_.kept, options_.max_rays);
+    store_ = field_store<Exec>(exec_, octree_.view(), binning, options_.kept, options_.max_rays,
+                               deposits_of_sample());
   else
     binner_ = spatial_binner<Exec>(exec_, octree_.view(), binning, options_.max_rays);
   octree_.release_build_data();
@@ -114,7 +116,7 @@ template <class Exec>
 void path_guider<Exec>::end_sample() {
   {
     const auto timed = clock_.time(detail::stage::record);
-    recorder_.deposit(exec_, cache_.view());
+    recorder_.deposit(exec_, cache_.view(), store_.learnt());
   }
   const auto timed = clock_.time(detail::stage::cache);
   cache_.update(exec_);
@@ -241,7 +243,7 @@ guide_view path_guider<Exec>::make_resident(const wave<Surfaces, Random>& w, con
   if (resident_fields_.size() < bins) reallocate(resident_fields_, bins + bins / 2);
   if (resident_words_.size() < words) reallocate(resident_words_, words + words / 2);
   if (field_of_ray_.size() < options_.max_rays) reallocate(field_of_ray_, options_.max_rays);
-  ::thrust::fill_n(exec_.thrust(), field_of_ray_.data(), w.ray_count, guide_view::no_field);
+  ::thrust::fill_n(exec_.thrust(), field_of_ray_.data(), w.ray_count, no_field);
   detail::for_each_field(exec_, fields, caster,
                          detail::resident_sink{fields.bins, resident_words_.data(), resident_fields_.data(),
                                                field_of_ray_.data(), fraction(), fields.resolution},
@@ -270,13 +272,13 @@ template <class Exec>
 memory_report path_guider<Exec>::memory() const {
   const std::size_t resident = resident_words_.bytes() + resident_fields_.bytes() + field_of_ray_.bytes();
   const std::size_t binning = binner_.bytes() + store_.wave_bytes() + counts_.bytes();
-  const std::size_t named =
-      recorder_.bytes() + binning + resident + store_.slot_bytes() + store_.level_bytes();
+  const std::size_t named = recorder_.bytes() + binning + resident + store_.slot_bytes() +
+                            store_.level_bytes() + store_.value_bytes();
   return {{{"octree", octree_.bytes(), true},
            {"cache", cache_.persistent_bytes(), true},
            {"kept fields", store_.slot_bytes(), true},
            {"levels", store_.level_bytes(), true},
-           {"deposits", cache_.transient_bytes(), false},
+           {"deposits", cache_.transient_bytes() + store_.value_bytes(), false},
            {"paths", recorder_.bytes(), false},
            {"binning", binning, false},
            {"fields", resident, false},

@@ -1,0 +1,233 @@
+// What fields learn: means in 4 bytes, exact sums of what many threads say in any order, what is dropped; and
+// a field store whose fields turn to where light was found.
+#include "support/evaluate.hpp"
+#include "support/fields.hpp"
+#include "support/kept_fields.hpp"
+#include "support/policies.hpp"
+
+#include <wfpg/detail/learnt_radiance.hpp>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+using namespace wfpg_test;
+using wfpg::detail::learnt_mean;
+
+TEST_CASE("learnt mean: of up to 255 values, to a part in 2^16 each time", "[learnt_radiance]") {
+  learnt_mean mean;
+  CHECK(mean.count() == 0);
+  double sum = 0.0;
+  random_numbers random(1);
+  for (std::uint32_t n = 1; n <= 255; ++n) {
+    const double value = std::pow(10.0, 6.0 * static_cast<double>(random.unit()) - 3.0);
+    sum += value;
+    mean.add(value, 1);
+    CHECK(mean.count() == n);
+  }
+  CHECK(std::abs(static_cast<double>(mean.mean()) / (sum / 255.0) - 1.0) < 255.0 / 0x1p17);
+  learnt_mean at_once;
+  at_once.add(sum, 255);
+  CHECK(std::abs(static_cast<double>(at_once.mean()) / (sum / 255.0) - 1.0) < 1.0 / 0x1p17);
+}
+
+TEST_CASE("learnt mean: old values fade once there are 255", "[learnt_radiance]") {
+  learnt_mean mean;
+  mean.add(1000.0, 1000);
+  CHECK(mean.mean() == 1.0f);
+  CHECK(mean.count() == 255);
+  for (int i = 0; i < 256; ++i) mean.add(3.0, 1);
+  const double left = std::pow(255.0 / 256.0, 256.0);
+  CHECK(std::abs(static_cast<double>(mean.mean()) - (3.0 - 2.0 * left)) < 0.01);
+  for (int i = 0; i < 4000; ++i) mean.add(0.0, 1);
+  CHECK(mean.mean() < 1e-5f);
+}
+
+TEST_CASE("learnt mean: zero, the smallest and the largest", "[learnt_radiance]") {
+  learnt_mean mean;
+  mean.add(0.0, 7);
+  CHECK(mean.mean() == 0.0f);
+  CHECK(mean.count() == 7);
+  for (double value : {1e-38, 1e-30, 1.0, 1e30}) {
+    learnt_mean one;
+    one.add(value, 1);
+    CHECK(std::abs(static_cast<double>(one.mean()) / value - 1.0) < 1.0 / 0x1p16);
+  }
+}
+
+TEST_CASE("learnt mean: a cone counts for so many values", "[learnt_radiance]") {
+  learnt_mean mean;
+  CHECK(mean.mixed_with(5.0f, 1.0f) == 5.0f);
+  mean.add(6.0, 3);
+  CHECK(mean.mixed_with(6.0f, 1.0f) == 3.0f);
+  CHECK(mean.mixed_with(4.0f, 3.0f) == 3.0f);
+}
+
+namespace {
+
+constexpr float not_a_number = std::numeric_limits<float>::quiet_NaN();
+const vec3 up(0.0f, 0.0f, 1.0f);
+
+/// Fields over hemispheres above z, of 2 x 2 cells, and what they are told.
+template <class Exec>
+struct told_fields {
+  static constexpr std::uint32_t cells = 4;
+
+  Exec exec;
+  wfpg::buffer<wfpg::resident_field, Exec> fields;
+  wfpg::detail::value_queue<Exec> queue;
+
+  told_fields(std::size_t count, std::size_t capacity)
+      : fields(exec, std::vector<wfpg::resident_field>(count, {up, 0.7f})),
+        queue(exec, capacity, count * cells) {}
+
+  wfpg::learnt_radiance_view view() const {
+    return {const_view<wfpg::resident_field>(fields), 2, queue.view()};
+  }
+  /// Mean and count of every cell, of fields that are all in use.
+  std::vector<learnt_mean> means() {
+    queue.sum(exec);
+    wfpg::detail::field_slot in_use;
+    in_use.last_used = 1;
+    const wfpg::buffer<wfpg::detail::field_slot, Exec> slots(
+        exec, std::vector<wfpg::detail::field_slot>(fields.size(), in_use));
+    const wfpg::buffer<learnt_mean, Exec> means(exec, std::vector<learnt_mean>(fields.size() * cells));
+    exec.for_each_block(fields.size(), 0,
+                        wfpg::detail::fold_learnt{slots.view(), 1, cells, queue.view(), means.data()});
+    return means.to_host(exec);
+  }
+};
+
+/// Thread i's value, over twenty orders of magnitude, and the field that it is for.
+WFPG_HD float told_value(std::uint32_t i) {
+  const float u = hashed_numbers{5}(i, 0).x;
+  return std::exp(46.0f * u - 23.0f);
+}
+WFPG_HD std::uint32_t told_field(std::uint32_t i) {
+  return (i * 2654435761u) >> 29;
+}
+
+WFPG_TEST_CASE("learnt radiance: means of many threads' values, whatever their order", "[learnt_radiance]") {
+  constexpr std::uint32_t threads = 5000, fields = 8;
+  std::vector<learnt_mean> first;
+  for (const bool backwards : {false, true}) {
+    told_fields<Exec> told(fields, threads);
+    const wfpg::learnt_radiance_view view = told.view();
+    told.exec.for_each(threads, [=] WFPG_HD(std::size_t thread) {
+      const auto n = static_cast<std::uint32_t>(thread);
+      const std::uint32_t i = backwards ? threads - 1 - n : n;
+      view.deposit(told_field(i), up, told_value(i));
+    });
+    const std::vector<learnt_mean> means = told.means();
+    for (std::uint32_t field = 0; field < fields; ++field) {
+      double sum = 0.0, count = 0.0;
+      for (std::uint32_t i = 0; i < threads; ++i)
+        if (told_field(i) == field) {
+          sum += static_cast<double>(told_value(i));
+          count += 1.0;
+        }
+      double mean = 0.0;
+      for (std::uint32_t cell = 0; cell < 4; ++cell)
+        mean += static_cast<double>(means[4 * field + cell].mean());
+      CHECK(std::abs(mean / (sum / count) - 1.0) < 1e-4);  // exp differs a little on a device
+    }
+    if (backwards) CHECK(std::memcmp(first.data(), means.data(), means.size() * sizeof(learnt_mean)) == 0);
+    first = means;
+  }
+}
+
+WFPG_TEST_CASE("learnt radiance: nonsense, and what is of no field, is dropped", "[learnt_radiance]") {
+  told_fields<Exec> told(2, 9);
+  const wfpg::learnt_radiance_view view = told.view();
+  CHECK(!view.empty());
+  CHECK(wfpg::learnt_radiance_view().empty());
+  told.exec.for_each(1, [=] WFPG_HD(std::size_t) {
+    view.deposit(0, up, not_a_number);
+    view.deposit(0, up, -1.0f);
+    view.deposit(0, up, 1.0f / 0.0f);
+    view.deposit(0, -up, 1.0f);
+    view.deposit(2, up, 1.0f);
+    view.deposit(wfpg::no_field, up, 1.0f);
+    view.deposit(0, up, 2.0f);
+    view.deposit(1, up, 3e38f);
+    view.deposit(0, up, -0.0f);
+    view.deposit(1, up, 5.0f);  // one too many
+  });
+  const std::vector<learnt_mean> means = told.means();
+  std::uint32_t counts[2] = {0, 0};
+  float sums[2] = {0.0f, 0.0f};
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    counts[i / 4] += means[i].count();
+    sums[i / 4] += means[i].mean();
+  }
+  CHECK(counts[0] == 2);
+  CHECK(sums[0] == 1.0f);
+  CHECK(counts[1] == 1);
+  CHECK(sums[1] == Approx(1e30f));
+}
+
+/// The share of a field's directions in the cell around one.
+template <class Exec>
+double share_around(const kept_box<Exec>& box, const wfpg::guide_view& view, vec3 direction) {
+  const std::vector<float> share = evaluate(box.exec(), std::size_t(1), [=] WFPG_HD(std::size_t) {
+    const wfpg::directional_field field = view.mixture(0).field;
+    return field.pdf(direction) * field.cell_solid_angle();
+  });
+  return static_cast<double>(share[0]);
+}
+
+WFPG_TEST_CASE("learnt radiance: a field turns to where light was found, and forgets", "[learnt_radiance]") {
+  kept_box<Exec> box(slots_of(16, 100, 4, true), wfpg::guiding_mode::oriented, 0, 1000);
+  box.box.cache.clear(box.exec());  // cones see nothing
+  box.field.filter_alpha = 0.0f;
+  const auto wave = rays_at({0.5f, 0.5f, 0.0f}, up, 20);
+  const vec3 lit = glm::normalize(vec3(0.4f, 0.3f, 0.8f));
+  wfpg::guide_view view = box.whole_sample(wave);
+  CHECK(share_around(box, view, lit) == Approx(1.0 / 256.0).epsilon(1e-4));
+  box.begin();
+  view = box.settle(wave);
+  const wfpg::learnt_radiance_view learnt = box.store.learnt();
+  box.exec().for_each(50, [=] WFPG_HD(std::size_t) {
+    const std::uint32_t field = view.mixture(0).number;
+    learnt.deposit(field, lit, 4.0f);
+    learnt.deposit(field, up, 0.0f);
+  });
+  box.end();
+  view = box.whole_sample(wave);
+  CHECK(share_around(box, view, lit) > 0.98);  // but for the floor
+  CHECK(share_around(box, view, up) < 0.001);
+  box.store.forget(box.exec());
+  CHECK(share_around(box, box.whole_sample(wave), lit) == Approx(1.0 / 256.0).epsilon(1e-4));
+}
+
+WFPG_TEST_CASE("learnt radiance: cones count beside it, and a field that is cast anew forgets",
+               "[learnt_radiance]") {
+  auto options = slots_of(16, 100, 4, true);
+  options.cone_samples = 10.0f;
+  kept_box<Exec> box(options, wfpg::guiding_mode::oriented, 0, 1000);
+  box.field.filter_alpha = 0.0f;
+  const auto wave = rays_at({0.5f, 0.5f, 0.0f}, up, 20);
+  box.whole_sample(wave);
+  box.begin();
+  wfpg::guide_view view = box.settle(wave);
+  const double before = share_around(box, view, up);
+  const wfpg::learnt_radiance_view learnt = box.store.learnt();
+  box.exec().for_each(5, [=] WFPG_HD(std::size_t) { learnt.deposit(view.mixture(0).number, up, 1000.0f); });
+  box.end();
+  const double after = share_around(box, box.whole_sample(wave), up);
+  CHECK(after > before);
+  CHECK(after > 0.9);
+  box.store.invalidate_all(box.exec());
+  CHECK(share_around(box, box.whole_sample(wave), up) == Approx(before).epsilon(0.3));
+}
+
+}  // namespace
+
+TEST_CASE("learnt radiance: a cone's share has to be positive and finite", "[learnt_radiance]") {
+  for (float samples : {0.0f, -1.0f, not_a_number, std::numeric_limits<float>::infinity()}) {
+    auto options = slots_of(16, 10, 4, true);
+    options.cone_samples = samples;
+    CHECK_THROWS_AS((kept_box<one_policy>(options)), std::invalid_argument);
+  }
+}
