@@ -308,6 +308,32 @@ WFPG_TEST_CASE("a share of the paths is deposited, and the others are not missed
   }
 }
 
+WFPG_TEST_CASE("a sample may record fewer paths than the others", "[path_recorder]") {
+  constexpr std::size_t paths = 3000;
+  recording<Exec> r(paths, 1, true, 2);
+  const std::size_t most = r.recorder.recorded(), bytes = r.recorder.bytes();
+  r.recorder.begin_sample(r.scene.exec, 7, 2);
+  CHECK(r.recorder.recorded() == wfpg::detail::recorded_runs{4, 7}.size(paths));
+  CHECK(r.recorder.recorded() < most / 3);
+  CHECK(r.recorder.bytes() == bytes);
+  const wfpg::path_recorder_view view = r.view();
+  r.scene.exec.for_each(paths, [=] WFPG_HD(std::size_t path) {
+    view.vertex(path, 0, place(0), up, vec3(1.0f));
+    view.radiance(path, 0, vec3(static_cast<float>(path)));
+  });
+  r.finish();
+  double sum = 0.0, count = 0.0;
+  for (std::size_t path = 0; path < paths; ++path) {
+    std::uint32_t recorded;
+    if (!wfpg::detail::recorded_runs{4, 7}.find(path, recorded)) continue;
+    sum += static_cast<double>(path);
+    count += 1.0;
+  }
+  CHECK(r.leaving(0) == Approx(sum / count));
+  r.recorder.begin_sample(r.scene.exec, 8);
+  CHECK(r.recorder.recorded() == most);
+}
+
 WFPG_TEST_CASE("radiance that is no number is dropped by the cache", "[path_recorder]") {
   recording<Exec> r(5, 2, true);
   for (std::size_t path = 0; path < 5; ++path) write_vertices(r, path, {vec3(1.0f), vec3(0.5f)});

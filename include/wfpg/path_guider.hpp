@@ -56,15 +56,16 @@ struct guider_options {
   /// Share of guided samples, (0, 1], less than 1 with products; 0: 0.5 in plain mode, 0.7 in oriented mode,
   /// 0.5 in transient oriented bins of less than c_ray rays.
   float guide_fraction = 0.0f;
-  /// Guide toward emitters themselves. Beside next-event estimation they count with their MIS weight, and false
-  /// leaves them to it: better where fields do not learn.
+  /// Guide toward emitters themselves. Beside next-event estimation they count with their MIS weight, and
+  /// false leaves them to it: better where fields do not learn.
   bool include_emission = true;
   std::uint32_t unguided_samples =
       1;  ///< samples at the beginning that only record ("PT first", section 3.7)
   std::uint64_t seed = 0;
   std::size_t max_paths = 0;  ///< paths of a sample; 0: the renderer deposits by itself
   /// Of the paths of a sample so many are recorded, others in each, that leaves get about as many deposits on
-  /// average, or up to twice as many; 0: all are. What they cost is bounded then, however many pixels.
+  /// average, or up to twice as many, and after 32 samples a quarter of that; 0: all are. What they cost is
+  /// bounded then, however many pixels.
   std::uint32_t deposits_per_leaf = 16;
   std::uint32_t max_depth =
       8;                     ///< vertices of a path that the recorder holds, and depths that statistics tell

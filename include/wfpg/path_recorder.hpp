@@ -221,10 +221,10 @@ class path_recorder {
         places_(exec, lengths_.size() * max_depth),
         light_(exec, lengths_.size() * max_depth),
         directions_(exec, fields_learn ? lengths_.size() * max_depth : 0),
-        dropped_(exec, 1) {
+        dropped_(exec, 1),
+        share_shift_(share_shift) {
     view_.paths_ = paths;
-    view_.recorded_ = lengths_.size();
-    view_.runs_.shift = share_shift;
+    record(share_shift);
     view_.max_depth_ = max_depth;
     view_.include_emission_ = include_emission;
     view_.lengths_ = lengths_.data();
@@ -241,12 +241,13 @@ class path_recorder {
     return lengths_.bytes() + places_.bytes() + light_.bytes() + directions_.bytes() + dropped_.bytes();
   }
 
-  /// Paths that one sample records, at most.
+  /// Paths that this sample records, at most.
   std::size_t recorded() const { return view_.recorded_; }
 
-  /// Forgets all paths. Views from then on record the paths of a sample of this seed.
-  void begin_sample(const Exec& exec, std::uint32_t seed) {
+  /// Forgets all paths. Views from then on record the paths of a sample of this seed; 2^`fewer` times fewer.
+  void begin_sample(const Exec& exec, std::uint32_t seed, std::uint32_t fewer = 0) {
     view_.runs_.seed = seed;
+    record(share_shift_ + fewer);
     clear(exec);
   }
   /// Forgets all paths.
@@ -264,11 +265,17 @@ class path_recorder {
   std::uint32_t dropped(const Exec& exec) const { return read_element(exec, dropped_.data()); }
 
  private:
+  void record(std::uint32_t shift) {
+    view_.runs_.shift = shift;
+    view_.recorded_ = view_.runs_.size(view_.paths_);
+  }
+
   buffer<std::uint32_t, Exec> lengths_;
   buffer<detail::recorded_place, Exec> places_;
   buffer<detail::recorded_light, Exec> light_;
   buffer<detail::recorded_direction, Exec> directions_;
   buffer<std::uint32_t, Exec> dropped_;
+  std::uint32_t share_shift_ = 0;
   path_recorder_view view_;
 };
 

@@ -108,7 +108,9 @@ path_guider<Exec>::path_guider(const Exec& exec, voxel_fragments<Exec> fragments
 template <class Exec>
 void path_guider<Exec>::begin_sample() {
   ++samples_;
-  recorder_.begin_sample(exec_, static_cast<std::uint32_t>(detail::hash(options_.seed, samples_)));
+  // Of many paths fewer do once means have settled.
+  const std::uint32_t fewer = share_shift() > 0 && samples_ > 32 ? 2 : 0;
+  recorder_.begin_sample(exec_, static_cast<std::uint32_t>(detail::hash(options_.seed, samples_)), fewer);
   if (keeps_fields()) store_.begin_sample(exec_, samples_);
 }
 
