@@ -7,11 +7,10 @@ Renders each scene with each method for SECONDS (10), and two references for REF
 seeds, one by path tracing and one guided, so that neither flatters itself. An error is the mean against both, less half
 the difference between the references, which is their own noise.
 """
-import json
-import os
-import subprocess
 import sys
 import tempfile
+
+from gpu_programs import Programs, write_results
 
 SCENES = {"cornell-enclosed": "off", "ajar": "on"}  # and next-event estimation
 METHODS = {
@@ -22,25 +21,6 @@ METHODS = {
 }
 REFERENCES = {"a": (["--method", "pt"], 901), "b": ([], 902)}
 ERRORS = ("mse", "relmse", "relmse_trimmed", "mse_reinhard")
-
-
-class Programs:
-    def __init__(self, directory, size, folder):
-        self.directory, self.size, self.folder = directory, size, folder
-
-    def render(self, scene, name, arguments, seconds, seed):
-        """Renders to NAME.exr and returns the statistics."""
-        picture, stats = (os.path.join(self.folder, name + ending) for ending in (".exr", ".json"))
-        command = [os.path.join(self.directory, "wfpg-render"), scene, "--device", "cuda", "--size", self.size]
-        command += ["--nee", SCENES[scene], "--seconds", str(seconds), "--seed", str(seed), *arguments]
-        subprocess.run([*command, "-o", picture, "--stats", stats], check=True, stdout=subprocess.DEVNULL)
-        with open(stats) as file:
-            return json.load(file)
-
-    def compare(self, name, reference):
-        pictures = [os.path.join(self.folder, n + ".exr") for n in (name, reference)]
-        command = [os.path.join(self.directory, "wfpg-compare"), *pictures, "--json"]
-        return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
 
 
 def summary(stats, errors, noise):
@@ -57,12 +37,16 @@ def summary(stats, errors, noise):
 
 
 def measure(programs, scene, seconds, reference_seconds):
+    def render(name, arguments, seconds, seed):
+        budget = ["--nee", SCENES[scene], "--seconds", str(seconds), "--seed", str(seed)]
+        return programs.render(scene, name, budget + arguments)
+
     for name, (arguments, seed) in REFERENCES.items():
-        programs.render(scene, name, arguments, reference_seconds, seed)
+        render(name, arguments, reference_seconds, seed)
     noise = programs.compare("a", "b")
     methods = {}
     for name, arguments in METHODS.items():
-        stats = programs.render(scene, name, arguments, seconds, 1)
+        stats = render(name, arguments, seconds, 1)
         methods[name] = summary(stats, [programs.compare(name, reference) for reference in REFERENCES], noise)
     for line in methods.values():
         # None where the references' noise hides what the method leaves.
@@ -73,18 +57,14 @@ def measure(programs, scene, seconds, reference_seconds):
 
 
 def main(directory, out, seconds=10.0, reference_seconds=60.0, size="1920x1080"):
-    gpu = subprocess.run(["nvidia-smi", "--query-gpu=name,driver_version", "--format=csv,noheader"],
-                         check=True, stdout=subprocess.PIPE, text=True).stdout.strip()
-    results = {"command": " ".join(sys.argv), "gpu_and_driver": gpu, "seconds": float(seconds),
-               "reference_seconds": float(reference_seconds), "size": size, "scenes": []}
+    scenes = []
     with tempfile.TemporaryDirectory() as folder:
         programs = Programs(directory, size, folder)
         for scene in SCENES:
             print(scene, file=sys.stderr)
-            results["scenes"].append(measure(programs, scene, float(seconds), float(reference_seconds)))
-    with open(out, "w") as file:
-        json.dump(results, file, indent=1)
-        file.write("\n")
+            scenes.append(measure(programs, scene, float(seconds), float(reference_seconds)))
+    write_results(out, {"seconds": float(seconds), "reference_seconds": float(reference_seconds), "size": size,
+                        "scenes": scenes})
 
 
 if __name__ == "__main__":

@@ -6,12 +6,11 @@ usage: bench/sample_times.py DIRECTORY_OF_PROGRAMS OUT.json [RUNS [SIZE]]
 A run renders each scene with each method twice, 32 and 128 samples: what lies between is samples whose fields have
 settled. Ratios are of one run, and medians over RUNS (20) of them.
 """
-import json
-import os
 import statistics
-import subprocess
 import sys
 import tempfile
+
+from gpu_programs import Programs, write_results
 
 SCENES = ("ajar",)
 METHODS = {"pt": ["--method", "pt"], "wfpg": []}
@@ -20,29 +19,19 @@ FIRST, LAST = 32, 128
 STAGES = ("camera", "update", "trace", "sort", "lights", "directions", "shade", "film")
 
 
-def render(directory, scene, arguments, samples, size):
-    with tempfile.TemporaryDirectory() as folder:
-        stats = os.path.join(folder, "stats.json")
-        command = [os.path.join(directory, "wfpg-render"), scene, "--device", "cuda", "--size", size, *arguments]
-        command += ["--spp", str(samples), "-o", os.path.join(folder, "x.exr"), "--stats", stats]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        with open(stats) as file:
-            return json.load(file)
-
-
-def settled(directory, scene, arguments, size):
+def settled(programs, scene, arguments):
     """Milliseconds by stage and segments of one settled sample."""
-    first, last = (render(directory, scene, arguments, n, size) for n in (FIRST, LAST))
+    first, last = (programs.render(scene, "x", ["--spp", str(n), *arguments]) for n in (FIRST, LAST))
     samples = LAST - FIRST
     line = {s: 1e3 * (last["seconds"].get(s, 0.0) - first["seconds"].get(s, 0.0)) / samples for s in STAGES}
     return {**line, "total": sum(line.values()), "segments": (last["segments"] - first["segments"]) / samples}
 
 
-def measure(directory, scene, runs, size):
+def measure(programs, scene, runs):
     methods = {name: [] for name in METHODS}
     for _ in range(runs + 1):  # the first warms up
         for name, arguments in METHODS.items():
-            methods[name].append(settled(directory, scene, arguments, size))
+            methods[name].append(settled(programs, scene, arguments))
     pairs = list(zip(methods["pt"], methods["wfpg"]))[1:]
     by_sample = [w["total"] / p["total"] for p, w in pairs]
     by_segment = [w["total"] / w["segments"] / (p["total"] / p["segments"]) for p, w in pairs]
@@ -53,17 +42,13 @@ def measure(directory, scene, runs, size):
 
 
 def main(directory, out, runs="20", size="1920x1080"):
-    gpu = subprocess.run(["nvidia-smi", "--query-gpu=name,driver_version", "--format=csv,noheader"],
-                         check=True, stdout=subprocess.PIPE, text=True).stdout.strip()
     settled_samples = []
-    for scene in SCENES:
-        print(scene, file=sys.stderr)
-        settled_samples.append(measure(directory, scene, int(runs), size))
-    results = {"command": " ".join(sys.argv), "gpu_and_driver": gpu, "runs": int(runs), "size": size,
-               "settled_samples": settled_samples}
-    with open(out, "w") as file:
-        json.dump(results, file, indent=1)
-        file.write("\n")
+    with tempfile.TemporaryDirectory() as folder:
+        programs = Programs(directory, size, folder)
+        for scene in SCENES:
+            print(scene, file=sys.stderr)
+            settled_samples.append(measure(programs, scene, int(runs)))
+    write_results(out, {"runs": int(runs), "size": size, "settled_samples": settled_samples})
 
 
 if __name__ == "__main__":

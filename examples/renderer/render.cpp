@@ -2,6 +2,7 @@
 #include "render.hpp"
 
 #include "embree_caster.hpp"
+#include "option_names.hpp"
 
 #include <wfpg/error.hpp>
 #include <wfpg/exec/omp.hpp>
@@ -22,36 +23,6 @@ namespace {
 constexpr int largest_side = 32768;
 constexpr int largest_depth = 1024;
 
-const char* name_of(sampling_method method) {
-  switch (method) {
-    case sampling_method::pt:
-      return "pt";
-    case sampling_method::wfpg_product:
-      return "wfpg-product";
-    case sampling_method::openpgl_vmm:
-      return "openpgl-vmm";
-    case sampling_method::openpgl_dqt:
-      return "openpgl-dqt";
-    default:
-      return "wfpg";
-  }
-}
-
-const char* name_of(device where) {
-  switch (where) {
-    case device::omp:
-      return "omp";
-    case device::seq:
-      return "seq";
-    case device::cuda:
-      return "cuda";
-    case device::optix:
-      return "optix";
-    default:
-      return "cpu";
-  }
-}
-
 render_options completed(const scene& scene, render_options options) {
   using wfpg::detail::require;
   if (options.width == 0 && options.height == 0) {
@@ -65,8 +36,8 @@ render_options completed(const scene& scene, render_options options) {
           "1 to 1024");
   require(options.method != sampling_method::wfpg_product || options.product_resolution > 0,
           "product_resolution", options.product_resolution, "4, 8 or 16 for wfpg-product");
-  require(!is_openpgl(options.method) || options.where == device::cpu, "device", name_of(options.where),
-          "cpu for Open PGL's methods, which run on TBB");
+  require(!is_openpgl(options.method) || options.where == device::cpu, "device",
+          name_of(device_names(), options.where), "cpu for Open PGL's methods, which run on TBB");
   require(options.guide_fraction >= 0.0f && options.guide_fraction <= 1.0f, "guide_fraction",
           options.guide_fraction, "0 to 1");
   require(options.samples_per_leaf >= 8 && options.samples_per_leaf <= 1u << 30, "samples_per_leaf",
@@ -100,8 +71,8 @@ render_result render_completed(const scene& scene, const render_options& options
 render_result render(const scene& scene, const render_options& options, const progress_callback& progress) {
   render_result result = render_completed(scene, completed(scene, options), progress);
   result.report.scene = scene.name;
-  result.report.method = name_of(options.method);
-  result.report.device = name_of(options.where);
+  result.report.method = name_of(method_names(), options.method);
+  result.report.device = name_of(device_names(), options.where);
   return result;
 }
 

@@ -3,6 +3,7 @@
 
 #include "builtin_scenes.hpp"
 #include "gltf_loader.hpp"
+#include "option_names.hpp"
 
 #include <CLI/CLI.hpp>
 
@@ -35,23 +36,8 @@ void parse_size(const std::string& text, render_options& options) {
 
 }  // namespace
 
-const std::map<std::string, wfpg::sample_combination>& combination_names() {
-  using combine = wfpg::sample_combination;
-  static const std::map<std::string, combine> names = {
-      {"pt-linear", combine::pt_linear},        {"pt-first", combine::pt_first},
-      {"constant", combine::constant},          {"linear", combine::linear},
-      {"quadratic", combine::quadratic},        {"one-two", combine::one_two},
-      {"discard-first", combine::discard_first}};
-  return names;
-}
-
 void add_method_options(CLI::App& app, render_options& options) {
-  add_choice<sampling_method>(app, "--method", options.method,
-                              {{"pt", sampling_method::pt},
-                               {"wfpg", sampling_method::wfpg},
-                               {"wfpg-product", sampling_method::wfpg_product},
-                               {"openpgl-vmm", sampling_method::openpgl_vmm},
-                               {"openpgl-dqt", sampling_method::openpgl_dqt}},
+  add_choice<sampling_method>(app, "--method", options.method, method_names(),
                               "path tracing; guided by fields (default), or by their products with BSDFs; by "
                               "Open PGL's mixtures of lobes or quadtrees");
   add_choice<guiding>(app, "--guiding", options.mode,
@@ -65,12 +51,7 @@ void add_method_options(CLI::App& app, render_options& options) {
 }
 
 void add_device_option(CLI::App& app, render_options& options) {
-  add_choice<device>(app, "--device", options.where,
-                     {{"cpu", device::cpu},
-                      {"omp", device::omp},
-                      {"seq", device::seq},
-                      {"cuda", device::cuda},
-                      {"optix", device::optix}},
+  add_choice<device>(app, "--device", options.where, device_names(),
                      "TBB (default), OpenMP, one thread, or a GPU");
 }
 
@@ -106,7 +87,7 @@ void add_guider_options(CLI::App& app, render_options& options) {
       ->check(CLI::Range(1, 1 << 20));
   add_choice<bool>(app, "--learn", options.learn, {{"on", true}, {"off", false}},
                    "kept fields learn from paths, beside their cones (default: on)");
-  app.add_option("--field-budget", options.field_budget, "memory of kept fields, such as 16MiB (the default)")
+  app.add_option("--field-budget", options.field_budget, "memory of kept fields, such as 32MiB (the default)")
       ->transform(CLI::AsSizeValue(false));
   app.add_option("--product-resolution", options.product_resolution,
                  "blocks a side of wfpg-product's products: 4, 8 or 16 (default: 8)")

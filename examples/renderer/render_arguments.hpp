@@ -4,7 +4,6 @@
 #include "render.hpp"
 #include "scene.hpp"
 
-#include <map>
 #include <string>
 
 namespace CLI {
@@ -21,9 +20,6 @@ void add_nee_option(CLI::App& app, render_options& options);     ///< --nee
 void add_budget_options(CLI::App& app, render_options& options);   ///< --spp, --seconds, --seed
 void add_picture_options(CLI::App& app, render_options& options);  ///< --size, --max-depth
 void add_guider_options(CLI::App& app, render_options& options);   ///< resolutions, budgets, bins
-
-/// The choices of --combine.
-const std::map<std::string, wfpg::sample_combination>& combination_names();
 
 /// What no option can check alone, after parsing. Throws CLI::ParseError.
 void check_render_options(const CLI::App& app, const render_options& options);

@@ -4,7 +4,6 @@
 #include "render_impl.hpp"
 
 #include <filesystem>
-#include <limits>
 #include <random>
 #include <sstream>
 #include <string>
@@ -14,13 +13,10 @@ namespace {
 
 /// Of all vertices, and a little more, since what a ray hits is beside them by rounding.
 pgl_box3f bounds_of(const scene& scene) {
-  vec3 low(std::numeric_limits<float>::max()), high(std::numeric_limits<float>::lowest());
-  for (const vec3& p : scene.positions) {
-    low = glm::min(low, p);
-    high = glm::max(high, p);
-  }
-  const vec3 more(1e-3f * glm::length(high - low));
-  return {to_pgl(low - more), to_pgl(high + more)};
+  wfpg::bounds3 box;
+  for (const vec3& p : scene.positions) box = wfpg::detail::bounds_union()(box, {p, p});
+  const vec3 more(1e-3f * glm::length(box.extent()));
+  return {to_pgl(box.lower - more), to_pgl(box.upper + more)};
 }
 
 openpgl_options openpgl_options_of(const scene& scene, const render_options& options) {

@@ -1,0 +1,34 @@
+#include "option_names.hpp"
+
+namespace render {
+
+const std::map<std::string, sampling_method>& method_names() {
+  static const std::map<std::string, sampling_method> names = {
+      {"pt", sampling_method::pt},
+      {"wfpg", sampling_method::wfpg},
+      {"wfpg-product", sampling_method::wfpg_product},
+      {"openpgl-vmm", sampling_method::openpgl_vmm},
+      {"openpgl-dqt", sampling_method::openpgl_dqt}};
+  return names;
+}
+
+const std::map<std::string, device>& device_names() {
+  static const std::map<std::string, device> names = {{"cpu", device::cpu},
+                                                      {"omp", device::omp},
+                                                      {"seq", device::seq},
+                                                      {"cuda", device::cuda},
+                                                      {"optix", device::optix}};
+  return names;
+}
+
+const std::map<std::string, wfpg::sample_combination>& combination_names() {
+  using combine = wfpg::sample_combination;
+  static const std::map<std::string, combine> names = {
+      {"pt-linear", combine::pt_linear},        {"pt-first", combine::pt_first},
+      {"constant", combine::constant},          {"linear", combine::linear},
+      {"quadratic", combine::quadratic},        {"one-two", combine::one_two},
+      {"discard-first", combine::discard_first}};
+  return names;
+}
+
+}  // namespace render
