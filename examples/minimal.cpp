@@ -87,9 +87,10 @@ int main() {
   guider.sample_directions(wave{0, directions.size(), floor_surfaces{}, random_numbers{}}, box_caster{},
                            {directions.data(), directions.size()});
   for (std::size_t ray = 0; ray < directions.size(); ray += 16) {
-    const auto& [d, pdf, technique] = directions[ray];
-    const char* by = technique == sampling_technique::guide ? "guide" : "BSDF";
+    const sampled_direction& next = directions[ray];
+    const vec3 d = next.direction;
+    const char* by = next.technique == sampling_technique::guide ? "guide" : "BSDF";
     std::printf("ray %3zu: direction (% .3f % .3f % .3f), density %8.4f per steradian, by the %s\n", ray, d.x,
-                d.y, d.z, pdf, by);
+                d.y, d.z, next.pdf, by);
   }
 }
