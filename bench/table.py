@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """Prints results as a table of docs/performance.md or docs/quality.md.
 
-usage: bench/table.py bench/results/NAME.json
+usage: bench/table.py bench/results/NAME.json [...]
+
+Several are of wfpg-quality, with the same methods in other scenes.
 """
 import json
 import sys
@@ -18,6 +20,7 @@ FLOORS = {
     "depositing": "reading the vertices",
     "casting": "OptiX, the same rays",
 }
+MEASURES = ("mse_reinhard", "relmse_robust")
 STAGES = ("trace", "sort", "lights", "directions", "shade", "update")
 
 
@@ -62,34 +65,61 @@ def print_sample_times(scenes):
             )
 
 
+def errors_at(scene, samples):
+    """By method: the mean over seeds of its errors after so many samples, less the reference's noise, and of seconds."""
+    sums = {}
+    for run in scene["runs"]:
+        for point in run["points"]:
+            if point["samples"] == samples:
+                sums.setdefault(run["method"], []).append(point)
+    return {
+        method: {
+            **{e: sum(p["error"][e] for p in points) / len(points) - scene["reference"]["noise"][e] for e in MEASURES},
+            "seconds": sum(p["seconds"] for p in points) / len(points),
+        }
+        for method, points in sums.items()
+    }
+
+
 def print_gains(scenes):
-    print("| scene | samples | method | gain in MSE after c / (1 + c) | at equal time | gain in relative MSE | seconds | MiB kept |")
-    print("| --- " * 8 + "|")
-    for scene in scenes:
-        name = scene["scene"].split("/")[-1]
-        for budget in scene["summary"]:
-            for m in budget["methods"]:
-                mse, relative = (m["errors"][e] for e in ("mse_reinhard", "relmse_robust"))
-                print(
-                    f"| {name} | {m['samples']['mean']:.0f} | {m['method']} | {ratio(mse['ratio'])} "
-                    f"| {ratio(mse.get('equal_time_ratio'))} | {ratio(relative['ratio'])} | {m['seconds']['mean']:.2f} "
-                    f"| {m['persistent_bytes'] / 2**20:.1f} |"
-                )
+    """A table for each number of samples at which all methods of all scenes have a picture, from 64 on."""
+    names = [scene["scene"].split("/")[-1].split(" ")[0].removesuffix(".glb") for scene in scenes]
+    methods = [m["method"] for m in scenes[0]["summary"][-1]["methods"]]
+    for samples in (64, 256, 1024, 4096):
+        at = [errors_at(scene, samples) for scene in scenes]
+        if not all(set(methods) <= set(errors) for errors in at):
+            continue
+        print(f"| {samples} samples: gain (relative MSE; equal time) |", " | ".join(names), "|")
+        print("| --- " * (1 + len(names)) + "|")
+        for method in methods:
+            cells = []
+            for errors in at:
+                mse, relative = (errors["pt"][e] / errors[method][e] for e in MEASURES)
+                equal = mse * errors["pt"]["seconds"] / errors[method]["seconds"]
+                cells.append(f"{mse:.2f} ({relative:.2f}; {equal:.2f})")
+            print(f"| {method} |", " | ".join(cells), "|")
+        print()
+    print("| MiB kept |", " | ".join(names), "|")
+    print("| --- " * (1 + len(names)) + "|")
+    for i, method in enumerate(methods):
+        kept = [scene["summary"][-1]["methods"][i]["persistent_bytes"] / 2**20 for scene in scenes]
+        print(f"| {method} |", " | ".join(f"{k:.1f}" for k in kept), "|")
 
 
-def main(path):
-    results = json.load(open(path))
-    if "benchmarks" in results:
-        print_stages(results["benchmarks"])
-    elif "baseline" in results:
-        print_gains(results["scenes"])
-    elif "settled_samples" in results:
-        print_sample_times(results["settled_samples"])
+def main(paths):
+    results = [json.load(open(path)) for path in paths]
+    first = results[0]
+    if "benchmarks" in first:
+        print_stages(first["benchmarks"])
+    elif "baseline" in first:
+        print_gains([scene for result in results for scene in result["scenes"]])
+    elif "settled_samples" in first:
+        print_sample_times(first["settled_samples"])
     else:
-        print_equal_time(results["scenes"])
+        print_equal_time(first["scenes"])
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
+    if len(sys.argv) < 2:
         sys.exit(__doc__.strip())
-    main(sys.argv[1])
+    main(sys.argv[1:])
