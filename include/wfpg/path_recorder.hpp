@@ -83,7 +83,7 @@ class path_recorder_view {
     const std::size_t slot = depth * recorded_ + place;
     places_[slot] = {position, pack_direction(outgoing)};
     light_[slot] = {throughput, vec3(0.0f)};
-    if (learns()) directions_[slot].field = no_field;
+    if (learns()) directions_[slot] = {no_field, 0};
     lengths_[place] = depth + 1;
   }
 
