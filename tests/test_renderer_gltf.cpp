@@ -412,6 +412,14 @@ TEST_CASE("glTF: hostile files", "[renderer][gltf][hostile]") {
       CHECK(tiny_gltf().with(part, json).error() != "nothing was thrown");
     }
   }
+  SECTION("a scene that no camera sees, a camera that sees nothing") {
+    tiny_gltf huge;
+    huge.buffer.replace(0, 36, raw<float>({0, 0, 0, 3e38f, 0, 0, 0, 3e38f, 0}));
+    CHECK(contains(huge.error(), "too large"));
+    tiny_gltf narrow;
+    narrow.with("cameras", R"([{"type": "perspective", "perspective": {"yfov": 1e-60, "znear": 0.1}}])");
+    CHECK(contains(narrow.with("nodes", R"([{"mesh": 0, "camera": 0}])").error(), "yfov"));
+  }
   SECTION("node graphs that are no trees") {
     CHECK(contains(tiny_gltf().with("nodes", R"([{"children": [0]}])").error(), "twice"));
     CHECK(contains(tiny_gltf().with("nodes", R"([{"children": [1]}, {"children": [0]}])").error(), "twice"));

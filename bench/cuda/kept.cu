@@ -50,6 +50,7 @@ void refreshing_slots(benchmark::State& state) {
   const wfpg::buffer<std::uint32_t, exec_policy> words(exec, std::size_t(slot_count) * cells),
       list(exec, slot_count);
   const wfpg::buffer<wfpg::detail::cone_hit, exec_policy> found(exec, std::size_t(slot_count) * cells);
+  const wfpg::buffer<wfpg::detail::learnt_mean, exec_policy> learnt(exec, found.size());
   const wfpg::buffer<wfpg::ray_hit, exec_policy> hits(exec, std::size_t(slot_count) * cells);
   thrust::sequence(exec.thrust(), list.data(), list.data() + slot_count);
 
@@ -61,6 +62,8 @@ void refreshing_slots(benchmark::State& state) {
                                             fields.data(),
                                             words.data(),
                                             found.data(),
+                                            learnt.data(),
+                                            1.0f,
                                             slot_size,
                                             recast,
                                             2,

@@ -276,7 +276,7 @@ class scene_reader {
     if (source.type != "perspective") return warn("only perspective cameras are supported");
     if (has_camera_) return warn("the scene has several cameras: the first is used");
     const double fov = source.perspective.yfov;
-    if (!(fov > 0.0 && fov < 3.14159)) throw std::runtime_error("a camera's yfov is not in (0, pi)");
+    if (!(fov > 1e-6 && fov < 3.14159)) throw std::runtime_error("a camera's yfov is not in (1e-6, pi)");
     target_.view.position = vec3(to_world[3]);
     target_.view.forward = unit_or(-vec3(to_world[2]), vec3(0.0f));
     target_.view.up = unit_or(vec3(to_world[1]), vec3(0.0f));
@@ -326,16 +326,18 @@ class scene_reader {
 
   /// Looks along -z at the whole bounding box.
   void frame_everything() {
-    if (target_.positions.empty()) return;
-    vec3 lower = target_.positions[0], upper = lower;
+    glm::dvec3 lower(std::numeric_limits<double>::max()), upper(-lower);
     for (const vec3& p : target_.positions) {
-      lower = glm::min(lower, p);
-      upper = glm::max(upper, p);
+      if (!finite(p)) continue;
+      lower = glm::min(lower, glm::dvec3(p));
+      upper = glm::max(upper, glm::dvec3(p));
     }
-    const float radius = std::max(0.5f * glm::length(upper - lower), 1e-6f);
+    if (upper.x < lower.x) return;
+    const double radius = std::max(0.5 * glm::length(upper - lower), 1e-6);
     camera view;
-    view.position = 0.5f * (lower + upper);
-    view.position.z += radius / std::sin(0.5f * view.vertical_fov);
+    const double distance = radius / std::sin(0.5 * static_cast<double>(view.vertical_fov));
+    view.position = vec3(0.5 * (lower + upper) + glm::dvec3(0.0, 0.0, distance));
+    if (!finite(view.position)) throw std::runtime_error("the scene is too large for a camera to see it");
     target_.view = view;
     warn("the file has no perspective camera: one that sees the whole scene is made up");
   }

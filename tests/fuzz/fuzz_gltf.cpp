@@ -1,0 +1,80 @@
+// The glTF loader on any bytes: a scene that holds together, or an error with the path and a reason.
+#include "gltf_loader.hpp"
+
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <stdexcept>
+#include <string>
+
+namespace {
+
+/// A file that lives in memory, with a path that others can open.
+class memory_file {
+ public:
+  memory_file() : descriptor_(memfd_create("scene", 0)) { require(descriptor_ >= 0, "no file in memory"); }
+
+  std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+  void hold(const std::uint8_t* bytes, std::size_t size) const {
+    require(ftruncate(descriptor_, 0) == 0, "the file cannot be emptied");
+    require(pwrite(descriptor_, bytes, size, 0) == static_cast<ssize_t>(size), "the file cannot be written");
+  }
+
+  static void require(bool holds, const char* what) {
+    if (holds) return;
+    std::fprintf(stderr, "%s\n", what);
+    std::abort();
+  }
+
+ private:
+  int descriptor_;
+};
+
+bool is_finite(const wfpg::vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+bool is_texture(const render::scene& scene, const render::texture_reference& reference) {
+  return reference.index < 0 || static_cast<std::size_t>(reference.index) < scene.textures.size();
+}
+
+/// What the renderer relies on.
+void check(const render::scene& scene) {
+  const auto require = memory_file::require;
+  const std::size_t vertices = scene.positions.size();
+  require(scene.normals.empty() || scene.normals.size() == vertices, "as many normals as positions");
+  require(scene.uvs.empty() || scene.uvs.size() == vertices, "as many texture coordinates as positions");
+  require(scene.triangle_materials.size() == scene.triangles.size(), "a material for each triangle");
+  for (const wfpg::uvec3& t : scene.triangles)
+    require(t.x < vertices && t.y < vertices && t.z < vertices, "triangles of vertices that exist");
+  for (const std::uint32_t m : scene.triangle_materials)
+    require(m < scene.materials.size(), "materials that exist");
+  for (const render::material& m : scene.materials) {
+    require(is_texture(scene, m.base_texture) && is_texture(scene, m.metallic_roughness_texture) &&
+                is_texture(scene, m.emission_texture),
+            "textures that exist");
+    require(m.alpha > 0.0f && m.alpha <= 1.0f && m.ior > 0.0f, "roughness and index in their ranges");
+    require(is_finite(m.base_color) && is_finite(m.emission) && is_finite(m.absorption), "finite materials");
+  }
+  require(is_finite(scene.view.position) && is_finite(scene.view.forward) && is_finite(scene.view.up) &&
+              scene.view.vertical_fov > 0.0f,
+          "a camera that sees");
+  require(scene.width > 0 && scene.height > 0 && scene.max_depth > 0, "a picture of some size");
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
+  static const memory_file file;
+  file.hold(bytes, size);
+  try {
+    check(render::load_gltf(file.path()));
+  } catch (const std::runtime_error& error) {
+    memory_file::require(std::string(error.what()).rfind(file.path() + ": ", 0) == 0, "errors name the path");
+  }
+  return 0;
+}
