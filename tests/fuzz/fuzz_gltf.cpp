@@ -1,10 +1,11 @@
 // The glTF loader on any bytes: a scene that holds together, or an error with the path and a reason.
 #include "gltf_loader.hpp"
 
+#include <wfpg/detail/math.hpp>
+
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -12,6 +13,8 @@
 #include <string>
 
 namespace {
+
+using wfpg::detail::is_finite;
 
 /// A file that lives in memory, with a path that others can open.
 class memory_file {
@@ -33,10 +36,6 @@ class memory_file {
  private:
   int descriptor_;
 };
-
-bool is_finite(const wfpg::vec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 bool is_texture(const render::scene& scene, const render::texture_reference& reference) {
   return reference.index < 0 || static_cast<std::size_t>(reference.index) < scene.textures.size();

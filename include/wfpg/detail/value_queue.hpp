@@ -7,7 +7,6 @@
 #include <wfpg/buffer.hpp>
 #include <wfpg/detail/atomic.hpp>
 #include <wfpg/detail/math.hpp>
-#include <wfpg/error.hpp>
 
 #include <thrust/fill.h>
 
