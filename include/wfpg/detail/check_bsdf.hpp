@@ -234,7 +234,7 @@ class bsdf_check {
   /// the whole sphere.
   std::string frequencies(bsdf_part part, vec3 outgoing, std::uint64_t numbers,
                           const std::vector<bsdf_draw>& made) const {
-    if (!made.front().asked) return {};
+    if (made.front().asked == 0) return {};
     for (const bsdf_draw& d : made) {
       const std::string message = drawn(part, outgoing, d.drawn, d.pdf);
       if (!message.empty()) return message;

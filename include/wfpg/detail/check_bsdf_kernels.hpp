@@ -99,8 +99,8 @@ struct probe_bsdf {
 /// A sample, for counting.
 struct bsdf_draw {
   bsdf_sample drawn;
-  float eval, pdf;  // 0 where sampling failed
-  bool asked;       // false where the part is never drawn
+  float eval, pdf;      // 0 where sampling failed
+  std::uint32_t asked;  // 0 where the part is never drawn; no bool, whose padding nobody would write
 };
 
 template <class Bsdf>
@@ -113,8 +113,8 @@ struct draw_bsdf {
 
   WFPG_HD void operator()(std::size_t i) const {
     bsdf_draw d{};
-    d.asked = draws(bsdf, part, outgoing);
-    if (d.asked) d.drawn = sample_of(bsdf, part, outgoing, unit_vec2(hash(hash(seed, i), 0)));
+    d.asked = draws(bsdf, part, outgoing) ? 1 : 0;
+    if (d.asked != 0) d.drawn = sample_of(bsdf, part, outgoing, unit_vec2(hash(hash(seed, i), 0)));
     if (d.drawn.pdf > 0.0f) {
       d.eval = bsdf.eval(outgoing, d.drawn.direction);
       d.pdf = pdf_of(bsdf, part, outgoing, d.drawn.direction);
