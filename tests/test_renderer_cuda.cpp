@@ -36,6 +36,7 @@ void check_as_on_cpu(rendering what) {
 void check_all_scenes(sampling_method method) {
   for (const char* scene : {"cornell-box", "cornell-enclosed", "ajar", "thin-wall", "furnace", "glossy-room"})
     for (const bool nee : {false, true}) check_as_on_cpu({scene, nee, method});
+  check_as_on_cpu({"many-lamps", true, method});
 }
 
 bool same_bits(const render::image& a, const render::image& b) {

@@ -6,6 +6,7 @@
 
 #include <wfpg/exec/seq.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <vector>
@@ -125,4 +126,112 @@ TEST_CASE("an environment map is sampled by luminance", "[renderer][lights]") {
   const device_scene<wfpg::exec::seq> corner(exec, s);
   CHECK(corner.view().environment.radiance(glm::normalize(vec3(1.0f, 1.414f, -1.0f))).x ==
         Approx(1.0).epsilon(0.01));
+}
+
+namespace {
+
+/// Squares of side 0.1 in a row along x, a unit apart, that face +z or, every other one, -z, and a floor that
+/// does not shine; of radius about half the row's length.
+scene row_of_lamps(int count) {
+  scene s;
+  s.materials.resize(2);
+  s.materials[1].emission = vec3(1.0f);
+  const auto square = [&](vec3 corner, vec2 size, bool flipped, std::uint32_t material) {
+    const auto first = static_cast<std::uint32_t>(s.positions.size());
+    const vec3 u(size.x, 0.0f, 0.0f), v(0.0f, size.y, 0.0f);
+    for (const vec3& p : {corner, corner + u, corner + u + v, corner + v}) s.positions.push_back(p);
+    for (const uvec3& t : {uvec3(0, 1, 2), uvec3(0, 2, 3)}) {
+      s.triangles.push_back(flipped ? uvec3(first) + uvec3(t.x, t.z, t.y) : uvec3(first) + t);
+      s.triangle_materials.push_back(material);
+    }
+  };
+  square({0.0f, 0.0f, -1.0f}, {static_cast<float>(count), 1.0f}, false, 0);
+  for (int i = 0; i < count; ++i) square({static_cast<float>(i), 0.0f, 0.0f}, vec2(0.1f), i % 2 == 1, 1);
+  return s;
+}
+
+double sum_of_shares(const grouped_lights& grouped) {
+  double sum = 0.0;
+  for (const light_group& group : grouped.groups) sum += static_cast<double>(group.share);
+  return sum;
+}
+
+}  // namespace
+
+TEST_CASE("every light is in one group, with its share of the power", "[renderer][lights]") {
+  scene s = row_of_lamps(6);
+  punctual_light bulb;
+  bulb.position = {0.5f, 0.5f, 3.0f};
+  s.punctual_lights = {bulb};
+  s.sky = {2, 1, {vec3(0.5f), vec3(0.5f)}};
+  for (const std::uint32_t most : {1u, 2u, 3u, 5u, 8u, 255u}) {
+    const grouped_lights grouped = group_lights(s, most);
+    INFO("at most " << most);
+    CHECK(grouped.groups.size() == (most == 1 ? 1u : std::min(most, 7u) + 1u));  // the sky is apart
+    CHECK(grouped.lights.size() == 6 * 2 + 2);
+    CHECK(sum_of_shares(grouped) == Approx(1.0));
+    std::vector<std::uint32_t> seen = grouped.lights;
+    std::sort(seen.begin(), seen.end());
+    CHECK(std::adjacent_find(seen.begin(), seen.end()) == seen.end());
+    std::uint32_t next = 0;
+    for (std::size_t g = 0; g < grouped.groups.size(); ++g) {
+      const light_group group = grouped.groups[g];
+      CHECK(group.first == next);
+      next += group.count;
+      double power = 0.0;
+      for (std::uint32_t i = group.first; i < next; ++i) {
+        power += grouped.powers[i];
+        if (grouped.groups.size() > 1 && !(grouped.lights[i] & grouped_lights::beyond_triangles))
+          CHECK(grouped.triangle_groups[grouped.lights[i]] == g);
+      }
+      CHECK(static_cast<double>(group.share) == Approx(power / grouped.total_power));
+    }
+    CHECK(next == grouped.lights.size());
+    // The environment is the last light.
+    CHECK(grouped.lights.back() == (grouped_lights::beyond_triangles | 1u));
+  }
+}
+
+TEST_CASE("flat emitters are one light, and lights near each other stay together", "[renderer][lights]") {
+  CHECK(group_lights(row_of_lamps(1), 32).groups.size() == 1);
+  CHECK(group_lights(row_of_lamps(1), 32).triangle_groups.empty());
+  // Two lamps of a thousand, a unit apart in a scene that is a thousand wide.
+  CHECK(group_lights(row_of_lamps(1000), 255).groups.size() < 100);
+  CHECK(group_lights(row_of_lamps(6), 32).groups.size() == 6);
+  CHECK(group_lights(scene(), 32).groups.empty());
+  // Front and back of a thin lamp are two.
+  scene both = row_of_lamps(2);
+  for (std::size_t i = 8; i < 12; ++i) both.positions[i].x -= 1.0f;
+  CHECK(group_lights(both, 32).groups.size() == 2);
+}
+
+TEST_CASE("a choice of groups changes what lights are drawn with, and not what they bring",
+          "[renderer][lights]") {
+  const scene s = row_of_lamps(5);
+  const wfpg::exec::seq exec;
+  const device_scene<wfpg::exec::seq> geometry(exec, s);
+  const light_distribution<wfpg::exec::seq> whole(exec, s), parts(exec, s, 32);
+  REQUIRE(parts.shares().size() == 5);
+  const vec3 from(2.0f, 0.3f, 1.0f);
+  const auto irradiance = [&](const light_distribution<wfpg::exec::seq>& lights, const auto& choose) {
+    double sum = 0.0;
+    constexpr std::uint32_t draws = 200000;
+    for (std::uint32_t i = 0; i < draws; ++i) {
+      const light_sample light = lights.view().sample(geometry.view(), from, choose(i),
+                                                      [&](std::uint32_t use) { return numbers(i, use); });
+      if (light.pdf > 0.0f) sum += static_cast<double>(light.radiance.x / light.pdf);
+    }
+    return sum / draws;
+  };
+  const double expected = irradiance(whole, [](std::uint32_t) { return wfpg::light_choice{}; });
+  // Far from how bright the groups are from there.
+  const float probabilities[] = {0.4f, 0.3f, 0.05f, 0.05f, 0.2f};
+  const double found = irradiance(parts, [&](std::uint32_t i) {
+    float u = numbers(i, 20).x;
+    for (std::uint32_t g = 0;; ++g) {
+      if (u < probabilities[g] || g == 4) return wfpg::light_choice{g, probabilities[g]};
+      u -= probabilities[g];
+    }
+  });
+  CHECK(found == Approx(expected).epsilon(0.02));
 }

@@ -38,6 +38,7 @@ constexpr auto product_method = render::sampling_method::wfpg_product;
 TEST_CASE("pictures guided by kept fields have the mean of unguided ones", "[renderer][unbiased]") {
   for (const char* scene : {"cornell-box", "cornell-enclosed", "ajar", "thin-wall", "furnace"})
     for (const bool nee : {false, true}) check_unbiased({scene, nee});
+  check_unbiased({"many-lamps", true});  // whose choice is learnt
   check_unbiased({"cornell-enclosed", false, wfpg_method, fields::kept, guiding::plain});
   check_unbiased({"thin-wall", true, wfpg_method, fields::kept, guiding::plain});
 }
@@ -47,6 +48,7 @@ TEST_CASE("pictures guided by transient fields have the mean of unguided ones", 
     check_unbiased({"cornell-enclosed", nee, wfpg_method, fields::transient, guiding::oriented});
     check_unbiased({"thin-wall", nee, wfpg_method, fields::transient, guiding::plain});
   }
+  check_unbiased({"many-lamps", true, wfpg_method, fields::transient, guiding::oriented});
 }
 
 TEST_CASE("pictures guided by products have the mean of unguided ones", "[renderer][unbiased]") {

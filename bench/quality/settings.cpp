@@ -27,8 +27,8 @@ struct preset {
   const char* size;  ///< empty: the scene's own
 };
 
-const std::vector<std::string> builtin_scenes = {"cornell-enclosed --nee off", "ajar", "thin-wall",
-                                                 "glossy-room --nee off", "cornell-box"};
+const std::vector<std::string> builtin_scenes = {"cornell-enclosed --nee off", "ajar",       "thin-wall",
+                                                 "glossy-room --nee off",      "many-lamps", "cornell-box"};
 
 const std::map<std::string, preset> presets = {
     {"quick", {builtin_scenes, {"pt", "wfpg", "wfpg-product"}, {64}, 2, 1024, "104x104"}},

@@ -278,6 +278,48 @@ scene glossy_room() {
   return b.finish(8);
 }
 
+/// Four rooms in a row, z from 1.5 to -8.5, with three lamps each, and walls without thickness between them
+/// that leave a passage on alternate sides.
+scene many_lamps() {
+  scene_builder b("many-lamps");
+  const auto white = b.diffuse(vec3(0.7f)), left = b.diffuse(red), right = b.diffuse(green);
+  material tiles;
+  tiles.kind = material_kind::plastic;
+  tiles.base_color = {0.45f, 0.42f, 0.38f};
+  tiles.alpha = 0.2f;
+  const auto floor = b.add(tiles);
+  b.room({{-2.0f, 0.0f, -8.5f}, {2.0f, 3.0f, 1.5f}}, {left, right, floor, white, white, white});
+  const float brightness[4][3] = {
+      {40.0f, 5.0f, 15.0f}, {2.0f, 30.0f, 8.0f}, {60.0f, 1.0f, 15.0f}, {5.0f, 90.0f, 40.0f}};
+  for (int room = 0; room < 4; ++room) {
+    const float z = 0.25f - 2.5f * static_cast<float>(room);
+    if (room > 0)
+      b.parallelogram({room % 2 == 1 ? -2.0f : -0.8f, 0.0f, z + 1.25f}, {2.8f, 0.0f, 0.0f},
+                      {0.0f, 3.0f, 0.0f}, {{0.0f, 0.0f, 1.0f}, white});
+    for (int i = 0; i < 3; ++i)
+      b.ceiling_lamp({1.3f * static_cast<float>(i - 1), 2.6f, z}, {0.3f, 0.15f},
+                     b.lamp(brightness[room][i] * vec3(1.0f, 0.8f, 0.55f)));
+  }
+  b.box({{0.6f, 0.3f, -0.4f}, {0.6f, 0.6f, 0.6f}, 0.4f}, white);
+  scene s = b.finish(8);
+  punctual_light bulb;
+  bulb.position = {-1.6f, 0.9f, -2.0f};
+  bulb.intensity = {0.2f, 0.4f, 1.0f};
+  punctual_light spot;
+  spot.kind = punctual_kind::spot;
+  spot.position = {-1.5f, 2.8f, 0.2f};
+  spot.direction = glm::normalize(vec3(0.6f, -1.0f, -0.4f));
+  spot.intensity = vec3(3.0f);
+  spot.cos_inner = 0.95f;
+  spot.cos_outer = 0.9f;
+  s.punctual_lights = {bulb, spot};
+  s.view.position = {-1.6f, 1.7f, 1.4f};
+  s.view.forward = glm::normalize(vec3(0.75f, -0.12f, -1.0f));
+  s.view.up = up;
+  s.view.vertical_fov = 1.1f;
+  return s;
+}
+
 scene furnace() {
   scene_builder b("furnace");
   material wall;
@@ -294,7 +336,8 @@ using maker = scene (*)();
 const std::vector<std::pair<std::string, maker>>& makers() {
   static const std::vector<std::pair<std::string, maker>> all = {
       {"cornell-box", cornell_box}, {"cornell-enclosed", cornell_enclosed}, {"ajar", ajar},
-      {"thin-wall", thin_wall},     {"glossy-room", glossy_room},           {"furnace", furnace}};
+      {"thin-wall", thin_wall},     {"glossy-room", glossy_room},           {"many-lamps", many_lamps},
+      {"furnace", furnace}};
   return all;
 }
 

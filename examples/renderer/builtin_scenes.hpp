@@ -9,7 +9,7 @@
 
 namespace render {
 
-/// cornell-box, cornell-enclosed, ajar, thin-wall, furnace.
+/// cornell-box, cornell-enclosed, ajar, thin-wall, glossy-room, many-lamps, furnace.
 std::vector<std::string> builtin_scene_names();
 
 bool is_builtin_scene(const std::string& name);
@@ -22,6 +22,9 @@ bool is_builtin_scene(const std::string& name);
 ///   the dark room past the door's free edge. Closed.
 /// - `thin-wall`: a two-sided wall without thickness between a lit and a dark half. The lamp hangs below the
 ///   wall's edge: all light in the dark half is indirect. Closed.
+/// - `glossy-room`: metal walls, and a lamp in a trough that shines at the ceiling alone. Closed.
+/// - `many-lamps`: four rooms in a row, each with three lamps of very different power, a bulb and a spot. Of
+///   the lamps in other rooms little is seen. Closed.
 /// - `furnace`: a closed box of albedo 0.5 that emits radiance 1 everywhere; see furnace_radiance().
 scene make_builtin_scene(const std::string& name);
 

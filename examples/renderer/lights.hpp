@@ -4,9 +4,10 @@
 
 #include "alias_table.hpp"
 #include "device_scene.hpp"
+#include "light_groups.hpp"
 #include "rng.hpp"
 
-#include <numeric>
+#include <wfpg/light_guide.hpp>
 
 namespace render {
 
@@ -36,12 +37,12 @@ WFPG_HD inline float solid_angle_pdf(float area_pdf, float distance, float cosin
 
 /// Trivially copyable.
 struct light_view {
-  wfpg::array_view<const std::uint32_t> triangles;
+  wfpg::array_view<const std::uint32_t> lights;  ///< as in grouped_lights
   wfpg::array_view<const punctual_light> punctual;
-  wfpg::array_view<const alias_column>
-      table;                 ///< by power: a column for each triangle, each other light, and a map
-  float total_power = 0.0f;  ///< over pi; of an emitter, mean luminance times area
-
+  wfpg::array_view<const alias_column> table;  ///< by power inside a group, a column a light
+  wfpg::array_view<const light_group> groups;
+  wfpg::array_view<const std::uint8_t> triangle_groups;  ///< of all triangles; empty: there is one group
+  float total_power = 0.0f;   ///< over pi; of an emitter, mean luminance times area
   float scene_radius = 0.0f;  ///< of a sphere around the scene
 
   /// Over pi, of the light that may meet a scene of that radius.
@@ -58,10 +59,10 @@ struct light_view {
   /// Density by area of any point of an emitter with this mean luminance.
   WFPG_HD float pdf(float luminance) const { return total_power > 0.0f ? luminance / total_power : 0.0f; }
 
-  /// A point of emitter number `light`.
+  /// A point of the emitter in a column of the table.
   WFPG_HD emitter_point sample_emitter(const scene_view& scene, std::uint32_t light, vec2 u) const {
     const float root = std::sqrt(u.x);
-    const triangle_hit hit{triangles[light], root * (1.0f - u.y), root * u.y};
+    const triangle_hit hit{lights[light], root * (1.0f - u.y), root * u.y};
     const surface_point at = scene.point(hit);
     const vec3 radiance =
         scene.is_cut_out(hit) ? vec3(0.0f) : scene.emitted(scene.materials[at.material], at.uv);
@@ -75,14 +76,34 @@ struct light_view {
     return environment.pdf(direction) * power_of(environment, scene_radius) / total_power;
   }
 
-  /// Light for a point; draw(dimension) gives random numbers in [0,1)².
+  /// The groups of an emitting triangle and of the environment.
+  WFPG_HD std::uint32_t group_of(std::uint32_t triangle) const {
+    return triangle_groups.empty() ? 0u : triangle_groups[triangle];
+  }
+  WFPG_HD std::uint32_t sky_group() const { return static_cast<std::uint32_t>(groups.size() - 1); }
+
+  /// Light for a point, of the group that was chosen; draw(dimension) gives random numbers in [0,1)².
   template <class Draw>
-  WFPG_HD light_sample sample(const scene_view& scene, vec3 from, const Draw& draw) const {
+  WFPG_HD light_sample sample(const scene_view& scene, vec3 from, const wfpg::light_choice& choice,
+                              const Draw& draw) const {
     if (table.empty()) return {};
-    const std::uint32_t light = pick(table, draw(dimension::light_choice));
-    if (light < triangles.size())
+    const light_group group = groups[choice.group];
+    const std::uint32_t column =
+        pick({table.data() + group.first, group.count}, draw(dimension::light_choice));
+    light_sample light = sample_light(scene, from, group.first + column, draw);
+    light.pdf *= choice.probability / group.share;
+    return light;
+  }
+
+ private:
+  /// As if all lights were one group.
+  template <class Draw>
+  WFPG_HD light_sample sample_light(const scene_view& scene, vec3 from, std::uint32_t light,
+                                    const Draw& draw) const {
+    const std::uint32_t number = lights[light];
+    if ((number & grouped_lights::beyond_triangles) == 0)
       return from_emitter(sample_emitter(scene, light, draw(dimension::light_point)), from);
-    const std::size_t beyond = light - triangles.size();
+    const std::uint32_t beyond = number & ~grouped_lights::beyond_triangles;
     if (beyond < punctual.size()) return from_punctual(punctual[beyond], from);
     const vec3 direction =
         scene.environment.sample(draw(dimension::light_texel), draw(dimension::light_point));
@@ -94,7 +115,6 @@ struct light_view {
     return sky;
   }
 
- private:
   WFPG_HD static light_sample from_emitter(const emitter_point& point, vec3 from) {
     const vec3 toward = point.position - from;
     const float distance = glm::length(toward);
@@ -140,60 +160,51 @@ struct light_view {
 template <class Exec>
 class light_distribution {
  public:
-  light_distribution(const Exec& exec, const scene& host) : radius_(radius_of(host)) {
-    std::vector<std::uint32_t> triangles;
-    std::vector<double> powers;
-    const std::vector<float> luminances = emitted_luminances(host);
-    for (std::size_t i = 0; i < host.triangles.size(); ++i) {
-      const double power = static_cast<double>(luminances[host.triangle_materials[i]]) * area_of(host, i);
-      if (!(power > 0.0)) continue;
-      triangles.push_back(static_cast<std::uint32_t>(i));
-      powers.push_back(power);
-    }
-    for (const punctual_light& light : host.punctual_lights)
-      powers.push_back(static_cast<double>(light_view::power_of(light, radius_)));
-    const double sky_power = host.sky.texels.empty() ? 0.0 : power_of_sky(host);
-    if (sky_power > 0.0) powers.push_back(sky_power);
-    total_power_ = static_cast<float>(std::accumulate(powers.begin(), powers.end(), 0.0));
-    triangles_ = wfpg::buffer<std::uint32_t, Exec>(exec, triangles);
-    punctual_ = wfpg::buffer<punctual_light, Exec>(exec, host.punctual_lights);
-    if (total_power_ > 0.0f) table_ = wfpg::buffer<alias_column, Exec>(exec, make_alias_table(powers));
-  }
+  light_distribution(const Exec& exec, const scene& host, std::uint32_t most_groups = 1)
+      : light_distribution(exec, host, group_lights(host, most_groups)) {}
 
   light_view view() const {
     light_view v;
-    v.triangles = triangles_.view();
+    v.lights = lights_.view();
     v.punctual = punctual_.view();
     v.table = table_.view();
+    v.groups = groups_.view();
+    v.triangle_groups = triangle_groups_.view();
     v.total_power = total_power_;
     v.scene_radius = radius_;
     return v;
   }
 
+  /// The share of each group in the lights' power.
+  const std::vector<float>& shares() const { return shares_; }
+
  private:
-  double power_of_sky(const scene& host) const {
-    const std::vector<double> powers = texel_powers(host.sky);
-    return static_cast<double>(radius_ * radius_) * std::accumulate(powers.begin(), powers.end(), 0.0);
+  light_distribution(const Exec& exec, const scene& host, const grouped_lights& grouped)
+      : lights_(exec, grouped.lights),
+        punctual_(exec, host.punctual_lights),
+        groups_(exec, grouped.groups),
+        triangle_groups_(exec, grouped.triangle_groups),
+        total_power_(static_cast<float>(grouped.total_power)),
+        radius_(grouped.scene_radius) {
+    std::vector<alias_column> table;
+    for (const light_group& group : grouped.groups) {
+      const auto begin = grouped.powers.begin() + group.first;
+      const std::vector<alias_column> columns =
+          make_alias_table(std::vector<double>(begin, begin + group.count));
+      table.insert(table.end(), columns.begin(), columns.end());
+      shares_.push_back(group.share);
+    }
+    table_ = wfpg::buffer<alias_column, Exec>(exec, table);
   }
 
-  static double area_of(const scene& host, std::size_t triangle) {
-    const uvec3 t = host.triangles[triangle];
-    const vec3 a = host.positions[t.x];
-    return static_cast<double>(0.5f *
-                               glm::length(glm::cross(host.positions[t.y] - a, host.positions[t.z] - a)));
-  }
-
-  static float radius_of(const scene& host) {
-    wfpg::bounds3 box;
-    for (const vec3& p : host.positions) box = {glm::min(box.lower, p), glm::max(box.upper, p)};
-    return box.empty() ? 0.0f : 0.5f * glm::length(box.extent());
-  }
-
-  wfpg::buffer<std::uint32_t, Exec> triangles_;
+  wfpg::buffer<std::uint32_t, Exec> lights_;
   wfpg::buffer<punctual_light, Exec> punctual_;
+  wfpg::buffer<light_group, Exec> groups_;
+  wfpg::buffer<std::uint8_t, Exec> triangle_groups_;
   wfpg::buffer<alias_column, Exec> table_;
-  float total_power_ = 0.0f;
-  float radius_ = 0.0f;
+  std::vector<float> shares_;
+  float total_power_;
+  float radius_;
 };
 
 }  // namespace render

@@ -124,6 +124,7 @@ class openpgl_guider {
     clock_.measure("train", [&] { field_.UpdateSurface(paths_.samples()); });
   }
   const openpgl_recorder& recorder() const { return paths_.recorder(); }
+  wfpg::light_guide_view lights() const { return {}; }
 
   template <class Wave, class Caster, class Queries = wfpg::no_queries>
   void sample_directions(const Wave& wave, const Caster&,

@@ -27,6 +27,21 @@ struct path_lights {
   scene_view scene;
   light_view lights;
   bool next_event = true;
+  wfpg::light_guide_view guide = {};  ///< empty: lights are chosen by power
+
+  /// The group of lights that a vertex asks.
+  WFPG_HD wfpg::light_choice choose(const path_vertex& vertex, float u) const {
+    return guide.empty() ? wfpg::light_choice{} : guide.choose(row(vertex), u);
+  }
+  /// How much more likely than by power a vertex chooses a group.
+  WFPG_HD float preference(const path_vertex& vertex, std::uint32_t group) const {
+    return guide.empty() ? 1.0f : guide.probability(row(vertex), group) / lights.groups[group].share;
+  }
+
+ private:
+  WFPG_HD std::uint32_t row(const path_vertex& vertex) const {
+    return guide.find(vertex.position, vertex.geometric_normal);
+  }
 };
 
 /// Starts a path through each pixel.
@@ -118,15 +133,15 @@ struct trace_paths {
     const triangle_hit hit = answers.hit(slot, path.ray());
     if (!hit.is_hit()) {
       recorder.escape(id, at.depth, path.throughput);
-      gather(id,
-             path.throughput * world.scene.environment.radiance(path.direction) * environment_weight(path));
+      gather(id, path.throughput * world.scene.environment.radiance(path.direction) *
+                     environment_weight(id, path));
       return end(id);
     }
     const hit_surface found = world.scene.surface(hit, -path.direction);
     const wfpg::surface<bsdf>& surface = found.surface;
     const vec3 before = path.throughput, throughput = before * absorb(id, path, found);
     recorder.vertex(id, at.depth, surface.position, surface.outgoing, throughput);
-    gather(id, throughput * found.emission * emission_weight(path, found));
+    gather(id, throughput * found.emission * emission_weight(id, path, hit, found));
     if (at.is_last()) return end(id);
     vertices.emplace(id, found);
     keys[id] = static_cast<std::uint32_t>(surface.bsdf.kind);
@@ -155,20 +170,23 @@ struct trace_paths {
     recorder.emission(id, at.depth, contribution);
   }
 
-  WFPG_HD float environment_weight(const path_state& path) const {
+  WFPG_HD float environment_weight(std::uint32_t id, const path_state& path) const {
     if (!world.next_event || !(path.pdf > 0.0f)) return 1.0f;
-    return wfpg::power_heuristic(path.pdf,
-                                 world.lights.environment_pdf(world.scene.environment, path.direction));
+    const float pdf = world.lights.environment_pdf(world.scene.environment, path.direction);
+    if (!(pdf > 0.0f)) return 1.0f;
+    return wfpg::power_heuristic(path.pdf, pdf * world.preference(vertices[id], world.lights.sky_group()));
   }
 
   // Against next-event estimation at the vertex before, which could have found the same point.
-  WFPG_HD float emission_weight(const path_state& path, const hit_surface& found) const {
-    if (!world.next_event || !(path.pdf > 0.0f)) return 1.0f;
+  WFPG_HD float emission_weight(std::uint32_t id, const path_state& path, const triangle_hit& hit,
+                                const hit_surface& found) const {
+    if (!world.next_event || !(path.pdf > 0.0f) || found.emission == vec3(0.0f)) return 1.0f;
     const vec3 normal = found.surface.geometric_normal;
     const float cosine = std::abs(glm::dot(normal, path.direction));
     const float distance = glm::length(found.surface.position - path.origin);
-    return wfpg::power_heuristic(
-        path.pdf, solid_angle_pdf(world.lights.pdf(found.emitted_luminance), distance, cosine));
+    const float pdf = world.lights.pdf(found.emitted_luminance) *
+                      world.preference(vertices[id], world.lights.group_of(hit.triangle));
+    return wfpg::power_heuristic(path.pdf, solid_angle_pdf(pdf, distance, cosine));
   }
 };
 
@@ -193,15 +211,18 @@ struct query_lights {
     const path_vertex& vertex = vertices[path];
     const bsdf scatters = vertex.bsdf();
     if (scatters.is_delta()) return {};
-    const light_sample light = world.lights.sample(world.scene, vertex.position,
+    const wfpg::light_choice choice = world.choose(vertex, at.draw(path, dimension::light_group).x);
+    const light_sample light = world.lights.sample(world.scene, vertex.position, choice,
                                                    [&](std::uint32_t use) { return at.draw(path, use); });
-    if (!(light.pdf > 0.0f)) return {};
-    light_query result;
+    light_query nothing;
+    nothing.choice = choice.key;
+    if (!(light.pdf > 0.0f)) return nothing;
+    light_query result = nothing;
     result.direction = light.direction;
     result.pdf = light.is_delta ? unrivalled_pdf : light.pdf;
     result.value = scatters.eval_rgb(vertex.outgoing, light.direction) * light.radiance / light.pdf;
-    if (!(wfpg::luminance(result.value) > 0.0f)) return {};
-    return is_hidden(slot, vertex, light) ? light_query{} : result;
+    if (!(wfpg::luminance(result.value) > 0.0f)) return nothing;
+    return is_hidden(slot, vertex, light) ? nothing : result;
   }
 
   WFPG_HD bool is_hidden(std::size_t slot, const path_vertex& vertex, const light_sample& light) const {
@@ -226,7 +247,10 @@ struct drop_hidden {
   tiled_view<light_query> queries;
 
   WFPG_HD void operator()(std::size_t slot) const {
-    if (hidden[slot] != 0) queries.emplace(slot);
+    if (hidden[slot] == 0) return;
+    light_query nothing;
+    nothing.choice = queries[slot].choice;
+    queries.emplace(slot, nothing);
   }
 };
 
@@ -242,6 +266,7 @@ struct shade_paths {
   wfpg::array_view<const wfpg::sampled_direction> directions;
   tiled_view<path_state> paths;
   wfpg::array_view<vec3> radiance;
+  wfpg::light_guide_view lights;
 
   WFPG_HD void operator()(std::size_t slot) const {
     if (!queue.holds(slot)) return;
@@ -263,9 +288,10 @@ struct shade_paths {
 
   WFPG_HD void add_light(std::size_t slot, std::uint32_t id) const {
     const light_query& query = queries[slot];
-    if (query.direction == vec3(0.0f)) return;
-    const vec3 contribution =
-        paths[id].throughput * query.value * wfpg::power_heuristic(query.pdf, densities[slot]);
+    if (query.direction == vec3(0.0f)) return lights.deposit(id, query.choice, 0.0f);
+    const vec3 scattered = query.value * wfpg::power_heuristic(query.pdf, densities[slot]);
+    lights.deposit(id, query.choice, wfpg::luminance(scattered));
+    const vec3 contribution = paths[id].throughput * scattered;
     radiance[id] += contribution;
     recorder.radiance(id, at.depth, contribution);
   }

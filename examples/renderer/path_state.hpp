@@ -5,6 +5,7 @@
 #include "rng.hpp"
 #include "tiled_array.hpp"
 
+#include <wfpg/light_guide.hpp>
 #include <wfpg/partitioner.hpp>
 
 namespace render {
@@ -83,7 +84,7 @@ struct light_query {
   vec3 direction{0.0f};  ///< toward the light, unit length; zero where there is nothing to add
   float pdf = 0.0f;      ///< of the direction by light sampling, per steradian; huge where nothing rivals it
   vec3 value{0.0f};      ///< BSDF, cosine and radiance over that pdf
-  std::uint32_t unused = 0;
+  std::uint32_t choice = wfpg::no_light_choice;  ///< of its group
 };
 
 /// The paths that go on, in the order of their materials: slot -> path.

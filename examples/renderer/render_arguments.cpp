@@ -87,6 +87,9 @@ void add_guider_options(CLI::App& app, render_options& options) {
       ->check(CLI::Range(1, 1 << 20));
   add_choice<bool>(app, "--learn", options.learn, {{"on", true}, {"off", false}},
                    "kept fields learn from paths, beside their cones (default: on)");
+  app.add_option("--light-groups", options.light_groups,
+                 "lights are chosen from so many groups as is learnt; 1: by power (default: 32)")
+      ->check(CLI::Range(1u, 255u));
   app.add_option("--field-budget", options.field_budget, "memory of kept fields, such as 32MiB (the default)")
       ->transform(CLI::AsSizeValue(false));
   app.add_option("--product-resolution", options.product_resolution,

@@ -108,8 +108,8 @@ inline wfpg::guider_options guider_options_of(const render_options& options) {
 
 /// Builds what a rendering needs, has its samples taken, and reports. `take` does so with directions from
 /// where it likes:
-///   void operator()(path_tracer<Exec, Caster>&, const scene_view&, const pinhole&, stage_clock& building,
-///                   render_result&) const;
+///   void operator()(path_tracer<Exec, Caster>&, const scene_view&, const light_distribution<Exec>&,
+///                   const pinhole&, stage_clock& building, render_result&) const;
 template <class Accelerated, class Exec, class Take>
 render_result render_by(const Exec& exec, const scene& scene, const render_options& options,
                         const Take& take) {
@@ -119,7 +119,10 @@ render_result render_by(const Exec& exec, const scene& scene, const render_optio
   render_report& report = result.report;
 
   const device_scene<Exec> geometry(exec, scene);
-  const light_distribution<Exec> lights(exec, scene);
+  // Groups are for who learns to choose between them.
+  const bool chooses =
+      options.method == sampling_method::wfpg || options.method == sampling_method::wfpg_product;
+  const light_distribution<Exec> lights(exec, scene, chooses ? options.light_groups : 1);
   std::unique_ptr<const Accelerated> accelerated;
   building.measure(Accelerated::name,
                    [&] { accelerated = std::make_unique<const Accelerated>(exec, scene, geometry.view()); });
@@ -128,7 +131,7 @@ render_result render_by(const Exec& exec, const scene& scene, const render_optio
   path_tracer<Exec, decltype(accelerated->caster())> tracer(
       exec, settings, {geometry.view(), lights.view(), options.nee}, accelerated->caster());
   const pinhole camera(scene.view, options.width, options.height);
-  take(tracer, geometry.view(), camera, building, result);
+  take(tracer, geometry.view(), lights, camera, building, result);
   report.segments = tracer.segments();
   result.picture = {options.width, options.height, tracer.picture()};
   report.seconds.insert(report.seconds.begin(), tracer.seconds().begin(), tracer.seconds().end());
@@ -142,15 +145,17 @@ render_result render_on(const Exec& exec, const scene& scene, const render_optio
                         const progress_callback& progress) {
   return render_by<Accelerated>(
       exec, scene, options,
-      [&](auto& tracer, const scene_view& geometry, const pinhole& camera, stage_clock& building,
-          render_result& result) {
+      [&](auto& tracer, const scene_view& geometry, const auto& lights, const pinhole& camera,
+          stage_clock& building, render_result& result) {
         if (options.method == sampling_method::pt) {
           unguided<Exec> guider(exec);
           take_samples(tracer, guider, camera, options, progress, result);
         } else {
           const wfpg::triangle_mesh_view mesh{geometry.positions, geometry.triangles};
           const stopwatch build;
-          wfpg::path_guider<Exec> guider(exec, mesh, guider_options_of(options));
+          wfpg::guider_options guided = guider_options_of(options);
+          if (options.nee && lights.shares().size() > 1) guided.lights.weights = lights.shares();
+          wfpg::path_guider<Exec> guider(exec, mesh, guided);
           building.add("octree", build.seconds());
           result.report.octree.build_seconds = build.seconds();
           take_samples(tracer, guider, camera, options, progress, result);

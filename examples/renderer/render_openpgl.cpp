@@ -74,13 +74,13 @@ bool has_openpgl() {
 render_result render_with_openpgl(const scene& scene, const render_options& options,
                                   const progress_callback& progress) {
   const wfpg::exec::tbb exec;
-  return render_by<embree_scene>(
-      exec, scene, options,
-      [&](auto& tracer, const scene_view&, const pinhole& camera, stage_clock&, render_result& result) {
-        openpgl_guider guider(exec, openpgl_options_of(scene, options));
-        take_samples(tracer, guider, camera, options, progress, result);
-        report_openpgl(guider, result.report);
-      });
+  return render_by<embree_scene>(exec, scene, options,
+                                 [&](auto& tracer, const scene_view&, const auto&, const pinhole& camera,
+                                     stage_clock&, render_result& result) {
+                                   openpgl_guider guider(exec, openpgl_options_of(scene, options));
+                                   take_samples(tracer, guider, camera, options, progress, result);
+                                   report_openpgl(guider, result.report);
+                                 });
 }
 
 }  // namespace render

@@ -38,6 +38,7 @@ inline constexpr std::uint32_t light_point = 2;
 inline constexpr std::uint32_t light_choice = 3;
 inline constexpr std::uint32_t roulette = 4;
 inline constexpr std::uint32_t light_texel = 5;  ///< of an environment
+inline constexpr std::uint32_t light_group = 6;
 inline constexpr std::uint32_t per_vertex = 8;
 inline constexpr std::uint32_t pixel = 0xffffffffu;  ///< the camera's
 }  // namespace dimension

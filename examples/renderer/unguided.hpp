@@ -2,6 +2,7 @@
 // where directions come from.
 #pragma once
 
+#include <wfpg/light_guide.hpp>
 #include <wfpg/mis.hpp>
 #include <wfpg/wave.hpp>
 
@@ -59,6 +60,7 @@ class unguided {
   void begin_sample() {}
   void end_sample() {}
   null_recorder recorder() const { return {}; }
+  wfpg::light_guide_view lights() const { return {}; }
 
   template <class Wave, class Caster>
   void sample_directions(const Wave& wave, const Caster&,

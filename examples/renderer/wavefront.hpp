@@ -66,6 +66,7 @@ class path_tracer {
       exec_.for_each(count_, start_paths{camera, at.random, paths_.view(), radiance_.view()});
     });
     clock_.measure("update", [&] { guider.begin_sample(); });
+    world_.guide = guider.lights();
     for (path_queue queue{{}, true}; at.depth < at.max_depth; ++at.depth) {
       trace(guider, at, queue);
       if (at.is_last()) break;
@@ -170,7 +171,7 @@ class path_tracer {
       auto recorder = guider.recorder();
       exec_.for_each(count_, shade_paths<decltype(recorder)>{
                                  at, recorder, queue, vertices_.view(), queries_.view(), densities_.view(),
-                                 directions_.view(), paths_.view(), radiance_.view()});
+                                 directions_.view(), paths_.view(), radiance_.view(), world_.guide});
     });
   }
 

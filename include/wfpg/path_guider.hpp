@@ -16,6 +16,7 @@
 #include <wfpg/exitance_cache.hpp>
 #include <wfpg/field_store.hpp>
 #include <wfpg/guide_view.hpp>
+#include <wfpg/light_guide.hpp>
 #include <wfpg/path_recorder.hpp>
 #include <wfpg/product_sampler.hpp>
 #include <wfpg/radiance_field.hpp>
@@ -50,6 +51,7 @@ struct guider_options {
       32;  ///< cells along a transient field's side at depth 0, in [2, 128]; halves at each depth
   std::uint32_t min_field_resolution = 16;  ///< down to this, in [2, 128]
   field_options field;                      ///< filter and floor
+  light_guide_options lights;               ///< groups of lights that next-event estimation chooses from
   /// P: draw from products of field and BSDF in P x P blocks, 4, 8 or 16, a divisor of the fields'
   /// resolutions (16 is none of kept.resolution's default); 0: from fields.
   std::uint32_t product_resolution = 0;
@@ -120,11 +122,12 @@ class path_guider {
   void invalidate_all() {
     if (keeps_fields()) store_.invalidate_all(exec_);
   }
-  /// Forgets all cached light, and what kept fields learnt: for lights that moved. Fields follow without
-  /// being cast anew.
+  /// Forgets all cached light, and what kept fields and choices of lights learnt: for lights that moved.
+  /// Fields follow without being cast anew.
   void forget_light() {
     cache_.clear(exec_);
     if (keeps_fields()) store_.forget(exec_);
+    lights_.forget(exec_);
   }
 
   /// Where the renderer's kernels record their paths.
@@ -133,6 +136,8 @@ class path_guider {
   exitance_cache_view cache() const { return cache_.view(); }
   /// Where they tell kept fields what their directions found, without it; empty where fields do not learn.
   learnt_radiance_view learnt() const { return store_.learnt(); }
+  /// Which lights next-event estimation is to ask, in this sample; empty without options.lights.weights.
+  light_guide_view lights() const { return lights_.view(); }
   const sparse_voxel_octree<Exec>& octree() const { return octree_; }
   const guider_options& options() const { return options_; }
   /// Whether the sample that has begun is guided, and how many cells transient fields have at a depth.
@@ -183,6 +188,7 @@ class path_guider {
   Exec exec_;                                           // allocates there
   path_recorder<Exec> recorder_;
   field_store<Exec> store_;      // of kept fields
+  light_guide<Exec> lights_;     // of both
   spatial_binner<Exec> binner_;  // of transient ones, and what follows
   buffer<std::uint32_t, Exec> resident_words_;
   buffer<resident_field, Exec> resident_fields_;

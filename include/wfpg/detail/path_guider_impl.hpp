@@ -49,6 +49,7 @@ const guider_options& path_guider<Exec>::checked(const guider_options& o) {
                                          resolution_at(o, depth));
   require(o.product_resolution == 0 || o.guide_fraction < 1.0f, "guide_fraction", o.guide_fraction,
           "less than 1 with products, which do not reach all that a BSDF does");
+  detail::require_valid(o.lights);
   require(o.deposit_capacity < 0xffffffffull, "deposit_capacity", o.deposit_capacity, "less than 2^32 - 1");
   require(o.max_paths * o.max_depth < 0xffffffffull, "max_paths times max_depth, the vertices of a sample,",
           o.max_paths * o.max_depth, "less than 2^32 - 1");
@@ -97,6 +98,7 @@ path_guider<Exec>::path_guider(const Exec& exec, voxel_fragments<Exec> fragments
                                deposits_of_sample());
   else
     binner_ = spatial_binner<Exec>(exec_, octree_.view(), binning, options_.max_rays);
+  lights_ = light_guide<Exec>(exec_, octree_.view(), options_.lights, options_.max_rays * options_.max_depth);
   octree_.release_build_data();
   ::thrust::fill_n(exec_.thrust(), counts_.data(), counts_.size(), depth_statistics{});
   const std::uint32_t p = options_.product_resolution;
@@ -110,8 +112,10 @@ void path_guider<Exec>::begin_sample() {
   ++samples_;
   // Of many paths fewer do once means have settled.
   const std::uint32_t fewer = share_shift() > 0 && samples_ > 32 ? 2 : 0;
-  recorder_.begin_sample(exec_, static_cast<std::uint32_t>(detail::hash(options_.seed, samples_)), fewer);
+  const auto seed = static_cast<std::uint32_t>(detail::hash(options_.seed, samples_));
+  recorder_.begin_sample(exec_, seed, fewer);
   if (keeps_fields()) store_.begin_sample(exec_, samples_);
+  lights_.begin_sample(seed);
 }
 
 template <class Exec>
@@ -123,6 +127,7 @@ void path_guider<Exec>::end_sample() {
   const auto timed = clock_.time(detail::stage::cache);
   cache_.update(exec_);
   if (keeps_fields()) store_.end_sample(exec_);
+  lights_.end_sample(exec_);
 }
 
 template <class Exec>
@@ -274,13 +279,15 @@ template <class Exec>
 memory_report path_guider<Exec>::memory() const {
   const std::size_t resident = resident_words_.bytes() + resident_fields_.bytes() + field_of_ray_.bytes();
   const std::size_t binning = binner_.bytes() + store_.wave_bytes() + counts_.bytes();
+  const std::size_t values = store_.value_bytes() + lights_.transient_bytes();
   const std::size_t named = recorder_.bytes() + binning + resident + store_.slot_bytes() +
-                            store_.level_bytes() + store_.value_bytes();
+                            store_.level_bytes() + lights_.persistent_bytes() + values;
   return {{{"octree", octree_.bytes(), true},
            {"cache", cache_.persistent_bytes(), true},
            {"kept fields", store_.slot_bytes(), true},
            {"levels", store_.level_bytes(), true},
-           {"deposits", cache_.transient_bytes() + store_.value_bytes(), false},
+           {"lights", lights_.persistent_bytes(), true},
+           {"deposits", cache_.transient_bytes() + values, false},
            {"paths", recorder_.bytes(), false},
            {"binning", binning, false},
            {"fields", resident, false},

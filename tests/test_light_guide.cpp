@@ -1,0 +1,342 @@
+// Choices of lights: their probabilities sum to one and are those that choose() has, follow what was
+// deposited as a plain computation says, reach down from parents, and never leave a group of lights out.
+#include "support/evaluate.hpp"
+#include "support/policies.hpp"
+#include "support/scenes.hpp"
+
+#include <wfpg/detail/chi_square.hpp>
+#include <wfpg/light_guide.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+using namespace wfpg_test;
+
+namespace {
+
+/// An octree over the walls of the unit box, and a guide of a few groups over it that listens to every path
+/// of samples of 3000 values.
+template <class Exec>
+struct guided_box {
+  Exec exec;
+  wfpg::sparse_voxel_octree<Exec> octree;
+  wfpg::light_guide<Exec> lights;
+
+  explicit guided_box(const wfpg::light_guide_options& options, std::size_t values = 3000)
+      : octree(octree_of(exec)), lights(exec, octree.view(), options, values) {}
+
+  static wfpg::sparse_voxel_octree<Exec> octree_of(const Exec& exec) {
+    const box_mesh<Exec> box(exec);
+    wfpg::voxel_fragments<Exec> fragments = wfpg::voxelize(exec, box.view(), 32);
+    return wfpg::sparse_voxel_octree<Exec>(exec, fragments);
+  }
+};
+
+wfpg::light_guide_options three_groups() {
+  wfpg::light_guide_options options;
+  options.weights = {1.0f, 2.0f, 1.0f};
+  options.resolution = 4;
+  return options;
+}
+
+/// A place of the box, and what its row says.
+struct asked_place {
+  vec3 position;
+  vec3 normal;
+};
+
+const asked_place on_floor{{0.3f, 0.0f, 0.3f}, {0.0f, 1.0f, 0.0f}};
+const asked_place on_wall{{0.0f, 0.6f, 0.9f}, {1.0f, 0.0f, 0.0f}};
+
+struct find_rows {
+  wfpg::light_guide_view guide;
+  wfpg::array_view<const asked_place> places;
+  wfpg::array_view<std::uint32_t> rows;
+  WFPG_HD void operator()(std::size_t i) const { rows[i] = guide.find(places[i].position, places[i].normal); }
+};
+
+struct ask_probabilities {
+  wfpg::light_guide_view guide;
+  wfpg::array_view<const std::uint32_t> rows;
+  wfpg::array_view<float> probabilities;
+  WFPG_HD void operator()(std::size_t i) const {
+    probabilities[i] =
+        guide.probability(rows[i / guide.groups()], static_cast<std::uint32_t>(i % guide.groups()));
+  }
+};
+
+struct choose_groups {
+  wfpg::light_guide_view guide;
+  std::uint32_t row;
+  hashed_numbers random;
+  wfpg::array_view<wfpg::light_choice> choices;
+  WFPG_HD void operator()(std::size_t i) const {
+    choices[i] = guide.choose(row, random(static_cast<std::uint32_t>(i), 0).x);
+  }
+};
+
+template <class Exec>
+std::vector<std::uint32_t> rows_of(const guided_box<Exec>& box, const std::vector<asked_place>& places) {
+  const wfpg::buffer<asked_place, Exec> asked(box.exec, places);
+  wfpg::buffer<std::uint32_t, Exec> rows(box.exec, places.size());
+  box.exec.for_each(places.size(), find_rows{box.lights.view(), asked.view(), rows.view()});
+  return rows.to_host(box.exec);
+}
+
+/// Of each place's groups, one place after the other.
+template <class Exec>
+std::vector<float> probabilities_at(const guided_box<Exec>& box, const std::vector<asked_place>& places) {
+  const wfpg::buffer<std::uint32_t, Exec> rows(box.exec, rows_of(box, places));
+  wfpg::buffer<float, Exec> found(box.exec, places.size() * box.lights.view().groups());
+  box.exec.for_each(found.size(), ask_probabilities{box.lights.view(), rows.view(), found.view()});
+  return found.to_host(box.exec);
+}
+
+template <class Exec>
+std::vector<wfpg::light_choice> choices_at(const guided_box<Exec>& box, const asked_place& place,
+                                           std::uint32_t count) {
+  wfpg::buffer<wfpg::light_choice, Exec> choices(box.exec, count);
+  box.exec.for_each(count, choose_groups{box.lights.view(), rows_of(box, {place})[0], {3}, choices.view()});
+  return choices.to_host(box.exec);
+}
+
+/// What one path has to say of a choice at a place.
+struct told {
+  asked_place at;
+  std::uint32_t group;
+  float scattered;  ///< but for the group's probability
+};
+
+struct tell {
+  wfpg::light_guide_view guide;
+  wfpg::array_view<const told> values;
+  WFPG_HD void operator()(std::size_t i) const {
+    const told& value = values[i];
+    const std::uint32_t row = guide.find(value.at.position, value.at.normal);
+    // The number that finds the group: the middle of its interval.
+    float before = 0.0f;
+    for (std::uint32_t g = 0; g < value.group; ++g) before += guide.probability(row, g);
+    const wfpg::light_choice choice = guide.choose(row, before + 0.5f * guide.probability(row, value.group));
+    guide.deposit(i, choice.key, value.scattered / choice.probability);
+  }
+};
+
+template <class Exec>
+void learn(guided_box<Exec>& box, const std::vector<told>& values, std::uint32_t seed = 1) {
+  const wfpg::buffer<told, Exec> deposited(box.exec, values);
+  box.lights.begin_sample(seed);
+  box.exec.for_each(values.size(), tell{box.lights.view(), deposited.view()});
+  box.lights.end_sample(box.exec);
+}
+
+/// Places all over the box's walls.
+std::vector<asked_place> places_on_walls(std::size_t count) {
+  random_numbers random(7);
+  std::vector<asked_place> places;
+  for (std::size_t i = 0; i < count; ++i) {
+    asked_place place{random.point(0.0f, 1.0f), vec3(0.0f)};
+    const auto axis = static_cast<int>(random.below(3));
+    const bool upper = random.below(2) == 1;
+    place.position[axis] = upper ? 1.0f : 0.0f;
+    place.normal[axis] = upper ? -1.0f : 1.0f;
+    places.push_back(place);
+  }
+  return places;
+}
+
+std::vector<told> values_on_walls(std::size_t count) {
+  random_numbers random(9);
+  std::vector<told> values;
+  for (const asked_place& place : places_on_walls(count))
+    values.push_back(
+        {place, random.below(3), random.below(4) == 0 ? 0.0f : std::exp(random.between(-9.0f, 9.0f))});
+  return values;
+}
+
+/// On the floor only one of three groups is seen. Of one alone nothing would follow: its prior may be wrong.
+std::vector<told> only_group(std::uint32_t seen, int times) {
+  std::vector<told> values;
+  for (int i = 0; i < times; ++i)
+    for (std::uint32_t g = 0; g < 3; ++g) values.push_back({on_floor, g, g == seen ? 5.0f : 0.0f});
+  return values;
+}
+
+/// As choose_light_groups documents, for one group that a row knows `mean` of from n values.
+double expected_estimate(double prior, double scale, double mean, double n) {
+  const double parent = 8.0;
+  return (parent * scale * prior + n * mean) / (parent + n);
+}
+
+}  // namespace
+
+WFPG_TEST_CASE("a guide of lights that knows nothing goes by weight", "[light_guide]") {
+  const guided_box<Exec> box(three_groups());
+  const std::vector<float> p = probabilities_at(box, {on_floor});
+  // A fifth is left to halves by weight and alike.
+  CHECK(p[0] == Approx(0.8 * 0.25 + 0.2 * 0.5 * (0.25 + 1.0 / 3.0)));
+  CHECK(p[1] == Approx(0.8 * 0.5 + 0.2 * 0.5 * (0.5 + 1.0 / 3.0)));
+  CHECK(p[0] + p[1] + p[2] == Approx(1.0));
+}
+
+WFPG_TEST_CASE("groups are chosen as often as their probabilities say", "[light_guide]") {
+  wfpg::light_guide_options options;
+  for (int g = 0; g < 33; ++g) options.weights.push_back(g == 5 ? 0.0f : static_cast<float>(1 + g % 4));
+  guided_box<Exec> box(options);
+  std::vector<told> values;
+  random_numbers random(4);
+  for (int i = 0; i < 400; ++i) {
+    const std::uint32_t group = random.below(33);
+    if (group != 5) values.push_back({on_floor, group, static_cast<float>(group)});
+  }
+  learn(box, values);
+  const std::vector<float> p = probabilities_at(box, {on_floor});
+  constexpr std::uint32_t draws = 100000;
+  std::vector<double> counted(p.size(), 0.0), expected;
+  for (const wfpg::light_choice& choice : choices_at(box, on_floor, draws)) {
+    REQUIRE(choice.group < p.size());
+    REQUIRE(choice.probability == p[choice.group]);
+    counted[choice.group] += 1.0;
+  }
+  for (const float probability : p) expected.push_back(draws * static_cast<double>(probability));
+  CHECK(p[5] == 0.0f);
+  CHECK(counted[5] == 0.0);
+  CHECK(wfpg::detail::chi_square_test(counted, expected).p > 1e-4);
+}
+
+WFPG_TEST_CASE("probabilities sum to one everywhere and leave no group out", "[light_guide]") {
+  guided_box<Exec> box(three_groups());
+  learn(box, values_on_walls(3000));
+  const std::vector<float> p = probabilities_at(box, places_on_walls(1000));
+  for (std::size_t i = 0; i < p.size(); i += 3) {
+    REQUIRE(static_cast<double>(p[i]) + static_cast<double>(p[i + 1]) + static_cast<double>(p[i + 2]) ==
+            Approx(1.0).margin(1e-6));
+    REQUIRE(std::min({p[i], p[i + 1], p[i + 2]}) > 0.2f * 0.29f);
+  }
+}
+
+WFPG_TEST_CASE("a row that has learnt follows its parents and its own means", "[light_guide]") {
+  wfpg::light_guide_options options = three_groups();
+  options.resolution = 2;  // two levels: the root and its children
+  guided_box<Exec> box(options);
+  // On the floor, group 0 brings nothing in 40 choices, group 1 brings 3 in 20, group 2 is not asked.
+  std::vector<told> values(40, {on_floor, 0, 0.0f});
+  values.insert(values.end(), 20, {on_floor, 1, 3.0f});
+  learn(box, values);
+  const double share[] = {0.25, 0.5, 0.25};
+  const double mean[] = {0.0, 3.0, 0.0}, n[] = {40.0, 20.0, 0.0};
+  double prior[] = {0.25, 0.5, 0.25};
+  for (int level = 0; level < 2; ++level) {
+    double found = 0.0, expected = 0.0, total = 0.0, estimate[3];
+    for (int g = 0; g < 3; ++g) found += n[g] * mean[g], expected += n[g] * prior[g];
+    for (int g = 0; g < 3; ++g) {
+      estimate[g] = expected_estimate(prior[g], found / expected, mean[g], n[g]);
+      total += estimate[g];
+    }
+    for (int g = 0; g < 3; ++g) prior[g] = estimate[g] / total;
+  }
+  const std::vector<float> p = probabilities_at(box, {on_floor, on_wall});
+  for (std::size_t g = 0; g < 3; ++g) {
+    const double defensive = 0.5 * (share[g] + 1.0 / 3.0);
+    CHECK(p[g] == Approx(0.8 * prior[g] + 0.2 * defensive).epsilon(1e-4));
+    // Nothing was learnt of surfaces that face another way.
+    CHECK(p[3 + g] == Approx(0.8 * share[g] + 0.2 * defensive).epsilon(1e-4));
+  }
+}
+
+WFPG_TEST_CASE("where nothing was learnt nearby, choices are the parent's", "[light_guide]") {
+  guided_box<Exec> box(three_groups());
+  learn(box, only_group(2, 100));
+  const asked_place beside{{0.2f, 0.0f, 0.3f}, {0.0f, 1.0f, 0.0f}};
+  const std::vector<float> p = probabilities_at(box, {on_floor, beside});
+  CHECK(p[2] > 0.7f);
+  CHECK(p[5] > 0.5f);
+  CHECK(p[5] < p[2]);
+}
+
+WFPG_TEST_CASE("what is learnt does not depend on the order of deposits", "[light_guide]") {
+  std::vector<told> values = values_on_walls(3000);
+  guided_box<Exec> box(three_groups()), other(three_groups());
+  learn(box, values);
+  random_numbers random(2);
+  shuffle(values, random);
+  learn(other, values);
+  const std::vector<asked_place> places = places_on_walls(500);
+  CHECK(probabilities_at(box, places) == probabilities_at(other, places));
+}
+
+WFPG_TEST_CASE("of many paths another part is listened to in each sample", "[light_guide]") {
+  wfpg::light_guide_options options = three_groups();
+  options.resolution = 1;
+  constexpr std::size_t paths = 32768;  // 384 are wanted
+  std::vector<told> values(paths, {on_floor, 0, 0.0f});
+  for (std::size_t i = 0; i < paths; i += 2) values[i] = {on_floor, 1, 1.0f};
+  guided_box<Exec> box(options, paths), other(options, paths);
+  CHECK(box.lights.transient_bytes() < 8 * 1000 + 16 * 100);
+  learn(box, values, 1);
+  const std::vector<float> first = probabilities_at(box, {on_floor});
+  CHECK(first[1] > 0.6f);
+  // Who is heard in one sample has nothing new to say to the next one's.
+  for (std::size_t i = 0; i < paths; ++i) values[i].scattered *= static_cast<float>(i);
+  learn(box, values, 2);
+  learn(other, values, 1);
+  CHECK(probabilities_at(box, {on_floor}) != probabilities_at(other, {on_floor}));
+}
+
+WFPG_TEST_CASE("choices forget, and drop what cannot be", "[light_guide]") {
+  guided_box<Exec> box(three_groups(), 100);
+  const std::vector<float> before = probabilities_at(box, {on_floor});
+  const float nan = std::numeric_limits<float>::quiet_NaN(),
+              infinite = std::numeric_limits<float>::infinity();
+  learn(box, {{on_floor, 0, nan}, {on_floor, 0, -1.0f}, {on_floor, 0, infinite}});
+  CHECK(probabilities_at(box, {on_floor}) == before);
+  learn(box, only_group(0, 300));  // nine times what the queue holds
+  const std::vector<float> after = probabilities_at(box, {on_floor});
+  CHECK(after[0] > 0.6f);
+  box.lights.forget(box.exec);
+  CHECK(probabilities_at(box, {on_floor}) == before);
+  // A host that never says how many choices a sample has can ask, and nothing is learnt.
+  guided_box<Exec> silent(three_groups(), 0);
+  learn(silent, only_group(0, 10));
+  CHECK(probabilities_at(silent, {on_floor}) == before);
+}
+
+WFPG_TEST_CASE("places that the octree does not know have the root's choices", "[light_guide]") {
+  guided_box<Exec> box(three_groups());
+  const asked_place outside{{40.0f, 0.0f, 0.0f}, {0.0f, 1.0f, 0.0f}};
+  learn(box, only_group(2, 100));
+  CHECK(rows_of(box, {outside})[0] == 2);
+  for (const wfpg::light_choice& choice : choices_at(box, outside, 100))
+    CHECK(choice.key == wfpg::no_light_choice);
+  CHECK(probabilities_at(box, {outside})[2] > 0.4f);
+}
+
+WFPG_TEST_CASE("options of light groups that cannot be are refused by name", "[light_guide]") {
+  const auto refused = [](const wfpg::light_guide_options& options, const std::string& name) {
+    try {
+      guided_box<Exec> box(options);
+      FAIL("not refused: " << name);
+    } catch (const std::invalid_argument& error) {
+      CHECK(std::string(error.what()).find(name) != std::string::npos);
+    }
+  };
+  wfpg::light_guide_options options = three_groups();
+  options.weights = {1.0f, -1.0f};
+  refused(options, "weights");
+  options.weights = {0.0f, 0.0f};
+  refused(options, "weights");
+  options.weights = std::vector<float>(257, 1.0f);
+  refused(options, "weights");
+  options = three_groups();
+  options.resolution = 3;
+  refused(options, "resolution");
+  options = three_groups();
+  options.floor = 0.0f;
+  refused(options, "floor");
+  options.floor = 1.0f;
+  refused(options, "floor");
+  CHECK(guided_box<Exec>(wfpg::light_guide_options()).lights.view().empty());
+}
