@@ -3,9 +3,9 @@
 //
 //   guider.begin_sample();
 //   for (std::uint32_t depth = 0; depth < max_depth; ++depth) {
-//     trace(...);                                              // the renderer's; records vertices in
-//     guider.recorder() guider.sample_directions(wfpg::wave{depth, n, surfaces, random}, caster, directions);
-//     shade(...);                                              // the renderer's; records radiance
+//     trace(...);              // the renderer's; records vertices in guider.recorder()
+//     guider.sample_directions(wfpg::wave{depth, n, surfaces, random}, caster, directions);
+//     shade(...);              // the renderer's; records radiance
 //   }
 //   guider.end_sample();
 #pragma once
