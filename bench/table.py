@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Prints results as a table of docs/performance.md or docs/quality.md.
+"""Prints results as a table of docs/packages.md, docs/performance.md or docs/quality.md.
 
 usage: bench/table.py bench/results/NAME.json [...]
 
 Several are of wfpg-quality, with the same methods in other scenes.
 """
 import json
+import re
 import sys
 
 # What a benchmark's floor is: see the sources in bench/cuda/.
@@ -106,6 +107,16 @@ def print_gains(scenes):
         print(f"| {method} |", " | ".join(f"{k:.1f}" for k in kept), "|")
 
 
+def print_compilers(compilers):
+    print("| compiler | source | seconds | ratio to Thrust and GLM | MiB at most | program, KiB |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    for compiler, sources in compilers.items():
+        name = re.sub(r" \(.*?\)|^Debian | version", "", compiler)
+        for source, m in sources.items():
+            print(f"| {name} | {source} | {m['seconds']:.2f} | {m['ratio']:.2f} | {m['mebibytes']:.0f} "
+                  f"| {m['program_bytes'] / 1024:.0f} |")
+
+
 def main(paths):
     results = [json.load(open(path)) for path in paths]
     first = results[0]
@@ -113,6 +124,8 @@ def main(paths):
         print_stages(first["benchmarks"])
     elif "baseline" in first:
         print_gains([scene for result in results for scene in result["scenes"]])
+    elif "compilers" in first:
+        print_compilers(first["compilers"])
     elif "settled_samples" in first:
         print_sample_times(first["settled_samples"])
     else:

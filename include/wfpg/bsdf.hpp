@@ -12,7 +12,7 @@ namespace wfpg {
 
 /// A direction drawn from a BSDF.
 struct bsdf_sample {
-  vec3 direction{0.0f};
+  vec3 direction{0.0f};  ///< unit length, world space
   float pdf = 0.0f;  ///< per unit solid angle, or the probability of a delta lobe; 0 where sampling failed
 };
 
@@ -29,8 +29,8 @@ struct surface {
   vec3 geometric_normal{0.0f};  ///< unit length, either side
   vec3 normal{0.0f};    ///< shading normal, unit length, on the same side; decides a bin's orientation
   vec3 outgoing{0.0f};  ///< toward the previous vertex, unit length
-  Bsdf bsdf{};
-  bool active = true;  ///< false: this ray of the capacity is not in use, nothing else is read
+  Bsdf bsdf{};          ///< what is_bsdf_v asks for
+  bool active = true;   ///< false: this ray of the capacity is not in use, nothing else is read
 };
 
 namespace detail {

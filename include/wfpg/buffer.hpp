@@ -34,7 +34,9 @@ class buffer {
   buffer(const Exec& exec, const std::vector<T>& host) : buffer(exec, host.size()) {
     exec.copy_from_host(data_, host.data(), bytes());
   }
+  /// Takes the memory of another, which is empty then.
   buffer(buffer&& other) noexcept { swap(other); }
+  /// The same; gives its own memory back.
   buffer& operator=(buffer&& other) noexcept {
     buffer(std::move(other)).swap(*this);
     return *this;
@@ -43,15 +45,20 @@ class buffer {
     if (data_) resource_->deallocate(data_, bytes(), alignment);
   }
 
+  /// Exchanges memory with another.
   void swap(buffer& other) noexcept {
     std::swap(resource_, other.resource_);
     std::swap(data_, other.data_);
     std::swap(size_, other.size_);
   }
 
+  /// The first element, in the policy's memory; null where empty.
   T* data() const { return data_; }
+  /// Number of elements.
   std::size_t size() const { return size_; }
+  /// Of all elements.
   std::size_t bytes() const { return size_ * sizeof(T); }
+  /// All elements. Valid while the buffer has them.
   array_view<T> view() const { return {data_, size_}; }
 
   /// The first `count` elements, copied to the host; waits for the work before it. For tests and reports.
@@ -60,6 +67,7 @@ class buffer {
     exec.copy_to_host(host.data(), data_, count * sizeof(T));
     return host;
   }
+  /// All elements, in the same way.
   std::vector<T> to_host(const Exec& exec) const { return to_host(exec, size_); }
 
  private:

@@ -12,9 +12,11 @@ namespace wfpg {
 /// A memory resource could not give what was asked for. The message names the bytes.
 class out_of_memory : public std::runtime_error {
  public:
+  /// `bytes` were asked for.
   explicit out_of_memory(std::size_t bytes)
       : std::runtime_error("wfpg: out of memory: " + std::to_string(bytes) + " bytes were asked for"),
         bytes_(bytes) {}
+  /// The bytes that were asked for.
   std::size_t bytes() const noexcept { return bytes_; }
 
  private:
@@ -24,9 +26,11 @@ class out_of_memory : public std::runtime_error {
 /// A call of a device's runtime failed. The message names code, text and call.
 class device_error : public std::runtime_error {
  public:
+  /// The runtime's code and text, and the name of the call.
   device_error(int code, const std::string& text, const std::string& call)
       : std::runtime_error("wfpg: " + call + ": " + text + " (code " + std::to_string(code) + ")"),
         code_(code) {}
+  /// The runtime's code.
   int code() const noexcept { return code_; }
 
  private:

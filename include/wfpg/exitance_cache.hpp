@@ -25,6 +25,7 @@ struct dropped_deposits {
   std::uint32_t outside = 0;   ///< no voxel at or next to the position
   std::uint32_t overflow = 0;  ///< the queue was full
 
+  /// All of them.
   std::uint64_t total() const { return std::uint64_t(invalid) + outside + overflow; }
 };
 
@@ -41,6 +42,7 @@ struct leaf_exitance {
 /// What a kernel sees of the cache.
 class exitance_cache_view {
  public:
+  /// The octree whose nodes it describes.
   WFPG_HD const sparse_voxel_octree_view& octree() const { return tree_; }
 
   /// N of a node; its other side faces -N.
@@ -87,6 +89,7 @@ class exitance_cache_view {
     write(entry, position, direction, radiance);
     count(entry);
   }
+  /// The same of linear RGB.
   WFPG_HD void deposit(vec3 position, vec3 direction, vec3 rgb) const {
     deposit(position, direction, luminance(rgb));
   }
@@ -95,6 +98,7 @@ class exitance_cache_view {
   /// written, then all are counted. Writing first lets a processor overlap look-ups, which the atomics of
   /// counting would put in order.
   WFPG_HD std::uint32_t reserve(std::uint32_t n) const { return queue_.reserve(n); }
+  /// Writes an entry of reserve(), as deposit() does.
   WFPG_HD void write(std::uint32_t entry, vec3 position, vec3 direction, float radiance) const {
     const bool valid = detail::is_finite(radiance) && radiance >= 0.0f && detail::is_finite(position) &&
                        detail::is_finite(direction);
@@ -106,6 +110,7 @@ class exitance_cache_view {
     detail::atomic_add(counters_ + reason, 1);
     if (fits) queue_.drop(entry);
   }
+  /// Counts an entry that is written.
   WFPG_HD void count(std::uint32_t entry) const { queue_.count(entry); }
 
  private:
@@ -188,10 +193,13 @@ class exitance_cache {
     clear(exec);
   }
 
+  /// What kernels see; valid while the cache lives.
   exitance_cache_view view() const { return view_; }
+  /// Of what is kept for guiding.
   std::size_t persistent_bytes() const {
     return normals_.bytes() + swapped_sides_.bytes() + leaves_.bytes() + inner_radiance_.bytes();
   }
+  /// Of the queue, needed while a sample is in flight.
   std::size_t transient_bytes() const { return queue_.bytes() + counters_.bytes(); }
 
   /// Forgets all light, and what is queued.

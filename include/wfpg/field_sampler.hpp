@@ -55,7 +55,9 @@ WFPG_HD inline float inside_cell(float fraction) {
 
 /// Cells of a grid: columns [x, x + side) and rows [y, y + side).
 struct cell_block {
-  std::uint32_t x = 0, y = 0, side = 1;
+  std::uint32_t x = 0;     ///< the first column
+  std::uint32_t y = 0;     ///< the first row
+  std::uint32_t side = 1;  ///< columns, and rows
 };
 
 /// A density over [0,1)², constant in each of F x F cells.
@@ -66,13 +68,16 @@ class grid_distribution {
   WFPG_HD grid_distribution(const std::uint32_t* sums, std::uint32_t resolution)
       : sums_(sums), resolution_(resolution) {}
 
+  /// F, cells along a side; 0 of a default one.
   WFPG_HD std::uint32_t resolution() const { return resolution_; }
+  /// The sum of all cells. Precondition: not a default one.
   WFPG_HD std::uint32_t total() const { return sums_[resolution_ * resolution_ - 1]; }
   /// The sum of a block's cells.
   WFPG_HD std::uint32_t weight(const cell_block& b) const {
     return before(b.x + b.side, b.y + b.side) - before(b.x, b.y + b.side) - before(b.x + b.side, b.y) +
            before(b.x, b.y);
   }
+  /// The weight of one cell.
   WFPG_HD std::uint32_t weight(std::uint32_t x, std::uint32_t y) const { return weight(cell_block{x, y, 1}); }
   /// The sum of columns 0 to x and rows 0 to y.
   WFPG_HD std::uint32_t sum_through(std::uint32_t x, std::uint32_t y) const {
@@ -148,10 +153,13 @@ class directional_field {
   WFPG_HD directional_field(const grid_distribution& grid, vec3 normal)
       : grid_(grid), frame_(normal), hemisphere_(true) {}
 
+  /// Whether there is nothing to draw from.
   WFPG_HD bool empty() const { return grid_.resolution() == 0; }
+  /// Whether it covers a hemisphere; else the sphere.
   WFPG_HD bool hemisphere() const { return hemisphere_; }
   /// Of the hemisphere.
   WFPG_HD vec3 normal() const { return frame_.z; }
+  /// The distribution over the square.
   WFPG_HD const grid_distribution& grid() const { return grid_; }
   /// The GGX roughness from which on a lobe is nearly as wide as a diffuse one: a field knows no BSDF.
   WFPG_HD static constexpr float resolved_alpha() { return 0.5f; }

@@ -53,15 +53,15 @@ struct kept_field_statistics {
 ///   Surfaces  (std::uint32_t ray) -> surface<Bsdf>
 template <class Surfaces>
 struct kept_field_wave {
-  std::size_t ray_count = 0;
-  Surfaces surfaces;
-  exitance_cache_view cache;
-  field_options options;
-  guiding_mode mode = guiding_mode::oriented;
-  float fraction = 0.7f;                   ///< of guided samples in the mixture
-  std::uint64_t seed = 0;                  ///< of the sample and depth
-  product_points points;                   ///< P divides the store's resolution
-  depth_statistics* statistics = nullptr;  ///< on the device: the wave's counts are added; null: nowhere
+  std::size_t ray_count = 0;                   ///< rays of the wave, at most max_rays
+  Surfaces surfaces;                           ///< where they are
+  exitance_cache_view cache;                   ///< what cones read
+  field_options options;                       ///< filter and floor
+  guiding_mode mode = guiding_mode::oriented;  ///< what fields cover
+  float fraction = 0.7f;                       ///< of guided samples in the mixture
+  std::uint64_t seed = 0;                      ///< of the sample and depth
+  product_points points;                       ///< P divides the store's resolution
+  depth_statistics* statistics = nullptr;      ///< on the device: the wave's counts are added; null: nowhere
 };
 
 /// Owns the slots, in the memory of `Exec`. The octree must outlive it. Results do not depend on the number
@@ -118,6 +118,7 @@ class field_store {
     expect_builds(32);
     exec.for_each(capacity_, detail::invalidate_fields{view(), fields_.data(), tree_, bounds});
   }
+  /// The same everywhere.
   void invalidate_all(const Exec& exec) { invalidate(exec, {vec3(-1.0e18f), vec3(1.0e18f)}); }
 
   /// On the device.

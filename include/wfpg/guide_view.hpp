@@ -15,15 +15,16 @@ struct alignas(16) resident_field {
   vec3 normal{0.0f};      ///< of the hemisphere that it covers, unit length; zero: it covers the sphere
   float fraction = 0.0f;  ///< of guided samples in the mixture; 0: not there yet, and guides nothing
 
+  /// Whether it covers a hemisphere.
   WFPG_HD bool hemisphere() const { return normal.x != 0.0f || normal.y != 0.0f || normal.z != 0.0f; }
 };
 
 /// Fields in memory: what each is, and its distribution.
 struct resident_fields {
-  const resident_field* fields = nullptr;
-  const std::uint32_t* words = nullptr;  ///< F² each
-  std::uint32_t resolution = 0;          ///< F
-  product_points points;                 ///< of this wave
+  const resident_field* fields = nullptr;  ///< a field: what it is
+  const std::uint32_t* words = nullptr;    ///< F² each
+  std::uint32_t resolution = 0;            ///< F
+  product_points points;                   ///< of this wave
 
   /// fields[i] and its distribution.
   WFPG_HD directional_field field(std::uint32_t i, const resident_field& info) const {
@@ -37,6 +38,7 @@ struct resident_fields {
 class guide_view {
  public:
   guide_view() = default;
+  /// `field_of_ray`: a ray's number among the fields, or no_field.
   WFPG_HD guide_view(array_view<const std::uint32_t> field_of_ray, const resident_fields& fields)
       : field_of_ray_(field_of_ray), fields_(fields) {}
 

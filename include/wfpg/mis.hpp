@@ -38,16 +38,16 @@ inline constexpr std::uint32_t no_field = 0xffffffffu;
 struct sampled_direction {
   vec3 direction{0.0f};  ///< unit length, away from the surface
   float pdf = 0.0f;  ///< of the whole mixture, per steradian; of a delta lobe its probability; 0 with none
-  sampling_technique technique = sampling_technique::none;
+  sampling_technique technique = sampling_technique::none;  ///< what drew it
   std::uint32_t field = no_field;  ///< the kept field in the mixture, for path_recorder_view::scatter()
 };
 
 /// The shares of what a mixture draws from; their sum is 1. A BSDF whose parts cannot be drawn alone is all
 /// `smooth`.
 struct mixture_shares {
-  float guide = 0.0f;
-  float glossy = 0.0f;
-  float smooth = 1.0f;
+  float guide = 0.0f;   ///< of the field or product
+  float glossy = 0.0f;  ///< of the BSDF's narrow part
+  float smooth = 1.0f;  ///< of the rest of the BSDF
 };
 
 /// How much of its share a glossy part of GGX roughness `alpha` leaves to a guide: all where the lobe is as
@@ -62,8 +62,8 @@ WFPG_HD inline float guided_part(float alpha, float resolved_alpha) {
 /// `fraction`, in [0, 1], and less on glossy parts. With an empty field, and on delta BSDFs, the BSDF alone.
 template <class Field>
 struct basic_guide_mixture {
-  Field field;
-  float fraction = 0.0f;
+  Field field;                      ///< a directional_field or product_field
+  float fraction = 0.0f;            ///< of guided samples, before glossy parts take theirs
   std::uint32_t number = no_field;  ///< of the field, which directions carry with them
 
   /// A direction from a number in [0,1) that chooses the technique and u in [0,1)². O(log F) and the BSDF.
@@ -141,8 +141,10 @@ struct basic_guide_mixture {
   }
 };
 
+/// A field and a BSDF.
 using guide_mixture = basic_guide_mixture<directional_field>;
 /// `fraction` below 1: where a product is 0 and the BSDF is not, the BSDF has to draw.
+/// A product and a BSDF.
 using product_mixture = basic_guide_mixture<product_field>;
 
 }  // namespace wfpg

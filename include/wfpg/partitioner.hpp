@@ -20,15 +20,18 @@ namespace wfpg {
 /// A partition as kernels see it. Group g < *count holds permutation[offsets[g]] to permutation[offsets[g +
 /// 1] - 1], in ascending order of key, and inside a group of index.
 struct partition_view {
-  array_view<const std::uint32_t> permutation;
+  array_view<const std::uint32_t> permutation;  ///< indices, group by group
   array_view<const std::uint32_t> offsets;      ///< one more than groups
   array_view<const std::uint32_t> sorted_keys;  ///< of the permutation's elements
   array_view<const std::uint32_t>
       group_through;                     ///< of the permutation's elements: the group, counted from 1
   const std::uint32_t* count = nullptr;  ///< number of groups, in the policy's memory
 
+  /// Where a group begins in the permutation.
   WFPG_HD std::uint32_t begin(std::size_t group) const { return offsets[group]; }
+  /// Indices in a group, at least 1.
   WFPG_HD std::uint32_t size(std::size_t group) const { return offsets[group + 1] - offsets[group]; }
+  /// What its indices have in common.
   WFPG_HD std::uint32_t key(std::size_t group) const { return sorted_keys[offsets[group]]; }
 };
 
@@ -96,6 +99,7 @@ class partitioner {
     return {{permutation_.data(), n}, {offsets_.data(), n + 1}, sorted, through, count_.data()};
   }
 
+  /// Of all that it allocated.
   std::size_t bytes() const {
     return keys_.bytes() + permutation_.bytes() + group_through_.bytes() + offsets_.bytes() + count_.bytes();
   }

@@ -3,9 +3,9 @@
 //
 //   guider.begin_sample();
 //   for (std::uint32_t depth = 0; depth < max_depth; ++depth) {
-//     trace(...);                                              // the renderer's; records vertices in
-//     guider.recorder() guider.sample_directions(wfpg::wave{depth, n, surfaces, random}, caster, directions);
-//     shade(...);                                              // the renderer's; records radiance
+//     trace(...);              // the renderer's; records vertices in guider.recorder()
+//     guider.sample_directions(wfpg::wave{depth, n, surfaces, random}, caster, directions);
+//     shade(...);              // the renderer's; records radiance
 //   }
 //   guider.end_sample();
 #pragma once
@@ -40,7 +40,9 @@ enum class field_lifetime : std::uint8_t {
 struct guider_options {
   std::uint32_t octree_resolution =
       128;  ///< voxels along the scene's longest side; a power of two in [1, 4096]
+  /// How rays form bins, and what their fields cover.
   guiding_mode mode = guiding_mode::oriented;
+  /// How long fields live.
   field_lifetime fields = field_lifetime::kept;
   kept_field_options kept;          ///< resolution, budget and refresh of kept fields
   std::uint32_t min_bin_level = 3;  ///< l_min: no bin is larger than a node of this level (root 0)
@@ -63,6 +65,7 @@ struct guider_options {
   bool include_emission = true;
   std::uint32_t unguided_samples =
       1;  ///< samples at the beginning that only record ("PT first", section 3.7)
+  /// Of all that the guider draws by itself.
   std::uint64_t seed = 0;
   std::size_t max_paths = 0;  ///< paths of a sample; 0: the renderer deposits by itself
   /// Of the paths of a sample so many are recorded, others in each, that leaves get about as many deposits on
@@ -138,14 +141,18 @@ class path_guider {
   learnt_radiance_view learnt() const { return store_.learnt(); }
   /// Which lights next-event estimation is to ask, in this sample; empty without options.lights.weights.
   light_guide_view lights() const { return lights_.view(); }
+  /// The octree; its view goes to an svo_ray_caster.
   const sparse_voxel_octree<Exec>& octree() const { return octree_; }
+  /// What it was told, with max_rays completed.
   const guider_options& options() const { return options_; }
   /// Whether the sample that has begun is guided, and how many cells transient fields have at a depth.
   bool guided() const { return samples_ > options_.unguided_samples && !octree_.view().empty(); }
+  /// Cells along a side of transient fields at a depth.
   std::uint32_t field_resolution(std::uint32_t depth) const { return resolution_at(options_, depth); }
 
   /// Wait for the work before them.
   guider_statistics statistics() const;
+  /// What it holds, by part. Waits for the work before it.
   memory_report memory() const;
 
  private:

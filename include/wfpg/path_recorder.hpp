@@ -47,7 +47,9 @@ struct alignas(8) recorded_direction {
 /// finite is dropped and counted; what comes for paths that this sample does not record is not.
 class path_recorder_view {
  public:
+  /// Paths of a sample, recorded or not.
   WFPG_HD std::size_t paths() const { return paths_; }
+  /// Vertices that a path can have.
   WFPG_HD std::uint32_t max_depth() const { return max_depth_; }
 
   /// Vertex `depth` (0: the first surface) of a path: where it is, the unit direction toward the vertex
@@ -143,10 +145,11 @@ class path_recorder_view {
 /// Deposits one path's vertices: L(k) = (sum of contributions at k and after) / throughput(k), Eq. 5. It is
 /// what leaves a vertex, for the cache, and what arrives along the direction before it, for kept fields.
 struct deposit_paths {
-  path_recorder_view paths;
-  exitance_cache_view cache;
-  learnt_radiance_view learnt;
+  path_recorder_view paths;     ///< what was recorded
+  exitance_cache_view cache;    ///< where it goes
+  learnt_radiance_view learnt;  ///< where it goes too, unless empty
 
+  /// Path `path` of those recorded.
   WFPG_HD void operator()(std::size_t path) const {
     const bool escapes = (paths.lengths_[path] & path_recorder_view::escaped) != 0;
     const std::uint32_t vertices = paths.lengths_[path] & ~path_recorder_view::escaped;
@@ -214,7 +217,9 @@ class path_recorder {
     clear(exec);
   }
 
+  /// What kernels see; valid until begin_sample().
   path_recorder_view view() const { return view_; }
+  /// Of all that it allocated.
   std::size_t bytes() const {
     return lengths_.bytes() + places_.bytes() + light_.bytes() + directions_.bytes() + dropped_.bytes();
   }

@@ -38,9 +38,9 @@ struct product_point {
 
 /// A wave's P² points over the hemisphere about +z and over the sphere, row by row.
 struct product_points {
-  const product_point* hemisphere = nullptr;
-  const product_point* sphere = nullptr;
-  std::uint32_t resolution = 0;  ///< P; 0: no products
+  const product_point* hemisphere = nullptr;  ///< P² points, in the policy's memory
+  const product_point* sphere = nullptr;      ///< P² points, in the policy's memory
+  std::uint32_t resolution = 0;               ///< P; 0: no products
 };
 
 /// A density over directions: a field times a BSDF, of one ray; or the field as it is, where it has the BSDF
@@ -48,6 +48,7 @@ struct product_points {
 class product_field {
  public:
   product_field() = default;
+  /// The field as it is.
   WFPG_HD explicit product_field(const directional_field& field) : field_(field) {}
   /// `weights`: inclusive sums of the P² products, row by row, below 2³²; they and the field outlive this.
   WFPG_HD product_field(const directional_field& field, std::uint32_t resolution,

@@ -26,7 +26,7 @@ struct field_options {
   /// Over a hemisphere cells are narrower, and it spans √2 as many: the same angle.
   float filter_alpha = 0.8f;
   float floor = 1.0e-2f;  ///< epsilon added to each cell: times the field's mean, or as it is where absolute
-  bool absolute_floor = false;
+  bool absolute_floor = false;  ///< `floor` is radiance, not a share of the mean
 };
 
 /// Where a field's cones start, and what it covers.

@@ -58,6 +58,7 @@ class svo_ray_caster {
                                   float clearance = 2.0f)
       : tree_(tree), environment_(environment), clearance_(clearance) {}
 
+  /// Casts a ray: the distance at which it enters a leaf's voxel.
   WFPG_HD ray_hit operator()(const ray& r) const {
     const vec3 origin = tree_.grid().to_grid(r.origin);
     const float per_unit = static_cast<float>(tree_.grid().resolution) / tree_.grid().side;

@@ -51,18 +51,27 @@ struct alignas(16) two_levels {
 /// and in a level with the Morton code.
 class sparse_voxel_octree_view {
  public:
+  /// The deepest level that leaves can have: resolutions are at most 4096.
   static constexpr std::uint32_t max_depth = 12;
 
+  /// Whether there are no nodes.
   WFPG_HD bool empty() const { return node_count() == 0; }
+  /// The level of the leaves.
   WFPG_HD std::uint32_t depth() const { return depth_; }
+  /// The cube that the root is.
   WFPG_HD const voxel_grid& grid() const { return grid_; }
+  /// Nodes of all levels; ids are below it.
   WFPG_HD std::uint32_t node_count() const { return level_begin_[depth_ + 1]; }
+  /// Leaves, the last of the nodes.
   WFPG_HD std::uint32_t leaf_count() const { return node_count() - first_leaf(); }
+  /// The id of the first leaf.
   WFPG_HD node_id first_leaf() const { return level_begin_[depth_]; }
+  /// Whether a node is a leaf.
   WFPG_HD bool is_leaf(node_id node) const { return node >= first_leaf(); }
   /// The first node of a level, 0 <= level <= depth() + 1; one past the last of the level before it.
   WFPG_HD node_id level_begin(std::uint32_t level) const { return level_begin_[level]; }
 
+  /// The level of a node. O(depth).
   WFPG_HD std::uint32_t level_of(node_id node) const {
     std::uint32_t level = depth_;
     while (node < level_begin_[level]) --level;
@@ -72,6 +81,7 @@ class sparse_voxel_octree_view {
   WFPG_HD node_id parent(node_id node) const { return parents_[node]; }
   /// The children of an inner node are `child_count` nodes from `first_child`, in the order of their octants.
   WFPG_HD node_id first_child(node_id node) const { return first_children_[node]; }
+  /// Number of children of an inner node, 1 to 8.
   WFPG_HD std::uint32_t child_count(node_id node) const { return detail::popcount(child_masks_[node]); }
   /// The octants that an inner node has children in, a bit each.
   WFPG_HD std::uint32_t child_mask(node_id node) const { return child_masks_[node]; }
@@ -116,6 +126,7 @@ class sparse_voxel_octree_view {
       node = parents_[node];
     return node;
   }
+  /// The level of that node; the leaves' where the cone is narrow.
   WFPG_HD std::uint32_t level_for_cone(float distance, float solid_angle) const {
     const float face = grid_.voxel_size() * grid_.voxel_size();
     const float ratio = distance * distance * solid_angle * (0.5f / face);  // 2: halfway to 4, in ratio
@@ -142,6 +153,7 @@ class sparse_voxel_octree_view {
     const vec3 lower = grid_.origin + vec3(coordinates(node)) * size;
     return {lower, lower + size};
   }
+  /// The middle of that box. O(level).
   WFPG_HD vec3 centre(node_id node) const { return bounds(node).centre(); }
   /// Side of a node's cube, scene units.
   WFPG_HD float node_size(std::uint32_t level) const { return grid_.side / static_cast<float>(1u << level); }
@@ -366,10 +378,15 @@ class sparse_voxel_octree {
     build_levels(exec, find_leaves(exec, fragments));
   }
 
+  /// What kernels see; valid while the octree lives.
   sparse_voxel_octree_view view() const { return view_; }
+  /// Voxels along a side.
   std::uint32_t resolution() const { return view_.grid_.resolution; }
+  /// Nodes of all levels.
   std::uint32_t node_count() const { return view_.node_count(); }
+  /// Voxels that hold surface.
   std::uint32_t leaf_count() const { return view_.leaf_count(); }
+  /// Of what is kept; without leaf_fragment_begin().
   std::size_t bytes() const {
     return parents_.bytes() + first_children_.bytes() + child_masks_.bytes() + top_.bytes() + steps_.bytes();
   }

@@ -36,7 +36,7 @@ WFPG_HD inline std::uint32_t dominant_axis(vec3 n) {
 
 /// What the binner asks of a ray.
 struct ray_to_bin {
-  vec3 position{0.0f};
+  vec3 position{0.0f};                          ///< world space; one that is not finite has no bin
   std::uint32_t orientation = orientation_any;  ///< bin_orientation or dominant_axis
   bool active = false;                          ///< false: no bin
 };
@@ -52,7 +52,9 @@ struct binning_options {
 struct bins_view : partition_view {
   array_view<const std::uint32_t> ray_keys;  ///< a ray: its bin's key, 0xffffffff where it has none
 
+  /// The node that a bin's rays are in.
   WFPG_HD node_id node(std::size_t bin) const { return key(bin) / orientations; }
+  /// Which of its surfaces: bin_orientation or dominant_axis.
   WFPG_HD std::uint32_t orientation(std::size_t bin) const { return key(bin) % orientations; }
 };
 
@@ -151,6 +153,7 @@ class spatial_binner {
 
   /// Active rays of the last call that lie outside every voxel, in the policy's memory.
   const std::uint32_t* unbinned() const { return unbinned_.data(); }
+  /// Of all that it allocated.
   std::size_t bytes() const {
     return partitioner_.bytes() + node_counts_.bytes() + keys_.bytes() + unbinned_.bytes();
   }

@@ -14,32 +14,36 @@ namespace wfpg {
 
 /// Time of one stage, in all.
 struct stage_time {
-  const char* name;
-  double seconds;
+  const char* name;  ///< bin, fields, serve, record or cache
+  double seconds;    ///< of the host: on a device that of launching, unless a call waits
 };
 
+/// What path_guider::statistics() tells.
 struct guider_statistics {
-  std::uint32_t samples = 0;         ///< begun
-  std::uint32_t guided_samples = 0;  ///< of them, with fields
-  std::vector<depth_statistics> depths;
-  kept_field_statistics kept;          ///< zero where fields are transient
-  dropped_deposits deposits;           ///< that the cache dropped
-  std::uint32_t dropped_vertices = 0;  ///< recorder calls with a path, depth or order out of range
-  build_report build;
-  std::vector<stage_time> seconds;
+  std::uint32_t samples = 0;             ///< begun
+  std::uint32_t guided_samples = 0;      ///< of them, with fields
+  std::vector<depth_statistics> depths;  ///< a depth: what guiding did
+  kept_field_statistics kept;            ///< zero where fields are transient
+  dropped_deposits deposits;             ///< that the cache dropped
+  std::uint32_t dropped_vertices = 0;    ///< recorder calls with a path, depth or order out of range
+  build_report build;                    ///< what of the geometry was left out
+  std::vector<stage_time> seconds;       ///< stages, in order
 };
 
 /// Bytes of one part of a guider.
 struct memory_part {
-  const char* name;
-  std::size_t bytes;
-  bool persistent;  ///< kept across samples for guiding; else needed while a sample is in flight
+  const char* name;   ///< what it holds
+  std::size_t bytes;  ///< of the policy's memory
+  bool persistent;    ///< kept across samples for guiding; else needed while a sample is in flight
 };
 
+/// What path_guider::memory() tells.
 struct memory_report {
-  std::vector<memory_part> parts;
+  std::vector<memory_part> parts;  ///< all that a guider holds
 
+  /// Bytes kept across samples.
   std::size_t persistent() const { return sum(true); }
+  /// Bytes needed while a sample is in flight.
   std::size_t transient() const { return sum(false); }
 
  private:

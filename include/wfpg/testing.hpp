@@ -22,24 +22,27 @@
 #include <cstdint>
 #include <string>
 
+/// Checks of what a host hands to the guider.
 namespace wfpg::testing {
 
 /// The outcome of a check.
 struct check_report {
   std::string message;  ///< the first violation: where, what was found, what was expected; empty: all holds
 
+  /// True where all holds.
   explicit operator bool() const { return message.empty(); }
 };
 
+/// What check_bsdf asks, and how strictly.
 struct bsdf_check_options {
   vec3 normal{0.0f, 0.0f, 1.0f};               ///< the BSDF's shading normal, unit length
   bool reciprocal = true;                      ///< false: reciprocity is not asked
   float ior = 1.0f;                            ///< index of refraction below the normal over above, positive
   float albedo_limit = 1.0f;                   ///< of the light that goes on, at least 0
   std::size_t samples = std::size_t(1) << 16;  ///< drawn for each outgoing direction, at least 1024
-  std::uint64_t seed = 1;
-  float tolerance = 1.0e-3f;     ///< relative, between two ways to compute one value, in (0, 1)
-  double significance = 1.0e-3;  ///< the probability that a correct BSDF is rejected, in (0, 1)
+  std::uint64_t seed = 1;                      ///< of all random numbers
+  float tolerance = 1.0e-3f;                   ///< relative, between two ways to compute one value, in (0, 1)
+  double significance = 1.0e-3;                ///< the probability that a correct BSDF is rejected, in (0, 1)
 };
 
 /// Checks that a BSDF is one as <wfpg/bsdf.hpp> says, in this order:
@@ -72,10 +75,11 @@ struct bsdf_check_options {
 template <class Exec, class Bsdf>
 check_report check_bsdf(const Exec& exec, const Bsdf& bsdf, const bsdf_check_options& options = {});
 
+/// What check_ray_caster asks, and how strictly.
 struct caster_check_options {
   std::size_t rays = std::size_t(1) << 14;  ///< positive
-  std::uint64_t seed = 1;
-  float tolerance = 1.0e-4f;    ///< between two hits of one ray, of the diagonal of the bounds
+  std::uint64_t seed = 1;                   ///< of the rays
+  float tolerance = 1.0e-4f;                ///< between two hits of one ray, of the diagonal of the bounds
   float least_distance = 0.0f;  ///< nearer hits are not cast anew, scene units; of use where a caster passes
                                 ///< what is near, as svo_ray_caster does
   double least_hits = 0.01;     ///< share of the rays that have to hit, in [0, 1]; 1 in a closed scene

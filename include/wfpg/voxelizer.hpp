@@ -40,11 +40,13 @@ struct surface_fragment {
 
 /// The cube of the octree: `resolution`³ voxels from `origin`.
 struct voxel_grid {
-  vec3 origin{0.0f};
+  vec3 origin{0.0f};             ///< its least corner, world space
   float side = 1.0f;             ///< of the whole cube, scene units
   std::uint32_t resolution = 1;  ///< voxels along a side, a power of two
 
+  /// A voxel's side, scene units.
   WFPG_HD float voxel_size() const { return side / static_cast<float>(resolution); }
+  /// World space to voxels: [0, resolution)³ inside the cube.
   WFPG_HD vec3 to_grid(vec3 p) const { return (p - origin) * (static_cast<float>(resolution) / side); }
 
   /// The voxel that holds p; false where p is outside the cube.
@@ -64,6 +66,7 @@ struct build_report {
       0;  ///< triangles with an index beyond the vertices; samples outside given bounds
   std::uint32_t degenerate = 0;  ///< triangles without area, samples without normal or positive area
 
+  /// All of them.
   std::uint32_t skipped() const { return non_finite + out_of_range + degenerate; }
 };
 
@@ -77,14 +80,17 @@ struct fragment_surface {
 /// it.
 template <class Exec>
 struct voxel_fragments {
-  buffer<morton_code, Exec> codes;
-  buffer<fragment_surface, Exec> surfaces;
-  voxel_grid grid;
-  build_report report;
+  buffer<morton_code, Exec> codes;          ///< a fragment: its voxel
+  buffer<fragment_surface, Exec> surfaces;  ///< a fragment: its surface
+  voxel_grid grid;                          ///< the voxels' cube
+  build_report report;                      ///< what was left out
 
   voxel_fragments() = default;
+  /// n fragments, not yet written. Throws out_of_memory.
   voxel_fragments(const Exec& exec, std::size_t n) : codes(exec, n), surfaces(exec, n) {}
+  /// Number of fragments.
   std::size_t size() const { return codes.size(); }
+  /// Of all fragments.
   std::size_t bytes() const { return codes.bytes() + surfaces.bytes(); }
 };
 

@@ -16,11 +16,12 @@ namespace wfpg {
 ///   and 1
 template <class Surfaces, class Random>
 struct wave {
-  std::uint32_t depth = 0;  ///< 0: the camera's first hits
-  std::size_t ray_count = 0;
-  Surfaces surfaces;
-  Random random;
+  std::uint32_t depth = 0;    ///< 0: the camera's first hits
+  std::size_t ray_count = 0;  ///< rays, or a capacity of them
+  Surfaces surfaces;          ///< where they have hit
+  Random random;              ///< what directions are drawn from
 };
+/// The types follow from the arguments.
 template <class Surfaces, class Random>
 wave(std::uint32_t, std::size_t, Surfaces, Random) -> wave<Surfaces, Random>;
 
@@ -29,8 +30,8 @@ struct depth_statistics {
   std::uint64_t bins = 0;  ///< whose fields were made; of kept fields, made or refreshed
   std::uint64_t rays = 0;  ///< in bins
   std::uint64_t unbinned =
-      0;  ///< active rays outside every voxel or without room for a field: their BSDF alone
-  std::uint64_t cones = 0;
+      0;                    ///< active rays outside every voxel or without room for a field: their BSDF alone
+  std::uint64_t cones = 0;  ///< cast for them
 };
 
 /// Directions whose densities the renderer wants from the same fields: those that next-event estimation
@@ -38,9 +39,10 @@ struct depth_statistics {
 ///   Query  vec3 operator()(std::uint32_t ray) const;   unit length, or zero for none
 template <class Query>
 struct density_queries {
-  Query query;
+  Query query;                  ///< a ray's direction
   array_view<float> densities;  ///< a ray: the whole mixture's density, per steradian; 0 for none
 };
+/// The type follows from the argument.
 template <class Query>
 density_queries(Query, array_view<float>) -> density_queries<Query>;
 

@@ -17,10 +17,12 @@ namespace wfpg {
 class learnt_radiance_view {
  public:
   learnt_radiance_view() = default;
+  /// Of fields of `resolution`² cells.
   WFPG_HD learnt_radiance_view(array_view<const resident_field> fields, std::uint32_t resolution,
                                const detail::value_queue_view& queue)
       : fields_(fields), resolution_(resolution), queue_(queue) {}
 
+  /// Whether nothing is learnt.
   WFPG_HD bool empty() const { return resolution_ == 0; }
 
   /// Radiance (luminance, W/(m² sr)) that arrives along a unit direction where `field` was drawn from or
@@ -34,6 +36,7 @@ class learnt_radiance_view {
 
   /// The same for several of one thread, as of exitance_cache_view.
   WFPG_HD std::uint32_t reserve(std::uint32_t n) const { return queue_.reserve(n); }
+  /// Writes an entry of reserve(), as deposit() does.
   WFPG_HD void write(std::uint32_t entry, std::uint32_t field, vec3 direction, float radiance) const {
     if (!queue_.fits(entry)) return;
     std::uint32_t cell;
@@ -42,6 +45,7 @@ class learnt_radiance_view {
     else
       queue_.drop(entry);
   }
+  /// Counts an entry that is written.
   WFPG_HD void count(std::uint32_t entry) const { queue_.count(entry); }
 
  private:

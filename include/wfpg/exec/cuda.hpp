@@ -30,8 +30,10 @@ namespace wfpg {
 /// the first call after it.
 class cuda_error : public std::runtime_error {
  public:
+  /// The name of the call, and what it returned.
   cuda_error(const char* call, cudaError_t code)
       : std::runtime_error(std::string(call) + ": " + cudaGetErrorString(code)), code_(code) {}
+  /// What the call returned.
   cudaError_t code() const { return code_; }
 
  private:
@@ -137,9 +139,13 @@ namespace exec {
 /// The CUDA policy on a stream. Copies of one share the stream and the memory.
 class cuda {
  public:
+  /// What reports call it.
   static constexpr const char* name = "cuda";
+  /// Lanes of a warp.
   static constexpr int warp_width = 32;
+  /// Warps of a block.
   static constexpr int warps_per_block = 16;
+  /// What for_each_block() calls with.
   using block = wfpg::detail::cuda_block<warps_per_block>;
 
   /// `resource` hands out device memory, ordered on the stream, and outlives what is allocated; null stands
@@ -147,10 +153,14 @@ class cuda {
   explicit cuda(cudaStream_t stream = nullptr, memory_resource* resource = nullptr)
       : stream_(stream), resource_(resource ? resource : wfpg::detail::stream_resource::of(stream)) {}
 
+  /// Where device memory comes from.
   memory_resource* resource() const { return resource_; }
+  /// The same stream, with memory from elsewhere.
   cuda with_resource(memory_resource* resource) const { return cuda(stream_, resource); }
+  /// What all calls are ordered on.
   cudaStream_t stream() const { return stream_; }
 
+  /// Thrust's CUDA policy on the stream, which does not wait, with temporaries from resource().
   auto thrust() const {
     return ::thrust::cuda::par_nosync(wfpg::detail::resource_allocator<char>(resource_)).on(stream_);
   }
@@ -165,6 +175,7 @@ class cuda {
     copy(to, from, bytes, cudaMemcpyHostToDevice);
   }
 
+  /// Sets each byte of device memory.
   void fill_bytes(void* to, unsigned char value, std::size_t bytes) const {
     if (bytes) wfpg::detail::check_cuda(cudaMemsetAsync(to, value, bytes, stream_), "cudaMemsetAsync");
   }
@@ -185,12 +196,14 @@ class cuda {
     sort(storage.data());
   }
 
+  /// f(i) for each i in [0, n), in no order. Throws cuda_error where the launch fails, as the others do.
   template <class F>
   void for_each(std::size_t n, const F& f) const {
     if (n == 0) return;
     const std::size_t blocks = (n + threads - 1) / threads;
     launch(wfpg::detail::for_each_kernel<std::size_t, F>, blocks, threads, 0, n, f);
   }
+  /// The same of a number that only the device knows.
   template <class F>
   void for_each(device_count n, const F& f) const {
     if (n.capacity == 0) return;
@@ -198,10 +211,13 @@ class cuda {
     launch(wfpg::detail::for_each_kernel<device_count, F>, at_most_resident(blocks), threads, 0, n, f);
   }
 
+  /// f(block, i) for each i in [0, n), by blocks with `scratch_bytes` of shared memory each. Throws
+  /// std::invalid_argument where the device has less.
   template <class F>
   void for_each_block(std::size_t n, std::size_t scratch_bytes, const F& f) const {
     if (n > 0) launch_blocks(n, n, scratch_bytes, f);
   }
+  /// The same of a number that only the device knows.
   template <class F>
   void for_each_block(device_count n, std::size_t scratch_bytes, const F& f) const {
     if (n.capacity > 0) launch_blocks(n, n.capacity, scratch_bytes, f);

@@ -35,14 +35,17 @@ namespace wfpg::exec {
 template <int W>
 class basic_omp : public wfpg::detail::cpu_policy<basic_omp<W>, W> {
  public:
+  /// What reports call it.
   static constexpr const char* name = "omp";
 
   /// Memory from `resource`, which must outlive what is allocated; null stands for the default resource.
   explicit basic_omp(memory_resource* resource = nullptr)
       : wfpg::detail::cpu_policy<basic_omp<W>, W>(resource) {}
 
+  /// Thrust's OpenMP policy, with temporaries from resource().
   auto thrust() const { return ::thrust::omp::par(wfpg::detail::omp_allocator<char>(this->resource())); }
 
+  /// Threads of a loop, at most.
   int concurrency() const { return omp_get_max_threads(); }
 
   /// What f throws is thrown here, once, when the loop has ended.
@@ -64,6 +67,7 @@ class basic_omp : public wfpg::detail::cpu_policy<basic_omp<W>, W> {
   }
 };
 
+/// The OpenMP policy, with warps of 32 lanes.
 using omp = basic_omp<32>;
 
 }  // namespace wfpg::exec

@@ -38,13 +38,15 @@ namespace wfpg {
 /// the resource hands out device memory.
 using memory_resource = std::pmr::memory_resource;
 
+/// Execution policies.
 namespace exec {
 
 /// A number of elements that a kernel computed: *value, and at most `capacity`. The host does not read it.
 struct device_count {
   const std::uint32_t* value = nullptr;  ///< in the policy's memory
-  std::size_t capacity = 0;
+  std::size_t capacity = 0;              ///< what it is at most
 
+  /// The number, read where it lies.
   WFPG_HD std::size_t get() const { return *value < capacity ? *value : capacity; }
 };
 

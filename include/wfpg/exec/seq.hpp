@@ -12,22 +12,27 @@ namespace wfpg::exec {
 template <int W>
 class basic_seq : public wfpg::detail::cpu_policy<basic_seq<W>, W> {
  public:
+  /// What reports call it.
   static constexpr const char* name = "seq";
 
   /// Memory from `resource`, which must outlive what is allocated; null stands for the default resource.
   explicit basic_seq(memory_resource* resource = nullptr)
       : wfpg::detail::cpu_policy<basic_seq<W>, W>(resource) {}
 
+  /// Thrust's serial policy, with temporaries from resource().
   auto thrust() const { return ::thrust::cpp::par(wfpg::detail::resource_allocator<char>(this->resource())); }
 
+  /// Threads of a loop.
   int concurrency() const { return 1; }
 
+  /// Calls f(0, n, 0) once.
   template <class F>
   void parallel(std::size_t n, std::size_t, const F& f) const {
     if (n) f(0, n, 0);
   }
 };
 
+/// The serial policy, with warps of 32 lanes.
 using seq = basic_seq<32>;
 
 }  // namespace wfpg::exec

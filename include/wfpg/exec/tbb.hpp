@@ -16,16 +16,20 @@ namespace wfpg::exec {
 template <int W>
 class basic_tbb : public wfpg::detail::cpu_policy<basic_tbb<W>, W> {
  public:
+  /// What reports call it.
   static constexpr const char* name = "tbb";
 
   /// Memory from `resource`, which must outlive what is allocated; null stands for the default resource.
   explicit basic_tbb(memory_resource* resource = nullptr)
       : wfpg::detail::cpu_policy<basic_tbb<W>, W>(resource) {}
 
+  /// Thrust's TBB policy, with temporaries from resource().
   auto thrust() const { return ::thrust::tbb::par(wfpg::detail::resource_allocator<char>(this->resource())); }
 
+  /// Threads of a loop, at most.
   int concurrency() const { return ::tbb::this_task_arena::max_concurrency(); }
 
+  /// Calls f(first, last, worker) for ranges of about `grain` that cover [0, n), in no order.
   template <class F>
   void parallel(std::size_t n, std::size_t grain, const F& f) const {
     // Isolated, since a thread that waits inside f, for a host's own TBB work, must not take up another
@@ -38,6 +42,7 @@ class basic_tbb : public wfpg::detail::cpu_policy<basic_tbb<W>, W> {
   }
 };
 
+/// The TBB policy, with warps of 32 lanes.
 using tbb = basic_tbb<32>;
 
 }  // namespace wfpg::exec

@@ -40,4 +40,4 @@ void trace(const scene&, path&);
 
 }  // namespace my
 
-#include "readme_tracer.inc"
+#include "readme-1.inc"

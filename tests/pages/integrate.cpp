@@ -1,0 +1,2 @@
+// The program of docs/integrate.md.
+#include "integrate-3.inc"
