@@ -7,7 +7,10 @@
 #include <wfpg/detail/section_file.hpp>
 #include <wfpg/path_guider.hpp>
 
-#include <utility>
+#include <thrust/fill.h>
+
+#include <cstdint>
+#include <string>
 #include <vector>
 
 namespace wfpg::detail {

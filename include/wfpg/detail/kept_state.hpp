@@ -7,6 +7,7 @@
 #include <wfpg/field_store.hpp>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
 #include <vector>
 

@@ -19,15 +19,16 @@
 #include <ostream>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
 namespace wfpg::detail {
 
-/// FNV-1a of 64 bits (Fowler, Noll and Vo): no single altered byte goes unnoticed.
-inline std::uint64_t checksum(std::string_view bytes) {
-  std::uint64_t hash = 0xcbf29ce484222325ull;
+/// FNV-1a of 64 bits (Fowler, Noll and Vo): no single altered byte goes unnoticed. `hash`: of the bytes
+/// before these.
+inline std::uint64_t checksum(std::string_view bytes, std::uint64_t hash = 0xcbf29ce484222325ull) {
   for (const char byte : bytes) hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3ull;
   return hash;
 }
