@@ -9,6 +9,7 @@
 
 #include <thrust/fill.h>
 
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -70,6 +71,13 @@ section_writer octree_to_bytes(const Exec& exec, const sparse_voxel_octree<Exec>
   return bytes;
 }
 
+inline bool is_divisible(const voxel_grid& grid) {
+  const float most = 1.0e6f * grid.side;
+  const vec3 o = grid.origin;
+  return grid.side >= 1.0e-20f && grid.side <= 1.0e20f && fabsf(o.x) <= most && fabsf(o.y) <= most &&
+         fabsf(o.z) <= most;
+}
+
 /// Fragments that the octree is built from, one a leaf. Their normals stand for those that the cache has.
 template <class Exec>
 voxel_fragments<Exec> fragments_from_bytes(const Exec& exec, section_reader bytes, std::uint32_t resolution) {
@@ -77,7 +85,7 @@ voxel_fragments<Exec> fragments_from_bytes(const Exec& exec, section_reader byte
   grid.resolution = resolution;
   grid.origin = bytes.get_vec3();
   grid.side = bytes.get<float>();
-  bytes.require(is_finite(grid.origin) && is_finite(grid.side) && grid.side > 0.0f, "has no cube");
+  bytes.require(is_divisible(grid), "has no cube that floats can divide");
   const auto codes = bytes.get_all<morton_code>(bytes.left() / sizeof(morton_code));
   bytes.end();
   const morton_code all = morton_code(resolution) * resolution * resolution;
@@ -141,9 +149,12 @@ struct state_access {
     bytes.put(guider.build_.out_of_range);
     bytes.put(guider.build_.degenerate);
     bytes.put(guider.recorder_.dropped(guider.exec_));
-    for (const depth_statistics& depth : guider.counts_.to_host(guider.exec_))
-      for (const std::uint64_t count : {depth.bins, depth.rays, depth.unbinned, depth.cones})
-        bytes.put(count);
+    for (const depth_statistics& depth : guider.counts_.to_host(guider.exec_)) {
+      bytes.put(depth.bins);
+      bytes.put(depth.rays);
+      bytes.put(depth.unbinned);
+      bytes.put(depth.cones);
+    }
     return bytes;
   }
 

@@ -82,9 +82,10 @@ struct store_state {
   static section_writer fields_to_bytes(const Exec& exec, const field_store<Exec>& store) {
     const auto state = read_element(exec, store.state_.data());
     section_writer bytes;
-    for (const std::uint32_t count :
-         {state.pressure, state.refused_births, state.delayed_births, state.refused_since_mark})
-      bytes.put(count);
+    bytes.put(state.pressure);
+    bytes.put(state.refused_births);
+    bytes.put(state.delayed_births);
+    bytes.put(state.refused_since_mark);
     bytes.put(state.born);
     bytes.put(state.refreshed);
     bytes.put(std::uint32_t(store.learns()));
@@ -98,9 +99,10 @@ struct store_state {
   template <class Exec>
   static void restore_fields(const Exec& exec, section_reader bytes, field_store<Exec>& store) {
     field_store_state state;
-    for (std::uint32_t* const count :
-         {&state.pressure, &state.refused_births, &state.delayed_births, &state.refused_since_mark})
-      *count = bytes.get<std::uint32_t>();
+    state.pressure = bytes.get<std::uint32_t>();
+    state.refused_births = bytes.get<std::uint32_t>();
+    state.delayed_births = bytes.get<std::uint32_t>();
+    state.refused_since_mark = bytes.get<std::uint32_t>();
     bytes.require(state.pressure >= 2 && state.pressure <= 1u << 16, "has a pressure out of range");
     state.born = bytes.get<std::uint64_t>();
     state.refreshed = bytes.get<std::uint64_t>();
@@ -139,9 +141,11 @@ struct store_state {
   template <class Exec>
   static void put(const Exec& exec, const field_store<Exec>& store, std::size_t i, const field_slot& slot,
                   const resident_field& field, section_writer& bytes) {
-    for (const std::uint32_t word :
-         {static_cast<std::uint32_t>(i), slot.key, slot.last_used, slot.last_built, slot.builds})
-      bytes.put(word);
+    bytes.put(static_cast<std::uint32_t>(i));
+    bytes.put(slot.key);
+    bytes.put(slot.last_used);
+    bytes.put(slot.last_built);
+    bytes.put(slot.builds);
     bytes.put(field.normal);
     bytes.put(field.fraction);
     if (!(field.fraction > 0.0f)) return;
@@ -158,8 +162,10 @@ struct store_state {
     s.index = bytes.get<std::uint32_t>();
     bytes.require(s.index >= first, "has slots out of order");
     bytes.require(s.index < store.capacity_, "has more fields than option kept.budget_bytes has room for");
-    for (std::uint32_t* const word : {&s.slot.key, &s.slot.last_used, &s.slot.last_built, &s.slot.builds})
-      *word = bytes.get<std::uint32_t>();
+    s.slot.key = bytes.get<std::uint32_t>();
+    s.slot.last_used = bytes.get<std::uint32_t>();
+    s.slot.last_built = bytes.get<std::uint32_t>();
+    s.slot.builds = bytes.get<std::uint32_t>();
     s.field.normal = bytes.get_vec3();
     s.field.fraction = bytes.get<float>();
     check(bytes, s, store.tree_.node_count(), store.sample_);
@@ -195,7 +201,7 @@ struct store_state {
     for (const std::uint32_t word : s.learnt) {
       learnt_mean mean;
       std::memcpy(static_cast<void*>(&mean), &word, sizeof word);
-      bytes.require(is_finite(mean.mean()), "has learnt what is not finite");
+      bytes.require(mean.mean() <= 1.001e30f, "has learnt radiance out of range");  // values are 1e30 at most
     }
   }
 
