@@ -148,6 +148,29 @@ WFPG_TEST_CASE("a warm start guides from the first sample on, with other options
   CHECK(count_guided(exec, view, 200) > 150);
 }
 
+WFPG_TEST_CASE("fields that learn and fields that cannot take over from one another", "[guide_file]") {
+  const Exec exec;
+  const guider_options learning = small_options();
+  guider_options without_paths = learning;  // nothing to learn from
+  without_paths.max_paths = 0;
+  without_paths.max_rays = paths;
+  const std::string bytes = saved(trained(exec, learning));
+  const wfpg::path_guider<Exec> second = loaded(exec, bytes, without_paths);
+  CHECK(second.learnt().empty());
+  CHECK(second.statistics().kept.live > 0);
+  const std::string other = saved(second);
+  CHECK(other.size() < bytes.size());
+  wfpg::path_guider<Exec> third = loaded(exec, other, learning);
+  CHECK_FALSE(third.learnt().empty());
+  CHECK(third.statistics().kept.live == second.statistics().kept.live);
+  CHECK(saved(third).size() == bytes.size());
+  wfpg::path_guider<Exec> forgetful = loaded(exec, bytes, learning);
+  CHECK(saved(third) != bytes);
+  forgetful.forget_light();
+  third.forget_light();
+  CHECK(saved(third) == saved(forgetful));
+}
+
 TEST_CASE("guide files that are cut off, altered or foreign are told apart", "[guide_file]") {
   const guider_options options = small_options();
   const std::string bytes = saved(trained(one_policy(), options));

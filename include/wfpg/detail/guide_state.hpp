@@ -11,6 +11,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <string>
 #include <vector>
 
@@ -74,6 +75,7 @@ section_writer octree_to_bytes(const Exec& exec, const sparse_voxel_octree<Exec>
 inline bool is_divisible(const voxel_grid& grid) {
   const float most = 1.0e6f * grid.side;
   const vec3 o = grid.origin;
+  if (!is_finite(o) || !is_finite(grid.side)) return false;
   return grid.side >= 1.0e-20f && grid.side <= 1.0e20f && fabsf(o.x) <= most && fabsf(o.y) <= most &&
          fabsf(o.z) <= most;
 }
@@ -97,6 +99,13 @@ voxel_fragments<Exec> fragments_from_bytes(const Exec& exec, section_reader byte
                    fragment_surface{pack_direction(vec3(0.0f, 0.0f, 1.0f)), 1.0f});
   fragments.grid = grid;
   return fragments;
+}
+
+/// At least 0, and finite as a float; by bits, since compilers may assume that of every number.
+inline bool is_float_radiance(double value) {
+  std::uint64_t bits;
+  std::memcpy(&bits, &value, sizeof value);
+  return bits <= 0x47efffffe0000000ull;
 }
 
 /// To and from the members that a guide file holds.
@@ -127,8 +136,7 @@ struct state_access {
       for (int side = 0; side < 2; ++side) {
         leaf.means[side] = bytes.get<double>();
         leaf.counts[side] = bytes.get<std::uint32_t>();
-        bytes.require(leaf.means[side] >= 0.0 && leaf.means[side] <= 3.4028234663852886e38,
-                      "has radiance that is negative or not finite");
+        bytes.require(is_float_radiance(leaf.means[side]), "has radiance that is negative or not finite");
       }
     const auto dropped = bytes.get_all<std::uint32_t>(cache.counters_.size());
     bytes.end();

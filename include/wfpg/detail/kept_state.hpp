@@ -46,6 +46,11 @@ inline bool is_distribution(const std::vector<std::uint32_t>& words, std::size_t
   return words.back() > 0;
 }
 
+/// In [0, most]; by bits, since compilers may assume that numbers are finite.
+inline bool is_up_to(float value, float most) {
+  return float_bits(value) <= float_bits(most);
+}
+
 /// To and from the members of a field_store that a guide file holds.
 struct store_state {
   template <class Exec>
@@ -186,7 +191,7 @@ struct store_state {
                   "has a field of a sample to come");
     bytes.require(is_finite(square) && (!s.field.hemisphere() || (square > 0.5f && square < 2.0f)),
                   "has a normal without unit length");
-    bytes.require(s.field.fraction >= 0.0f && s.field.fraction <= 1.0f, "has a fraction out of range");
+    bytes.require(is_up_to(s.field.fraction, 1.0f), "has a fraction out of range");
     bytes.require(s.field.fraction > 0.0f || s.slot.builds == 0, "has a field without cells");
   }
 
@@ -201,7 +206,8 @@ struct store_state {
     for (const std::uint32_t word : s.learnt) {
       learnt_mean mean;
       std::memcpy(static_cast<void*>(&mean), &word, sizeof word);
-      bytes.require(mean.mean() <= 1.001e30f, "has learnt radiance out of range");  // values are 1e30 at most
+      bytes.require(is_up_to(mean.mean(), 1.001e30f),  // values are 1e30 at most
+                    "has learnt radiance out of range");
     }
   }
 
