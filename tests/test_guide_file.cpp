@@ -105,7 +105,7 @@ WFPG_TEST_CASE("fields without room, invalidated or without light go on to the b
   const Exec exec;
   guider_options options = small_options();
   options.octree_resolution = 32;
-  wfpg::path_guider<Exec> first = trained(exec, options, 4);
+  wfpg::path_guider<Exec> first = trained(exec, options, 34);  // when waves take turns to build fields
   REQUIRE(first.statistics().kept.refused > 0);
   first.invalidate({wfpg::vec3(0.4f), wfpg::vec3(0.6f)});
   first.forget_light();

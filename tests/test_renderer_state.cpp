@@ -249,6 +249,18 @@ TEST_CASE("a rendering begins with the guide of another one", "[renderer][state]
     CHECK(warm.report.spp == 1);
     CHECK(warm.report.cones_per_segment > 0.0);
     CHECK_FALSE(same_bits(warm.picture, cold.picture));
+
+    options.spp = 5;
+    const render_result whole = render::render(world, options, {});
+    write_bytes(folder.file("state"), stopped(world, options, 2).state);
+    render_options rest = options;
+    rest.load_guide.clear();
+    rest.resume = folder.file("state");
+    rest.combine = combination_of(options);
+    double begun = 0.0;
+    const auto progress = [&begun](const render_progress& p) { begun = p.begun; };
+    CHECK(same_bits(render::render(world, rest, progress).picture, whole.picture));
+    CHECK(begun == Approx(0.4));
     options.octree_resolution = 64;
     CHECK(contains(fault([&] { render::render(world, options, {}); }), "option octree_resolution 32"));
   }

@@ -128,6 +128,7 @@ struct render_progress {
   int samples = 0;        ///< done
   double fraction = 0.0;  ///< of the budget, in [0, 1]
   double seconds = 0.0;   ///< since rendering began
+  double begun = 0.0;     ///< fraction that a rendering which goes on had before
 };
 using progress_callback = std::function<void(const render_progress&)>;
 

@@ -35,14 +35,15 @@ class sample_budget {
       : spp_(options.spp),
         seconds_(options.seconds),
         least_(combination_of(options) == wfpg::sample_combination::discard_first ? 2 : 1),
-        samples_(samples) {}
+        samples_(samples),
+        begun_(options.seconds > 0.0 ? 0.0 : fraction()) {}
 
   int samples() const { return samples_; }
   double seconds() const { return clock_.seconds() - left_out_; }
   bool is_spent() const { return samples_ >= least_ && fraction() >= 1.0; }
   void count() { ++samples_; }
   void leave_out(double seconds) { left_out_ += seconds; }
-  render_progress progress() const { return {samples_, std::min(1.0, fraction()), seconds()}; }
+  render_progress progress() const { return {samples_, std::min(1.0, fraction()), seconds(), begun_}; }
 
  private:
   double fraction() const {
@@ -55,6 +56,7 @@ class sample_budget {
   double left_out_ = 0.0;
   int least_;  ///< the picture of fewer has no weight
   int samples_;
+  double begun_;  ///< fraction
 };
 
 inline bool is_kept(checkpoint_times times, int samples, bool is_last) {
