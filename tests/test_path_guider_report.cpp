@@ -41,8 +41,8 @@ WFPG_TEST_CASE("path guider: memory() is what it holds of its resource, by part"
       CHECK(memory.persistent() + memory.transient() == resource.bytes_in_use - mesh_bytes);
       std::set<std::string> names;
       for (const wfpg::memory_part& part : memory.parts) names.insert(part.name);
-      CHECK(names == std::set<std::string>{"octree", "cache", "kept fields", "levels", "deposits", "paths",
-                                           "binning", "fields", "scratch"});
+      CHECK(names == std::set<std::string>{"octree", "cache", "kept fields", "levels", "lights", "deposits",
+                                           "paths", "binning", "fields", "scratch"});
       CHECK(memory.persistent() <= most_persistent(guider));
       for (const wfpg::memory_part& part : memory.parts) {
         if (part.name == std::string("paths")) CHECK(part.bytes <= 300 * 3 * 48 + 300 * 4 + 64);

@@ -1,7 +1,10 @@
-// wfpg-render: renders a scene with or without guiding. Exit code 0, or 2 with a message on failure.
+// wfpg-render: renders a scene with or without guiding. SIGINT and SIGTERM end it after the sample in flight,
+// with its picture and state. Exit code 0; 2 with a message on failure; 3 where it was interrupted.
+#include "interruption.hpp"
 #include "progress_bar.hpp"
 #include "render.hpp"
 #include "render_arguments.hpp"
+#include "render_state.hpp"
 #include "stats_json.hpp"
 
 #include <CLI/CLI.hpp>
@@ -15,9 +18,10 @@
 namespace {
 
 constexpr int failure = 2;
+constexpr int interrupted = 3;
 
 struct arguments {
-  std::string scene, environment, output, png, stats, reference;
+  std::string scene, environment, output, png, stats, reference, save_guide, save_state;
   float exposure = 1.0f;  // of the PNG
   render::render_options options;
 };
@@ -36,12 +40,34 @@ void add_file_options(CLI::App& app, arguments& given) {
   app.add_option("--reference", given.reference, "picture to print the error against, OpenEXR");
 }
 
+void add_state_options(CLI::App& app, arguments& given) {
+  app.add_option("--save-guide", given.save_guide, "where the guide goes at the end: what it has learnt");
+  CLI::Option* const load =
+      app.add_option("--load-guide", given.options.load_guide, "guide to begin with, of the same scene");
+  app.add_option("--save-state", given.save_state,
+                 "where the rendering's state goes at the end, and when it is interrupted");
+  app.add_option("--resume", given.options.resume,
+                 "state of the rendering to go on with; where it goes when that is interrupted")
+      ->excludes(load);
+}
+
+/// What a rendering leaves behind beside its pictures.
+void save_states(const arguments& given, const render::render_result& result) {
+  if (!given.save_guide.empty()) render::write_bytes(given.save_guide, result.guide);
+  const bool updates = given.save_state.empty() && result.is_stopped;
+  const std::string& state = updates ? given.options.resume : given.save_state;
+  if (!state.empty()) render::write_bytes(state, result.state);
+  if (!result.is_stopped) return;
+  std::cerr << "wfpg-render: interrupted after " << result.report.spp << " samples"
+            << (state.empty() ? "" : "; --resume " + state + " goes on") << '\n';
+}
+
 void print_error(const render::image_error& error) {
   std::printf("mse %.6e  relmse %.6e  relmse trimmed %.6e  mse reinhard %.6e\n", error.mse, error.relmse,
               error.relmse_trimmed, error.mse_reinhard);
 }
 
-void run(arguments& given) {
+int run(arguments& given) {
   render::scene scene = render::load_scene(given.scene);
   if (!given.environment.empty()) scene.sky = render::read_environment(given.environment);
   for (const std::string& warning : scene.warnings) std::cerr << "wfpg-render: warning: " << warning << '\n';
@@ -53,6 +79,10 @@ void run(arguments& given) {
   std::optional<render::image> reference;
   if (!given.reference.empty()) reference = render::read_exr(given.reference);
 
+  given.options.keep_guide = !given.save_guide.empty();
+  given.options.keep_state = !given.save_state.empty() || !given.options.resume.empty();
+  given.options.is_stopped = render::is_interrupted;
+  render::note_interruptions();
   render::progress_bar bar;
   const render::render_result result =
       render::render(scene, given.options, [&bar](const render::render_progress& p) { bar.show(p); });
@@ -63,6 +93,8 @@ void run(arguments& given) {
   if (reference) error = render::compare(result.picture, *reference);
   if (error) print_error(*error);
   if (!given.stats.empty()) render::write_stats(given.stats, result.report, error);
+  save_states(given, result);
+  return result.is_stopped ? interrupted : 0;
 }
 
 }  // namespace
@@ -71,6 +103,7 @@ int main(int argc, char** argv) {
   arguments given;
   CLI::App app{"Renders a scene by wavefront path tracing, with or without path guiding."};
   add_file_options(app, given);
+  add_state_options(app, given);
   render::add_method_options(app, given.options);
   render::add_device_option(app, given.options);
   render::add_nee_option(app, given.options);
@@ -79,17 +112,17 @@ int main(int argc, char** argv) {
   render::add_guider_options(app, given.options);
   try {
     app.parse(argc, argv);
-    if (given.output.empty() && given.png.empty() && given.stats.empty() && given.reference.empty())
-      throw CLI::RequiredError("one of -o, --png, --stats, --reference");
+    if (given.output.empty() && given.png.empty() && given.stats.empty() && given.reference.empty() &&
+        given.save_guide.empty() && given.save_state.empty())
+      throw CLI::RequiredError("one of -o, --png, --stats, --reference, --save-guide, --save-state");
     render::check_render_options(app, given.options);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : failure;
   }
   try {
-    run(given);
+    return run(given);
   } catch (const std::exception& error) {
     std::cerr << "wfpg-render: " << error.what() << '\n';
     return failure;
   }
-  return 0;
 }

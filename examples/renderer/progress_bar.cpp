@@ -24,7 +24,8 @@ void progress_bar::show(const render_progress& progress) {
   const double since = last_shown_ < 0.0 ? progress.seconds : progress.seconds - last_shown_;
   if (since < interval && !(complete && terminal_)) return;
   last_shown_ = progress.seconds;
-  const double left = progress.seconds * (1.0 - progress.fraction) / std::max(1e-6, progress.fraction);
+  const double done = progress.fraction - progress.begun;
+  const double left = progress.seconds * (1.0 - progress.fraction) / std::max(1e-6, done);
   if (terminal_) {
     const auto full = static_cast<std::size_t>(columns * progress.fraction);
     const std::string bar = std::string(full, '#') + std::string(columns - full, '.');

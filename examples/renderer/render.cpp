@@ -23,6 +23,20 @@ namespace {
 constexpr int largest_side = 32768;
 constexpr int largest_depth = 1024;
 
+/// State on disk is of what can be saved.
+void require_guided_files(const render_options& options) {
+  using wfpg::detail::require;
+  const std::string& method = name_of(method_names(), options.method);
+  const bool guided =
+      options.method == sampling_method::wfpg || options.method == sampling_method::wfpg_product;
+  require(guided || (options.load_guide.empty() && !options.keep_guide), "method", method,
+          "wfpg or wfpg-product where a guide is loaded or saved");
+  require(!is_openpgl(options.method) || (options.resume.empty() && !options.keep_state), "method", method,
+          "none of Open PGL's where a rendering's state is resumed or saved");
+  require(options.resume.empty() || options.load_guide.empty(), "load_guide", options.load_guide,
+          "none where a rendering goes on, which has its own");
+}
+
 render_options completed(const scene& scene, render_options options) {
   using wfpg::detail::require;
   if (options.width == 0 && options.height == 0) {
@@ -46,6 +60,7 @@ render_options completed(const scene& scene, render_options options) {
   const int least = combination_of(options) == wfpg::sample_combination::discard_first ? 2 : 1;
   require(options.seconds > 0.0 || options.spp >= least, "spp", options.spp,
           least == 2 ? "at least 2, as the first sample is discarded" : "at least 1");
+  require_guided_files(options);
   return options;
 }
 

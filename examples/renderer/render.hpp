@@ -52,7 +52,13 @@ struct render_options {
   std::uint32_t light_groups = 32;         ///< that guided paths learn to choose lights from, in [1, 255]
   std::uint32_t samples_per_leaf = 32000;  ///< after which Open PGL's field splits a leaf, 8 to 2^30
   checkpoint_times checkpoints = checkpoint_times::none;  ///< when to keep the picture so far
-  std::optional<wfpg::sample_combination> combine;  ///< unset: pt_linear, and all alike for path tracing
+  /// Unset: pt_linear, and all alike for path tracing and with a guide that was loaded.
+  std::optional<wfpg::sample_combination> combine;
+  std::string load_guide;            ///< guide file, of the same scene, to begin with; empty: none
+  std::string resume;                ///< state file of the rendering to go on with; empty: none
+  bool keep_guide = false;           ///< the result has the guide
+  bool keep_state = false;           ///< the result has what `resume` takes
+  std::function<bool()> is_stopped;  ///< asked after each sample: true ends the rendering; may be empty
 };
 
 /// Bins of one depth, means over the samples that were guided; of kept fields, those made or refreshed.
@@ -81,7 +87,7 @@ struct octree_report {
 
 struct render_report {
   std::string scene, method, device;
-  int spp = 0;                 ///< rendered
+  int spp = 0;                 ///< rendered, before a rendering went on too; times are since then
   std::uint64_t segments = 0;  ///< rays that paths were extended by
   double total_seconds = 0.0;  ///< from building to the last sample
   named_seconds seconds;       ///< by stage; "guide ..." are parts of "directions" and of "update"
@@ -98,8 +104,8 @@ struct render_report {
 /// How the samples of these options are combined.
 inline wfpg::sample_combination combination_of(const render_options& options) {
   using wfpg::sample_combination;
-  return options.combine.value_or(options.method == sampling_method::pt ? sample_combination::constant
-                                                                        : sample_combination::pt_linear);
+  const bool settled = options.method == sampling_method::pt || !options.load_guide.empty();
+  return options.combine.value_or(settled ? sample_combination::constant : sample_combination::pt_linear);
 }
 
 /// A picture on the way.
@@ -113,6 +119,9 @@ struct render_result {
   image picture;
   std::vector<checkpoint> checkpoints;  ///< where options ask for them
   render_report report;
+  bool is_stopped = false;  ///< before its budget was spent
+  std::string guide;        ///< a guide file's bytes, where options ask for them
+  std::string state;        ///< a state file's bytes, where options ask for them
 };
 
 /// Where a rendering is; given after every sample.
@@ -120,11 +129,13 @@ struct render_progress {
   int samples = 0;        ///< done
   double fraction = 0.0;  ///< of the budget, in [0, 1]
   double seconds = 0.0;   ///< since rendering began
+  double begun = 0.0;     ///< fraction that a rendering which goes on had before
 };
 using progress_callback = std::function<void(const render_progress&)>;
 
 /// Renders on options.where. Throws std::invalid_argument for options or scenes that cannot be right; the
-/// message names what; std::runtime_error where the device cannot be used. `progress` may be empty.
+/// message names what; std::runtime_error where the device cannot be used; wfpg::file_error where a file to
+/// begin with is not one, or not this rendering's. `progress` may be empty.
 render_result render(const scene& scene, const render_options& options, const progress_callback& progress);
 
 /// The same on a policy, whatever options.where says, with the ray caster of an Accelerated, which is made

@@ -3,6 +3,8 @@
 
 #include "guider_report.hpp"
 #include "render.hpp"
+#include "render_state.hpp"
+#include "saved_guider.hpp"
 #include "unguided.hpp"
 #include "wavefront.hpp"
 
@@ -28,17 +30,20 @@ class stopwatch {
 /// Samples taken, and the part of the budget that they used.
 class sample_budget {
  public:
-  explicit sample_budget(const render_options& options)
+  /// `samples`: taken already.
+  sample_budget(const render_options& options, int samples)
       : spp_(options.spp),
         seconds_(options.seconds),
-        least_(combination_of(options) == wfpg::sample_combination::discard_first ? 2 : 1) {}
+        least_(combination_of(options) == wfpg::sample_combination::discard_first ? 2 : 1),
+        samples_(samples),
+        begun_(options.seconds > 0.0 ? 0.0 : fraction()) {}
 
   int samples() const { return samples_; }
   double seconds() const { return clock_.seconds() - left_out_; }
   bool is_spent() const { return samples_ >= least_ && fraction() >= 1.0; }
   void count() { ++samples_; }
   void leave_out(double seconds) { left_out_ += seconds; }
-  render_progress progress() const { return {samples_, std::min(1.0, fraction()), seconds()}; }
+  render_progress progress() const { return {samples_, std::min(1.0, fraction()), seconds(), begun_}; }
 
  private:
   double fraction() const {
@@ -50,7 +55,8 @@ class sample_budget {
   double seconds_;
   double left_out_ = 0.0;
   int least_;  ///< the picture of fewer has no weight
-  int samples_ = 0;
+  int samples_;
+  double begun_;  ///< fraction
 };
 
 inline bool is_kept(checkpoint_times times, int samples, bool is_last) {
@@ -59,17 +65,18 @@ inline bool is_kept(checkpoint_times times, int samples, bool is_last) {
          (times == checkpoint_times::powers_of_two && (is_power_of_two || is_last));
 }
 
-/// The samples of one rendering, whatever their directions come from.
+/// The samples of one rendering, from those that the report has on, whatever their directions come from.
 template <class Exec, class Caster, class Guider>
 void take_samples(path_tracer<Exec, Caster>& tracer, Guider& guider, const pinhole& camera,
                   const render_options& options, const progress_callback& progress, render_result& result) {
-  sample_budget budget(options);
-  for (bool is_last = false; !is_last;) {
+  sample_budget budget(options, result.report.spp);
+  for (bool is_last = budget.is_spent(); !is_last;) {
     const auto sample = static_cast<std::uint32_t>(budget.samples());
     const float weight = wfpg::sample_weight(combination_of(options), sample + 1);
     tracer.render_sample(guider, camera, sample, weight);
     budget.count();
-    is_last = budget.is_spent();
+    result.is_stopped = !budget.is_spent() && options.is_stopped && options.is_stopped();
+    is_last = budget.is_spent() || result.is_stopped;
     if (is_kept(options.checkpoints, budget.samples(), is_last)) {
       const double seconds = budget.seconds();
       const stopwatch keeping;
@@ -106,6 +113,17 @@ inline wfpg::guider_options guider_options_of(const render_options& options) {
   return guided;
 }
 
+/// The state that a rendering goes on from; none where options name no file. Throws std::invalid_argument
+/// where it has more samples than it is to have.
+inline render_state begin_state(const scene& scene, const render_options& options) {
+  if (options.resume.empty()) return {};
+  render_state state = read_state(options.resume, scene, options);
+  if (options.seconds <= 0.0)
+    wfpg::detail::require(state.samples <= options.spp, "spp", options.spp,
+                          "no fewer than the rendering to go on with has");
+  return state;
+}
+
 /// Builds what a rendering needs, has its samples taken, and reports. `take` does so with directions from
 /// where it likes:
 ///   void operator()(path_tracer<Exec, Caster>&, const scene_view&, const light_distribution<Exec>&,
@@ -131,8 +149,14 @@ render_result render_by(const Exec& exec, const scene& scene, const render_optio
   path_tracer<Exec, decltype(accelerated->caster())> tracer(
       exec, settings, {geometry.view(), lights.view(), options.nee}, accelerated->caster());
   const pinhole camera(scene.view, options.width, options.height);
+  const render_state before = begin_state(scene, options);
+  if (before.samples > 0) tracer.restore(before.film);
+  report.spp = before.samples;
+  result.guide = before.guide;
   take(tracer, geometry.view(), lights, camera, building, result);
   report.segments = tracer.segments();
+  if (options.keep_state)
+    result.state = state_bytes(scene, options, {report.spp, tracer.film(), result.guide});
   result.picture = {options.width, options.height, tracer.picture()};
   report.seconds.insert(report.seconds.begin(), tracer.seconds().begin(), tracer.seconds().end());
   report.seconds.insert(report.seconds.begin(), building.seconds().begin(), building.seconds().end());
@@ -155,11 +179,12 @@ render_result render_on(const Exec& exec, const scene& scene, const render_optio
           const stopwatch build;
           wfpg::guider_options guided = guider_options_of(options);
           if (options.nee && lights.shares().size() > 1) guided.lights.weights = lights.shares();
-          wfpg::path_guider<Exec> guider(exec, mesh, guided);
+          wfpg::path_guider<Exec> guider = begin_guider(exec, mesh, guided, options, result.guide);
           building.add("octree", build.seconds());
           result.report.octree.build_seconds = build.seconds();
           take_samples(tracer, guider, camera, options, progress, result);
           report_guider(guider, tracer.segments(), result.report);
+          result.guide = kept_guide(guider, options);
         }
       });
 }

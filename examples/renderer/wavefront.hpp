@@ -2,6 +2,7 @@
 #pragma once
 
 #include "path_kernels.hpp"
+#include "render_state.hpp"
 #include "stage_clock.hpp"
 
 #include <wfpg/buffer.hpp>
@@ -96,7 +97,15 @@ class path_tracer {
   /// Rays traced to extend paths, shadow rays not among them.
   std::uint64_t segments() const {
     const std::vector<std::uint32_t> counts = segments_.to_host(exec_);
-    return std::accumulate(counts.begin(), counts.end(), std::uint64_t(0));
+    return std::accumulate(counts.begin(), counts.end(), segments_before_);
+  }
+
+  /// The samples so far, and to go on from them. Precondition: of a picture of this size.
+  film_state film() const { return {weight_, segments(), film_.to_host(exec_)}; }
+  void restore(const film_state& film) {
+    weight_ = film.weight;
+    segments_before_ = film.segments;
+    film_ = wfpg::buffer<glm::dvec3, Exec>(exec_, film.sums);
   }
 
   const named_seconds& seconds() const { return clock_.seconds(); }
@@ -193,6 +202,7 @@ class path_tracer {
   wfpg::buffer<triangle_hit, Exec> hits_;
   wfpg::buffer<std::uint32_t, Exec> hidden_;
   double weight_ = 0.0;
+  std::uint64_t segments_before_ = 0;  // of samples that were taken elsewhere
   policy_clock<Exec> clock_;
 };
 

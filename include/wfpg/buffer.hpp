@@ -13,6 +13,11 @@
 
 namespace wfpg {
 
+namespace detail {
+struct state_access;  // to what guide_file.hpp saves and restores
+struct store_state;
+}  // namespace detail
+
 /// `size` uninitialised elements in the memory of `Exec`. Movable, not copyable. The policy's memory resource
 /// must outlive it.
 template <class T, class Exec>

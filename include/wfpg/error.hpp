@@ -37,6 +37,14 @@ class device_error : public std::runtime_error {
   int code_;
 };
 
+/// A file of saved state cannot be read or written, or is not what it should be. The message names the file
+/// and says what is wrong with it, and where.
+class file_error : public std::runtime_error {
+ public:
+  file_error(const std::string& name, const std::string& reason)
+      : std::runtime_error("wfpg: " + name + " " + reason) {}
+};
+
 namespace detail {
 
 /// Throws std::invalid_argument "wfpg: NAME is VALUE, expected WHAT" unless `holds`.

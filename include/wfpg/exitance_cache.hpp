@@ -116,6 +116,7 @@ class exitance_cache_view {
  private:
   template <class Exec>
   friend class exitance_cache;
+  friend struct detail::state_access;
   enum : std::uint32_t { counter_invalid, counter_outside, counter_overflow, counters };
 
   sparse_voxel_octree_view tree_;
@@ -226,6 +227,8 @@ class exitance_cache {
   }
 
  private:
+  friend struct detail::state_access;
+
   // Before memory is asked for.
   static std::size_t checked(std::size_t queue_capacity) {
     detail::require(queue_capacity <= (1u << 31), "deposit queue capacity", queue_capacity, "at most 2^31");

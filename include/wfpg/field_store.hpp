@@ -149,6 +149,8 @@ class field_store {
   }
 
  private:
+  friend struct detail::store_state;
+
   // Through-counts (2), list of builds (2), free list, what is settled, and at most 4 entries each of the
   // table (2) and of wanted keys with their own through-counts.
   static constexpr std::size_t words_a_slot = 2 + 2 + 1 + 1 + 8 + 4 + 4;

@@ -18,6 +18,10 @@
 
 namespace wfpg {
 
+namespace detail {
+struct light_state;
+}
+
 /// How groups of lights are chosen. Ranges are checked when a guide is made.
 struct light_guide_options {
   /// What each group is worth before anything is known, such as its power: finite, at least 0, one of them
@@ -84,13 +88,16 @@ class light_guide_view {
     if (!queue_.fits(entry)) return;
     const float scattered = estimate * probability(first_row_ + key / rows_.groups, key % rows_.groups);
     if (!(scattered >= 0.0f) || !detail::is_finite(scattered)) return queue_.drop(entry);
-    queue_.write(entry, key, detail::min(scattered, 1.0e15f));
+    queue_.write(entry, key, detail::min(scattered, most));
     queue_.count(entry);
   }
 
  private:
   template <class Exec>
   friend class light_guide;
+  friend struct detail::light_state;
+
+  static constexpr float most = 1.0e15f;  // that is learnt of one choice
 
   sparse_voxel_octree_view tree_;
   detail::light_rows rows_;
@@ -126,9 +133,12 @@ class light_guide {
   std::size_t transient_bytes() const { return queue_.bytes(); }
 
  private:
+  friend struct detail::light_state;
+
   std::size_t first_row(std::uint32_t level) const { return view_.rows_.first(view_.tree_, level); }
   std::size_t rows_of(std::uint32_t level) const { return first_row(level + 1) - first_row(level); }
   void set_weights(const Exec& exec, const std::vector<float>& weights);
+  void follow_means(const Exec& exec);
   void choose(const Exec& exec);
 
   float floor_ = 0.0f;
@@ -206,10 +216,16 @@ void light_guide<Exec>::end_sample(const Exec& exec) {
   queue_.sum(exec);
   exec.for_each(rows_of(view_.level_) * groups,
                 detail::fold_light_values{queue_.view(), first_row(view_.level_) * groups, means_.data()});
+  follow_means(exec);
+}
+
+/// All that follows from the means of the deepest rows.
+template <class Exec>
+void light_guide<Exec>::follow_means(const Exec& exec) {
   for (std::uint32_t level = view_.level_; level-- > 0;)
-    exec.for_each(
-        rows_of(level) * groups,
-        detail::gather_light_means{view_.tree_, view_.rows_, first_row(level) * groups, means_.data()});
+    exec.for_each(rows_of(level) * view_.groups(),
+                  detail::gather_light_means{view_.tree_, view_.rows_, first_row(level) * view_.groups(),
+                                             means_.data()});
   choose(exec);
 }
 

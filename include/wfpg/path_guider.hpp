@@ -156,6 +156,8 @@ class path_guider {
   memory_report memory() const;
 
  private:
+  friend struct detail::state_access;
+
   static const guider_options& checked(const guider_options& options);
   static guider_options completed(guider_options options);
   std::uint32_t share_shift() const;

@@ -248,6 +248,8 @@ class path_recorder {
   std::uint32_t dropped(const Exec& exec) const { return read_element(exec, dropped_.data()); }
 
  private:
+  friend struct detail::state_access;
+
   void record(std::uint32_t shift) {
     view_.runs_.shift = shift;
     view_.recorded_ = view_.runs_.size(view_.paths_);

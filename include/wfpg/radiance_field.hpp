@@ -57,6 +57,10 @@ class cone_hit {
     const float value = word_ & escaped ? bits_float(word_ & ~escaped) : cache.read(word_ / 2, word_ % 2);
     return is_finite(value) ? min(value, 1.0e30f) : 0.0f;
   }
+  /// Whether this is what a cone finds where there are so many nodes.
+  bool is_sound(std::uint32_t nodes) const {
+    return word_ & escaped ? is_finite(bits_float(word_)) : word_ / 2 < nodes;
+  }
 
  private:
   static constexpr std::uint32_t escaped = 0x80000000u;  // the sign, which radiance does not need

@@ -10,6 +10,7 @@
 #include <wfpg/exitance_cache.hpp>
 #include <wfpg/field_sampler.hpp>
 #include <wfpg/field_store.hpp>
+#include <wfpg/guide_file.hpp>
 #include <wfpg/guide_view.hpp>
 #include <wfpg/mis.hpp>
 #include <wfpg/morton.hpp>

@@ -3,54 +3,20 @@
 
 #include "scene.hpp"
 #include "support/catch.hpp"
+#include "support/temporary_folder.hpp"
 
 #include <glm/geometric.hpp>
 
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
-#include <system_error>
 
 namespace render_test {
 
 using render::scene;
 using render::vec3;
-
-/// A folder that lives as long as the test.
-class temporary_folder {
- public:
-  temporary_folder() {
-    static int count = 0;
-    path_ = std::filesystem::temp_directory_path() /
-            ("wfpg_io_" + std::to_string(std::uintptr_t(this)) + "_" + std::to_string(count++));
-    std::filesystem::create_directories(path_);
-  }
-  ~temporary_folder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  temporary_folder(const temporary_folder&) = delete;
-  temporary_folder& operator=(const temporary_folder&) = delete;
-
-  std::string file(const std::string& name) const { return (path_ / name).string(); }
-
-  std::string write(const std::string& name, const std::string& content) const {
-    std::ofstream(file(name), std::ios::binary) << content;
-    return file(name);
-  }
-
- private:
-  std::filesystem::path path_;
-};
-
-/// The bytes of a file.
-inline std::string content_of(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return std::string(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
-}
+using wfpg_test::content_of;
+using wfpg_test::temporary_folder;
 
 inline bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;

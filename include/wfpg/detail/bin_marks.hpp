@@ -115,6 +115,8 @@ class bin_marks {
   }
 
  private:
+  friend struct store_state;
+
   void mark_bins(const Exec& exec, const mark_threshold& threshold) {
     exec.for_each(leaves_.size(), mark_leaves{tree_, view(), options_.min_level, threshold});
   }

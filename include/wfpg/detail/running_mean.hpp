@@ -23,6 +23,11 @@ class learnt_mean {
     word_ = (float_bits(rounded) + (1u << (dropped_bits - 1))) >> dropped_bits << count_bits | count_now;
   }
 
+  /// False also of what is not finite; by bits, since compilers may assume that numbers are.
+  WFPG_HD bool is_up_to(float most_mean) const {
+    return word_ >> count_bits << dropped_bits <= float_bits(most_mean) + (1u << dropped_bits);
+  }
+
   /// The mean of these values and of `weight` times `other`, which need not be a whole number.
   WFPG_HD float mixed_with(float other, float weight) const {
     const auto n = static_cast<float>(count());

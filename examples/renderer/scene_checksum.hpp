@@ -1,0 +1,13 @@
+// Tells scenes apart, for what was saved of one and must not be used with another.
+#pragma once
+
+#include "scene.hpp"
+
+#include <cstdint>
+
+namespace render {
+
+/// Of all that decides what a scene looks like; its name and intended picture do not. O(bytes of the scene).
+std::uint64_t checksum_of(const scene& scene);
+
+}  // namespace render

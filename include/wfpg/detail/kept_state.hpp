@@ -1,0 +1,226 @@
+// Kept fields to and from bytes: which node each leaf's rays belong to, and the slots in use with what their
+// cells hold. All that finds slots is made anew when the next sample begins.
+// Memory: the bytes of the fields in use.
+#pragma once
+
+#include <wfpg/detail/section_file.hpp>
+#include <wfpg/field_store.hpp>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+namespace wfpg::detail {
+
+/// Sets each leaf's rays and the level of the node that they belong to.
+struct place_marks {
+  sparse_voxel_octree_view tree;
+  const std::uint32_t* rays;
+  const std::uint8_t* levels;
+  leaf_mark* leaves;
+  WFPG_HD void operator()(std::size_t i) const {
+    leaves[i] = {rays[i], tree.ancestor(tree.first_leaf() + static_cast<node_id>(i), levels[i])};
+  }
+};
+
+/// A slot in use, as a file has it. Cells are there once it has been built: its fraction is positive then.
+struct saved_slot {
+  std::uint32_t index = 0;
+  field_slot slot;
+  resident_field field;
+  std::vector<std::uint32_t> words, hits, learnt;  // learnt: empty where fields do not learn
+};
+
+/// Whether words are a summed-area table with weight.
+inline bool is_distribution(const std::vector<std::uint32_t>& words, std::size_t resolution) {
+  for (std::size_t y = 0; y < resolution; ++y) {
+    std::uint32_t row = 0;  // of the cells so far
+    for (std::size_t x = 0; x < resolution; ++x) {
+      const std::uint32_t here = words[y * resolution + x],
+                          above = y > 0 ? words[(y - 1) * resolution + x] : 0;
+      if (here < above || here - above < row) return false;
+      row = here - above;
+    }
+  }
+  return words.back() > 0;
+}
+
+/// In [0, most]; by bits, since compilers may assume that numbers are finite.
+inline bool is_up_to(float value, float most) {
+  return float_bits(value) <= float_bits(most);
+}
+
+/// To and from the members of a field_store that a guide file holds.
+struct store_state {
+  template <class Exec>
+  static section_writer levels_to_bytes(const Exec& exec, const field_store<Exec>& store) {
+    section_writer bytes;
+    bytes.put(store.counted_samples_);
+    bytes.put(store.busy_until_);
+    const std::vector<leaf_mark> leaves = store.marks_.leaves_.to_host(exec);
+    for (const leaf_mark& leaf : leaves) bytes.put(leaf.rays);
+    for (const leaf_mark& leaf : leaves) bytes.put(static_cast<std::uint8_t>(store.tree_.level_of(leaf.bin)));
+    return bytes;
+  }
+
+  template <class Exec>
+  static void restore_levels(const Exec& exec, section_reader bytes, std::uint32_t samples,
+                             field_store<Exec>& store) {
+    const std::size_t leaf_count = store.tree_.leaf_count();
+    store.sample_ = samples;
+    store.counted_samples_ = bytes.get<std::uint32_t>();
+    store.busy_until_ = bytes.get<std::uint32_t>();
+    bytes.require(store.counted_samples_ <= samples && store.busy_until_ <= samples + 32,
+                  "has more samples than there were");
+    const buffer<std::uint32_t, Exec> rays(exec, bytes.get_all<std::uint32_t>(leaf_count));
+    const auto levels = bytes.get_all<std::uint8_t>(leaf_count);
+    bytes.end();
+    for (const std::uint8_t level : levels)
+      bytes.require(level <= store.tree_.depth(), "has a level below the leaves");
+    const buffer<std::uint8_t, Exec> levels_there(exec, levels);
+    exec.for_each(leaf_count,
+                  place_marks{store.tree_, rays.data(), levels_there.data(), store.marks_.leaves_.data()});
+  }
+
+  template <class Exec>
+  static section_writer fields_to_bytes(const Exec& exec, const field_store<Exec>& store) {
+    const auto state = read_element(exec, store.state_.data());
+    section_writer bytes;
+    bytes.put(state.pressure);
+    bytes.put(state.refused_births);
+    bytes.put(state.delayed_births);
+    bytes.put(state.refused_since_mark);
+    bytes.put(state.born);
+    bytes.put(state.refreshed);
+    bytes.put(std::uint32_t(store.learns()));
+    const std::vector<field_slot> slots = store.slots_.to_host(exec);
+    const std::vector<resident_field> fields = store.fields_.to_host(exec);
+    for (std::size_t i = 0; i < slots.size(); ++i)
+      if (slots[i].key != no_key) put(exec, store, i, slots[i], fields[i], bytes);
+    return bytes;
+  }
+
+  template <class Exec>
+  static void restore_fields(const Exec& exec, section_reader bytes, field_store<Exec>& store) {
+    field_store_state state;
+    state.pressure = bytes.get<std::uint32_t>();
+    state.refused_births = bytes.get<std::uint32_t>();
+    state.delayed_births = bytes.get<std::uint32_t>();
+    state.refused_since_mark = bytes.get<std::uint32_t>();
+    bytes.require(state.pressure >= 2 && state.pressure <= 1u << 16, "has a pressure out of range");
+    state.born = bytes.get<std::uint64_t>();
+    state.refreshed = bytes.get<std::uint64_t>();
+    const bool learnt = bytes.get<std::uint32_t>() != 0;
+    std::vector<field_slot> slots(store.capacity_);
+    std::vector<resident_field> fields(store.capacity_);
+    std::vector<std::uint32_t> keys;
+    for (std::size_t first = 0; bytes.left() > 0;) {
+      const saved_slot saved = take(bytes, store, first, learnt);
+      first = std::size_t(saved.index) + 1;
+      slots[saved.index] = saved.slot;
+      fields[saved.index] = saved.field;
+      keys.push_back(saved.slot.key);
+      upload(exec, saved, store);
+    }
+    std::sort(keys.begin(), keys.end());
+    bytes.require(std::adjacent_find(keys.begin(), keys.end()) == keys.end(), "has a field twice");
+    state.free = static_cast<std::uint32_t>(store.capacity_ - keys.size());
+    exec.copy_from_host(store.slots_.data(), slots.data(), store.slots_.bytes());
+    exec.copy_from_host(store.fields_.data(), fields.data(), store.fields_.bytes());
+    exec.copy_from_host(store.state_.data(), &state, sizeof state);
+  }
+
+ private:
+  static_assert(sizeof(cone_hit) == 4 && sizeof(learnt_mean) == 4, "files hold them as words");
+
+  template <class Exec, class T>
+  static void put_cells(const Exec& exec, const buffer<T, Exec>& of_all, std::size_t cells, std::size_t slot,
+                        section_writer& bytes) {
+    std::vector<std::uint32_t> words(cells);
+    exec.copy_to_host(words.data(), of_all.data() + slot * cells, cells * sizeof(T));
+    bytes.put_all(words);
+  }
+
+  /// The ray that a build was to start from is not there: the wave that it was of has ended.
+  template <class Exec>
+  static void put(const Exec& exec, const field_store<Exec>& store, std::size_t i, const field_slot& slot,
+                  const resident_field& field, section_writer& bytes) {
+    bytes.put(static_cast<std::uint32_t>(i));
+    bytes.put(slot.key);
+    bytes.put(slot.last_used);
+    bytes.put(slot.last_built);
+    bytes.put(slot.builds);
+    bytes.put(field.normal);
+    bytes.put(field.fraction);
+    if (!(field.fraction > 0.0f)) return;
+    put_cells(exec, store.words_, store.cells_a_field(), i, bytes);
+    put_cells(exec, store.hits_, store.cells_a_field(), i, bytes);
+    if (store.learns()) put_cells(exec, store.learnt_, store.cells_a_field(), i, bytes);
+  }
+
+  /// The next slot in use, `first` or one after it.
+  template <class Exec>
+  static saved_slot take(section_reader& bytes, const field_store<Exec>& store, std::size_t first,
+                         bool learnt) {
+    saved_slot s;
+    s.index = bytes.get<std::uint32_t>();
+    bytes.require(s.index >= first, "has slots out of order");
+    bytes.require(s.index < store.capacity_, "has more fields than option kept.budget_bytes has room for");
+    s.slot.key = bytes.get<std::uint32_t>();
+    s.slot.last_used = bytes.get<std::uint32_t>();
+    s.slot.last_built = bytes.get<std::uint32_t>();
+    s.slot.builds = bytes.get<std::uint32_t>();
+    s.field.normal = bytes.get_vec3();
+    s.field.fraction = bytes.get<float>();
+    check(bytes, s, store.tree_.node_count(), store.sample_);
+    if (!(s.field.fraction > 0.0f)) return s;
+    const std::size_t cells = store.cells_a_field();
+    s.words = bytes.get_all<std::uint32_t>(cells);
+    s.hits = bytes.get_all<std::uint32_t>(cells);
+    if (learnt) s.learnt = bytes.get_all<std::uint32_t>(cells);
+    check_cells(bytes, s, store.options_.resolution, store.tree_.node_count());
+    return s;
+  }
+
+  static void check(const section_reader& bytes, const saved_slot& s, std::uint32_t nodes,
+                    std::uint32_t sample) {
+    const float square = glm::dot(s.field.normal, s.field.normal);
+    bytes.require(s.slot.key / orientations < nodes, "has a field of no node");
+    bytes.require(s.slot.last_used <= sample && s.slot.last_built <= sample,
+                  "has a field of a sample to come");
+    bytes.require(is_finite(square) && (!s.field.hemisphere() || (square > 0.5f && square < 2.0f)),
+                  "has a normal without unit length");
+    bytes.require(is_up_to(s.field.fraction, 1.0f), "has a fraction out of range");
+    bytes.require(s.field.fraction > 0.0f || s.slot.builds == 0, "has a field without cells");
+  }
+
+  static void check_cells(const section_reader& bytes, const saved_slot& s, std::uint32_t resolution,
+                          std::uint32_t nodes) {
+    bytes.require(is_distribution(s.words, resolution), "has a field that is no distribution");
+    for (const std::uint32_t word : s.hits) {
+      cone_hit hit;
+      std::memcpy(static_cast<void*>(&hit), &word, sizeof word);
+      bytes.require(hit.is_sound(nodes), "has a cone that hit no node");
+    }
+    for (const std::uint32_t word : s.learnt) {
+      learnt_mean mean;
+      std::memcpy(static_cast<void*>(&mean), &word, sizeof word);
+      bytes.require(mean.is_up_to(1.0e30f), "has learnt radiance out of range");  // values are no more
+    }
+  }
+
+  template <class Exec>
+  static void upload(const Exec& exec, const saved_slot& s, field_store<Exec>& store) {
+    if (s.words.empty()) return;
+    const std::size_t first = s.index * s.words.size(), bytes = s.words.size() * sizeof(std::uint32_t);
+    exec.copy_from_host(store.words_.data() + first, s.words.data(), bytes);
+    exec.copy_from_host(store.hits_.data() + first, s.hits.data(), bytes);
+    if (!store.learns()) return;
+    const std::vector<std::uint32_t> nothing(s.words.size(), 0);
+    exec.copy_from_host(store.learnt_.data() + first, s.learnt.empty() ? nothing.data() : s.learnt.data(),
+                        bytes);
+  }
+};
+
+}  // namespace wfpg::detail
