@@ -41,6 +41,7 @@ class device_error : public std::runtime_error {
 /// and says what is wrong with it, and where.
 class file_error : public std::runtime_error {
  public:
+  /// "wfpg: NAME REASON".
   file_error(const std::string& name, const std::string& reason)
       : std::runtime_error("wfpg: " + name + " " + reason) {}
 };

@@ -36,7 +36,7 @@ inline constexpr std::uint32_t no_light_choice = 0xffffffffu;
 
 /// A group of lights.
 struct light_choice {
-  std::uint32_t group = 0;
+  std::uint32_t group = 0;              ///< its index among the weights
   float probability = 1.0f;             ///< that it was chosen with
   std::uint32_t key = no_light_choice;  ///< by which light_guide_view::deposit knows it
 };
@@ -46,6 +46,7 @@ class light_guide_view {
  public:
   /// Whether there are no groups to choose from: the host draws its lights as it would without.
   WFPG_HD bool empty() const { return rows_.groups == 0; }
+  /// How many there are.
   WFPG_HD std::uint32_t groups() const { return rows_.groups; }
 
   /// The row of a surface's point with a unit normal, on the side that is lit; of the root where the octree
@@ -118,6 +119,7 @@ class light_guide {
   light_guide(const Exec& exec, const sparse_voxel_octree_view& tree, const light_guide_options& options,
               std::size_t values);
 
+  /// What kernels of the sample that has begun see.
   light_guide_view view() const { return view_; }
 
   /// Begins a sample, whose seed decides which paths are listened to.
@@ -127,9 +129,11 @@ class light_guide {
   /// Forgets what was learnt.
   void forget(const Exec& exec);
 
+  /// Bytes that are kept across samples.
   std::size_t persistent_bytes() const {
     return sums_.bytes() + means_.bytes() + weights_.bytes() + defensive_.bytes();
   }
+  /// Bytes of what a sample deposits.
   std::size_t transient_bytes() const { return queue_.bytes(); }
 
  private:
