@@ -38,6 +38,10 @@ def ratio(value):
     return "" if value is None else f"{value:.2f}"
 
 
+def error(value):
+    return f"{value:.2e}" if value > 0.0 else "below the references' noise"
+
+
 def print_equal_time(scenes):
     print("| scene | method | samples | MSE after c / (1 + c) | pt's over it | relative MSE, trimmed | pt's over it |", end="")
     print(" million segments | ms a sample |", " | ".join(STAGES), "| MiB kept | MiB in flight |")
@@ -48,7 +52,7 @@ def print_equal_time(scenes):
             stages = " | ".join(f"{ms.get(stage, 0.0):.2f}" for stage in STAGES)
             print(
                 f"| {scene['scene']} | {name} | {m['spp']} | {m['mse_reinhard']:.2e} | {ratio(m['ratios']['mse_reinhard'])} "
-                f"| {m['relmse_trimmed']:.2e} | {ratio(m['ratios']['relmse_trimmed'])} | {m['segments_a_sample'] * 1e-6:.2f} "
+                f"| {error(m['relmse_trimmed'])} | {ratio(m['ratios']['relmse_trimmed'])} | {m['segments_a_sample'] * 1e-6:.2f} "
                 f"| {ms['total']:.2f} | {stages} | {m['persistent_bytes'] / 2**20:.1f} | {m['transient_bytes'] / 2**20:.0f} |"
             )
 
