@@ -27,7 +27,7 @@ struct guided_box {
   wfpg::light_guide<Exec> lights;
 
   explicit guided_box(const wfpg::light_guide_options& options, std::size_t values = 3000)
-      : octree(octree_of(exec)), lights(exec, octree.view(), options, values) {}
+      : octree(octree_of(exec)), lights(exec, octree.view(), options, values, 1) {}
 
   static wfpg::sparse_voxel_octree<Exec> octree_of(const Exec& exec) {
     const box_mesh<Exec> box(exec);

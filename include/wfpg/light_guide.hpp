@@ -80,8 +80,8 @@ class light_guide_view {
 
   /// What came of a choice: the estimate of the luminance that the point scatters toward the viewer, BSDF,
   /// MIS weight and all of the light sample's density included; 0 where the light is hidden or faces away. Of
-  /// many paths a part is listened to. What is negative or not finite, or does not fit the queue, is dropped.
-  /// Seen after the sample.
+  /// many paths, numbered from 0, a part is listened to. What is negative or not finite, or does not fit the
+  /// queue, is dropped. Seen after the sample.
   WFPG_HD void deposit(std::size_t path, std::uint32_t key, float estimate) const {
     std::uint32_t place;
     if (key == no_light_choice || !runs_.find(path, place)) return;
@@ -114,17 +114,18 @@ template <class Exec>
 class light_guide {
  public:
   light_guide() = default;
-  /// Over an octree that outlives it; for samples of up to `values` choices, of which it listens to about 64
-  /// a row. Without weights or octree it is empty. Throws std::invalid_argument, out_of_memory.
+  /// Over an octree that outlives it; for samples of `paths` paths with up to `depth` choices each, of which
+  /// it listens to about 64 a row. Without weights or octree it is empty. Throws std::invalid_argument,
+  /// out_of_memory.
   light_guide(const Exec& exec, const sparse_voxel_octree_view& tree, const light_guide_options& options,
-              std::size_t values);
+              std::size_t paths, std::uint32_t depth);
 
   /// What kernels of the sample that has begun see.
   light_guide_view view() const { return view_; }
 
   /// Begins a sample, whose seed decides which paths are listened to.
   void begin_sample(std::uint32_t seed) { view_.runs_.seed = seed; }
-  /// Learns what was deposited. O(values + nodes · groups).
+  /// Learns what was deposited. O(choices + nodes · groups).
   void end_sample(const Exec& exec);
   /// Forgets what was learnt.
   void forget(const Exec& exec);
@@ -173,7 +174,7 @@ inline void require_valid(const light_guide_options& options) {
 
 template <class Exec>
 light_guide<Exec>::light_guide(const Exec& exec, const sparse_voxel_octree_view& tree,
-                               const light_guide_options& options, std::size_t values)
+                               const light_guide_options& options, std::size_t paths, std::uint32_t depth)
     : floor_(options.floor) {
   detail::require_valid(options);
   if (options.weights.empty() || tree.empty()) return;
@@ -186,10 +187,10 @@ light_guide<Exec>::light_guide(const Exec& exec, const sparse_voxel_octree_view&
                   "less than 2^32 - 1");
   view_.first_row_ = static_cast<std::uint32_t>(first_row(view_.level_));
   const std::size_t wanted = 64 * (rows - view_.first_row_);
-  while (values >> view_.runs_.shift > wanted) ++view_.runs_.shift;
+  while (paths * depth >> view_.runs_.shift > wanted) ++view_.runs_.shift;
   sums_ = buffer<float, Exec>(exec, rows * groups);
   means_ = buffer<detail::learnt_mean, Exec>(exec, rows * groups);
-  queue_ = detail::value_queue<Exec>(exec, detail::min(values, 2 * wanted), rows_of(view_.level_) * groups);
+  queue_ = detail::value_queue<Exec>(exec, view_.runs_.size(paths) * depth, rows_of(view_.level_) * groups);
   view_.sums_ = sums_.data();
   view_.queue_ = queue_.view();
   forget(exec);

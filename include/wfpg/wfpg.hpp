@@ -12,6 +12,7 @@
 #include <wfpg/field_store.hpp>
 #include <wfpg/guide_file.hpp>
 #include <wfpg/guide_view.hpp>
+#include <wfpg/light_guide.hpp>
 #include <wfpg/mis.hpp>
 #include <wfpg/morton.hpp>
 #include <wfpg/octahedral_map.hpp>

@@ -131,6 +131,11 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(d::fill_steps{});
   launch(d::adapt_pressure{state});
 
+  // Choices of lights.
+  launch(d::fold_light_values{});
+  launch(d::gather_light_means{tree, {}, 0, nullptr});
+  launch(d::choose_light_groups{tree, {}, 0, nullptr, nullptr, nullptr, 0.5f, nullptr});
+
   // Checks for hosts.
   launch(d::probe_bsdf<cuda_compile::grey>{});
   launch(d::draw_bsdf<cuda_compile::grey>{});

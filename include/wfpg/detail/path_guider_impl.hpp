@@ -98,7 +98,8 @@ path_guider<Exec>::path_guider(const Exec& exec, voxel_fragments<Exec> fragments
                                deposits_of_sample());
   else
     binner_ = spatial_binner<Exec>(exec_, octree_.view(), binning, options_.max_rays);
-  lights_ = light_guide<Exec>(exec_, octree_.view(), options_.lights, options_.max_rays * options_.max_depth);
+  lights_ = light_guide<Exec>(exec_, octree_.view(), options_.lights,
+                              detail::max(options_.max_paths, options_.max_rays), options_.max_depth);
   octree_.release_build_data();
   ::thrust::fill_n(exec_.thrust(), counts_.data(), counts_.size(), depth_statistics{});
   const std::uint32_t p = options_.product_resolution;
