@@ -45,10 +45,11 @@ struct render_options {
   std::uint32_t recast = 8;                          ///< a refresh casts one cone in so many again
   bool learn = true;                                 ///< kept fields learn from paths
   std::size_t field_budget = std::size_t(32) << 20;  ///< bytes of kept fields
-  std::uint32_t product_resolution = 8;              ///< blocks a side of products, 4, 8 or 16
-  std::uint32_t rays_per_bin = 64;                   ///< c_ray
-  std::uint32_t min_bin_level = 3;                   ///< l_min, from the root
-  float guide_fraction = 0.0f;                       ///< in [0, 1]; 0: the mode's own, 0.5 of Open PGL's
+  std::size_t caster_buffer = std::size_t(16) << 20;  ///< bytes of cones in flight to OptiX
+  std::uint32_t product_resolution = 8;               ///< blocks a side of products, 4, 8 or 16
+  std::uint32_t rays_per_bin = 64;                    ///< c_ray
+  std::uint32_t min_bin_level = 3;                    ///< l_min, from the root
+  float guide_fraction = 0.0f;                        ///< in [0, 1]; 0: the mode's own, 0.5 of Open PGL's
   std::uint32_t light_groups = 32;         ///< that guided paths learn to choose lights from, in [1, 255]
   std::uint32_t samples_per_leaf = 32000;  ///< after which Open PGL's field splits a leaf, 8 to 2^30
   checkpoint_times checkpoints = checkpoint_times::none;  ///< when to keep the picture so far

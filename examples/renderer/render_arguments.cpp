@@ -92,6 +92,9 @@ void add_guider_options(CLI::App& app, render_options& options) {
       ->check(CLI::Range(1u, 255u));
   app.add_option("--field-budget", options.field_budget, "memory of kept fields, such as 32MiB (the default)")
       ->transform(CLI::AsSizeValue(false));
+  app.add_option("--caster-buffer", options.caster_buffer,
+                 "memory of cones in flight to OptiX (default: 16MiB)")
+      ->transform(CLI::AsSizeValue(false));
   app.add_option("--product-resolution", options.product_resolution,
                  "blocks a side of wfpg-product's products: 4, 8 or 16 (default: 8)")
       ->check(CLI::IsMember({4, 8, 16}));
@@ -110,6 +113,8 @@ void check_render_options(const CLI::App& app, const render_options& options) {
     throw CLI::RequiresError("--product-resolution", "--method wfpg-product");
   if (app.count("--samples-per-leaf") > 0 && !is_openpgl(options.method))
     throw CLI::RequiresError("--samples-per-leaf", "--method openpgl-vmm or openpgl-dqt");
+  if (app.count("--caster-buffer") > 0 && options.where != device::optix)
+    throw CLI::RequiresError("--caster-buffer", "--device optix");
 }
 
 std::string listed_builtin_scenes() {

@@ -98,6 +98,7 @@ inline wfpg::guider_options guider_options_of(const render_options& options) {
   guided.kept.resolution = options.slot_resolution;
   guided.kept.recast = options.recast;
   guided.kept.budget_bytes = options.field_budget;
+  guided.caster_buffer_bytes = options.caster_buffer;
   if (options.method == sampling_method::wfpg_product) guided.product_resolution = options.product_resolution;
   guided.rays_per_bin = options.rays_per_bin;
   guided.min_bin_level = options.min_bin_level;
