@@ -24,6 +24,8 @@
 #include <thrust/functional.h>
 #include <thrust/transform_scan.h>
 
+#include <vector>
+
 namespace wfpg {
 
 /// How fields are kept.

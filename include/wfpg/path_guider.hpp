@@ -27,6 +27,7 @@
 #include <wfpg/wave.hpp>
 
 #include <memory>
+#include <vector>
 
 namespace wfpg {
 
