@@ -223,3 +223,19 @@ TEST_CASE("inspect: what cannot be is named before anything is rendered", "[insp
   const std::string file = folder.write("file", "x");
   CHECK(run({"cornell-box", "--pixel", "0,0", "--size", "8x8", "--spp", "1", "-o", file}).code == 2);
 }
+
+TEST_CASE("inspect: the octree is an OpenVDB file, or what is missing is said", "[inspect]") {
+  temporary_folder folder;
+  const std::string vdb = folder.file("octree.vdb"), output = folder.file("page");
+  const outcome done = run({"cornell-box", "--pixel", "0,0", "--size", "8x8", "--spp", "1", "--reference-spp",
+                            "2", "--histogram", "10", "-o", output, "--vdb", vdb});
+  if (done.code == 0) {
+    const std::string bytes = content_of(vdb);
+    CHECK(bytes.substr(0, 4) == std::string(" BDV"));
+    for (const char* const grid : {"exitance_front", "exitance_back", "normal", "level"})
+      CHECK(contains(bytes, grid));
+    return;
+  }
+  CHECK(contains(done.log, "built without OpenVDB"));
+  CHECK_FALSE(std::filesystem::exists(output));
+}

@@ -3,6 +3,7 @@
 
 #include "numbers.hpp"
 #include "octree_pictures.hpp"
+#include "octree_vdb.hpp"
 #include "option_names.hpp"
 #include "page.hpp"
 #include "progress_bar.hpp"
@@ -27,6 +28,7 @@ void check(const inspection& asked) {
   require(asked.y >= 0 && asked.y < options.height, "pixel's y", asked.y, range(options.height).c_str());
   require(asked.reference_spp >= 2, "reference_spp", asked.reference_spp, "at least 2");
   require(asked.histogram >= 1, "histogram", asked.histogram, "at least 1");
+  if (!asked.vdb.empty()) require_vdb();
 }
 
 /// A bar for one stage.
@@ -213,6 +215,7 @@ void run(const render::scene& scene, const inspection& asked_of, std::ostream& l
     log << "wfpg-inspect: tracing the reference\n";
     show_directions(learnt, asked, pixel, shown, numbers);
   }
+  if (!asked.vdb.empty()) write_vdb(learnt, asked.vdb);
   shown.numbers = rows_of(numbers);
   write_numbers(folder, numbers);
   write_page(folder, shown);

@@ -16,6 +16,7 @@ struct inspection {
   int reference_spp = 256;          ///< paths for each of the reference's cells, 2 or more
   int histogram = 1 << 20;          ///< samples in the histogram, positive
   std::filesystem::path output = "inspection";
+  std::string vdb;  ///< OpenVDB file of the octree; empty: none
 };
 
 /// Writes pictures, numbers.json and index.html into the output folder, which is made. Stages and warnings go

@@ -4,6 +4,7 @@
 #include <wfpg/spatial_binner.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 namespace inspect {

@@ -1,6 +1,7 @@
 // HTML by hand; pictures are in it as base64 (RFC 4648).
 #include "page.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <fstream>

@@ -34,6 +34,7 @@ void add_options(CLI::App& app, arguments& given) {
          "X,Y from the upper left: what its middle hits is looked at")
       ->required();
   app.add_option("-o,--output", given.output, "folder of the page and its pictures (default: inspection)");
+  app.add_option("--vdb", given.asked.vdb, "the octree's voxels, OpenVDB");
   app.add_option("--environment", given.environment,
                  "light from all directions, OpenEXR or .hdr, equirectangular (default: the scene's)");
   app.add_option("--load-guide", given.asked.learning.load_guide,
