@@ -1,4 +1,5 @@
-// An inspection from a scene to a folder of pictures, numbers and a page.
+// An inspection from a scene to a folder of pictures, numbers and a page, after the thesis's tool
+// (section 5.3).
 #pragma once
 
 #include "findings.hpp"

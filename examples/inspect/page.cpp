@@ -72,7 +72,7 @@ figure picture_folder::write(const std::string& name, const std::string& caption
                              const render::image& picture, float exposure) const {
   const int times = std::max(1, (least_side - 1) / std::max(picture.width, picture.height) + 1);
   render::write_png(file(name + ".png"), times > 1 ? render::enlarged(picture, times) : picture, exposure);
-  return {name + ".png", caption};
+  return {name + ".png", caption, false};
 }
 
 std::vector<figure> picture_folder::write_cells(const std::string& name, const std::string& caption,
@@ -81,9 +81,10 @@ std::vector<figure> picture_folder::write_cells(const std::string& name, const s
   render::write_exr(file(name + "-octahedral.exr"), cells);
   render::write_exr(file(name + "-latlong.exr"), latitude_longitude(grid, cells, map_height, vec3(0.0f)));
   const render::image coloured = scale.colours(cells);
-  return {write(name + "-octahedral", caption, coloured),
-          write(name + "-latlong", "the same, latitude and longitude",
-                latitude_longitude(grid, coloured, map_height, no_cell))};
+  figure square = write(name + "-octahedral", caption, coloured);
+  square.starts_row = true;
+  return {square, write(name + "-latlong", "the same, latitude and longitude",
+                        latitude_longitude(grid, coloured, map_height, no_cell))};
 }
 
 render::image grey_cells(const std::vector<double>& values) {
@@ -102,8 +103,8 @@ void write_page(const picture_folder& folder, const page& shown) {
     body += "<h2>" + escaped(s.title) + "</h2>\n<p>" + escaped(s.text) + "</p>\n";
     if (s.scale) body += bar(folder, *s.scale, i);
     for (const figure& f : s.figures)
-      body += "<figure>" + embedded(folder, f.file, f.caption) + "<figcaption>" + escaped(f.caption) +
-              "</figcaption></figure>\n";
+      body += std::string(f.starts_row ? "<br>" : "") + "<figure>" + embedded(folder, f.file, f.caption) +
+              "<figcaption>" + escaped(f.caption) + "</figcaption></figure>\n";
   }
   const std::string path = (folder.path() / "index.html").string();
   std::ofstream file(path, std::ios::binary);

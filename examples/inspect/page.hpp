@@ -15,6 +15,7 @@ namespace inspect {
 /// A picture's PNG in the page's folder, and what is below it.
 struct figure {
   std::string file, caption;
+  bool starts_row = false;
 };
 
 /// Figures that share a scale.
