@@ -12,6 +12,7 @@
 
 #include <glm/vector_relational.hpp>
 
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -24,6 +25,22 @@ using inspect::learnt_scene;
 using render::image;
 using render::vec2;
 using render_test::check_close;
+
+/// Relative standard deviation of samples under light that is 1 from everywhere, drawn.
+double deviation_of(const inspect::pixel_sampler& sampler) {
+  const int n = 50000;
+  double sum = 0.0, squares = 0.0;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const render::random_stream uniform{11, 0};
+    const auto next = sampler.sample(uniform(i, 0).x, uniform(i, 1));
+    if (!(next.pdf > 0.0f)) continue;
+    const auto& at = sampler.surface();
+    const double value = double(at.bsdf.eval(at.outgoing, next.direction)) / double(next.pdf);
+    sum += value;
+    squares += value * value;
+  }
+  return std::sqrt(squares * n / (sum * sum) - 1.0);
+}
 
 }  // namespace
 
@@ -66,6 +83,8 @@ TEST_CASE("inspect: a floor under the sky is sampled as its BSDF does", "[inspec
   CHECK(found.correlation > 0.95);
   CHECK(found.divergence < 0.05);
   CHECK(found.divergence_noise < 1e-6);
+  const inspect::pixel_sampler sampler(learnt.fields(), pixel, learnt.hits()[pixel].surface);
+  CHECK(found.noise.sampler == Approx(deviation_of(sampler)).epsilon(0.05));
   double mean = 0.0;  // of the contributions, by their density
   for (std::size_t cell = 0; cell < found.fine_cells.size(); ++cell)
     mean += found.contributions[cell] *
