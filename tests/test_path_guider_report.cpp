@@ -225,6 +225,24 @@ WFPG_TEST_CASE("path guider: statistics count fields that are made or refreshed,
   CHECK(transient.guider.statistics().kept.born == 0);
 }
 
+WFPG_TEST_CASE("path guider: kept fields tell of which node and orientation they are", "[path_guider]") {
+  guided_box<Exec> box;
+  box.learn();
+  box.sample_again(wall_surfaces(600, 7));
+  const std::vector<std::uint32_t> keys = box.guider.field_keys();
+  const auto kept = box.guider.statistics().kept;
+  CHECK(keys.size() == kept.capacity);
+  std::uint32_t live = 0;
+  for (const std::uint32_t key : keys) {
+    if (key == 0xffffffffu) continue;
+    ++live;
+    CHECK(key / wfpg::orientations < box.guider.octree().node_count());
+    CHECK(std::count(keys.begin(), keys.end(), key) == 1);
+  }
+  CHECK(live == kept.live);
+  CHECK(guided_box<Exec>(field_lifetime::transient).guider.field_keys().empty());
+}
+
 WFPG_TEST_CASE("path guider: a build report tells what of the mesh was left out", "[path_guider]") {
   const Exec exec;
   auto positions = box_positions();

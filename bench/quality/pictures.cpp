@@ -1,9 +1,9 @@
 // Crops and colours.
 #include "pictures.hpp"
 
-#include <wfpg/types.hpp>
+#include "colour_map.hpp"
 
-#include <glm/common.hpp>
+#include <wfpg/types.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -16,19 +16,6 @@ using render::vec3;
 constexpr float middle = 0.25f;  // about half of sRGB's range
 constexpr double shown_share = 0.99;
 constexpr int least_crop = 24;
-
-/// A value of 0 to 1, linear RGB.
-vec3 ramp(float value) {
-  constexpr int last = 4;
-  static const vec3 colours[] = {{0.0f, 0.0f, 0.0f},
-                                 {0.12f, 0.01f, 0.25f},
-                                 {0.75f, 0.08f, 0.04f},
-                                 {0.95f, 0.60f, 0.05f},
-                                 {1.0f, 1.0f, 1.0f}};
-  const float at = std::clamp(value, 0.0f, 1.0f) * float(last);
-  const int below = std::min(int(at), last - 1);
-  return glm::mix(colours[below], colours[below + 1], at - float(below));
-}
 
 double percentile(std::vector<double> values, double share) {
   const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
@@ -86,7 +73,8 @@ window worst_window(const std::vector<double>& errors, int width, int height) {
 render::image error_map(const std::vector<double>& errors, int width, int height, double greatest) {
   render::image map = render::make_image(width, height);
   for (std::size_t i = 0; i < map.pixels.size(); ++i)
-    map.pixels[i] = ramp(std::isfinite(errors[i]) ? std::sqrt(float(errors[i] / greatest)) : 1.0f);
+    map.pixels[i] =
+        render::heat_colour(std::isfinite(errors[i]) ? std::sqrt(float(errors[i] / greatest)) : 1.0f);
   return map;
 }
 

@@ -44,9 +44,10 @@ struct path_lights {
   }
 };
 
-/// Starts a path through each pixel.
+/// Starts a path through each pixel. A Camera is a pinhole, or what has its through().
+template <class Camera>
 struct start_paths {
-  pinhole camera;
+  Camera camera;
   random_stream random;
   tiled_view<path_state> paths;
   wfpg::array_view<vec3> radiance;

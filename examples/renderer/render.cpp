@@ -37,6 +37,8 @@ void require_guided_files(const render_options& options) {
           "none where a rendering goes on, which has its own");
 }
 
+}  // namespace
+
 render_options completed(const scene& scene, render_options options) {
   using wfpg::detail::require;
   if (options.width == 0 && options.height == 0) {
@@ -63,6 +65,8 @@ render_options completed(const scene& scene, render_options options) {
   require_guided_files(options);
   return options;
 }
+
+namespace {
 
 render_result render_completed(const scene& scene, const render_options& options,
                                const progress_callback& progress) {

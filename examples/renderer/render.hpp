@@ -134,6 +134,10 @@ struct render_progress {
 };
 using progress_callback = std::function<void(const render_progress&)>;
 
+/// Options with the scene's own size and depth where they name none. Throws std::invalid_argument for options
+/// that cannot be right; the message names what.
+render_options completed(const scene& scene, render_options options);
+
 /// Renders on options.where. Throws std::invalid_argument for options or scenes that cannot be right; the
 /// message names what; std::runtime_error where the device cannot be used; wfpg::file_error where a file to
 /// begin with is not one, or not this rendering's. `progress` may be empty.

@@ -60,11 +60,13 @@ class path_tracer {
         clock_(exec) {}
 
   /// Sample number `sample` (from 0) of each pixel; `weight` >= 0 is its share of the picture. Waits for it.
-  template <class Guider>
-  void render_sample(Guider& guider, const pinhole& camera, std::uint32_t sample, float weight) {
+  /// A Camera is a pinhole, or another that gives rays:
+  ///   wfpg::ray through(std::uint32_t pixel, vec2 offset) const;  offset in [0, 1)² of the pixel
+  template <class Guider, class Camera>
+  void render_sample(Guider& guider, const Camera& camera, std::uint32_t sample, float weight) {
     wave_position at{{settings_.seed, sample}, 0, settings_.max_depth};
     clock_.measure("camera", [&] {
-      exec_.for_each(count_, start_paths{camera, at.random, paths_.view(), radiance_.view()});
+      exec_.for_each(count_, start_paths<Camera>{camera, at.random, paths_.view(), radiance_.view()});
     });
     clock_.measure("update", [&] { guider.begin_sample(); });
     world_.guide = guider.lights();

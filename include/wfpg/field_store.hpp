@@ -24,6 +24,8 @@
 #include <thrust/functional.h>
 #include <thrust/transform_scan.h>
 
+#include <vector>
+
 namespace wfpg {
 
 /// How fields are kept.
@@ -129,6 +131,9 @@ class field_store {
   std::uint32_t refresh_cones() const { return detail::refresh_cones(options_.resolution, options_.recast); }
   /// Waits for the work before it.
   kept_field_statistics statistics(const Exec& exec) const;
+  /// A slot: node · orientations + orientation of its field, 0xffffffff where it is free. Waits for the work
+  /// before it.
+  std::vector<std::uint32_t> keys(const Exec& exec) const;
   /// Of the slots and all that finds them.
   std::size_t slot_bytes() const;
   /// Of what decides the level: running counts and bins.

@@ -27,6 +27,7 @@
 #include <wfpg/wave.hpp>
 
 #include <memory>
+#include <vector>
 
 namespace wfpg {
 
@@ -152,6 +153,10 @@ class path_guider {
 
   /// Wait for the work before them.
   guider_statistics statistics() const;
+  /// A kept field, by the number that mixtures and directions have of it: node · orientations + orientation,
+  /// or 0xffffffff where the number is not in use. Empty where fields are transient. Waits for the work
+  /// before it.
+  std::vector<std::uint32_t> field_keys() const { return store_.keys(exec_); }
   /// What it holds, by part. Waits for the work before it.
   memory_report memory() const;
 

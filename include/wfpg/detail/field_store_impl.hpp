@@ -231,6 +231,13 @@ void field_store<Exec>::build_batches(const Exec& exec, const Builder& builder, 
 }
 
 template <class Exec>
+std::vector<std::uint32_t> field_store<Exec>::keys(const Exec& exec) const {
+  std::vector<std::uint32_t> result;
+  for (const detail::field_slot& slot : slots_.to_host(exec)) result.push_back(slot.key);
+  return result;
+}
+
+template <class Exec>
 kept_field_statistics field_store<Exec>::statistics(const Exec& exec) const {
   const detail::field_store_state state = read_element(exec, state_.data());
   kept_field_statistics result;

@@ -1,0 +1,29 @@
+// An inspection from a scene to a folder of pictures, numbers and a page, after the thesis's tool
+// (section 5.3).
+#pragma once
+
+#include "findings.hpp"
+#include "render.hpp"
+
+#include <filesystem>
+#include <iosfwd>
+#include <string>
+
+namespace inspect {
+
+struct inspection {
+  render::render_options learning;  ///< the rendering that the guider learns from
+  int x = 0, y = 0;                 ///< pixel, from the upper left
+  int reference_spp = 256;          ///< paths for each of the reference's cells, 2 or more
+  int histogram = 1 << 20;          ///< samples in the histogram, positive
+  std::filesystem::path output = "inspection";
+  std::string vdb;  ///< OpenVDB file of the octree; empty: none
+};
+
+/// Writes pictures, numbers.json and index.html into the output folder, which is made. Stages and warnings go
+/// to `log`, progress to stderr. Throws std::invalid_argument for what cannot be right, a pixel outside of
+/// the picture among it, before anything is rendered; what render::render throws; std::runtime_error where a
+/// file cannot be written.
+void run(const render::scene& scene, const inspection& asked, std::ostream& log);
+
+}  // namespace inspect

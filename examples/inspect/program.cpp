@@ -1,0 +1,88 @@
+// From arguments to an inspection.
+#include "program.hpp"
+
+#include "inspection.hpp"
+#include "render_arguments.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <ostream>
+#include <string>
+
+namespace inspect {
+namespace {
+
+constexpr int failure = 2;
+
+struct arguments {
+  std::string scene, environment, output = "inspection";
+  inspection asked;
+};
+
+void parse_pixel(const std::string& text, inspection& asked) {
+  char end = 0;
+  if (std::sscanf(text.c_str(), "%6d,%6d%c", &asked.x, &asked.y, &end) != 2)
+    throw CLI::ValidationError("--pixel is " + text + ", expected X,Y from the upper left, such as 320,90");
+}
+
+void add_options(CLI::App& app, arguments& given) {
+  app.add_option("SCENE", given.scene, "a .glb or .gltf file, or one of: " + render::listed_builtin_scenes())
+      ->required();
+  app.add_option_function<std::string>(
+         "--pixel", [&given](const std::string& text) { parse_pixel(text, given.asked); },
+         "X,Y from the upper left: what its middle hits is looked at")
+      ->required();
+  app.add_option("-o,--output", given.output, "folder of the page and its pictures (default: inspection)");
+  app.add_option("--vdb", given.asked.vdb, "the octree's voxels, OpenVDB");
+  app.add_option("--environment", given.environment,
+                 "light from all directions, OpenEXR or .hdr, equirectangular (default: the scene's)");
+  app.add_option("--load-guide", given.asked.learning.load_guide,
+                 "guide to begin with, of the same scene and options");
+  app.add_option("--reference-spp", given.asked.reference_spp,
+                 "paths for each of the reference's cells, of which there are about 96 x 96 (default: 256)")
+      ->check(CLI::Range(2, 1 << 24));
+  app.add_option("--histogram", given.asked.histogram, "samples in the histogram (default: 1048576)")
+      ->check(CLI::Range(1, 1 << 30));
+  render::render_options& options = given.asked.learning;
+  render::add_method_options(app, options);
+  render::add_device_option(app, options);
+  render::add_nee_option(app, options);
+  render::add_budget_options(app, options);
+  render::add_picture_options(app, options);
+  render::add_guider_options(app, options);
+}
+
+void inspect_scene(arguments& given, std::ostream& out, std::ostream& log) {
+  render::scene scene = render::load_scene(given.scene);
+  if (!given.environment.empty()) scene.sky = render::read_environment(given.environment);
+  for (const std::string& warning : scene.warnings) log << "wfpg-inspect: warning: " << warning << '\n';
+  if (render::is_dark(scene))
+    log << "wfpg-inspect: warning: the scene has no light: there is nothing to learn\n";
+  given.asked.output = given.output;
+  run(scene, given.asked, log);
+  out << (given.asked.output / "index.html").string() << '\n';
+}
+
+}  // namespace
+
+int run_program(int argc, const char* const* argv, std::ostream& out, std::ostream& log) {
+  arguments given;
+  CLI::App app{"Shows the field that guides a pixel's samples, beside the light that arrives there."};
+  add_options(app, given);
+  try {
+    app.parse(argc, argv);
+    render::check_render_options(app, given.asked.learning);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error, out, log) == 0 ? 0 : failure;
+  }
+  try {
+    inspect_scene(given, out, log);
+    return 0;
+  } catch (const std::exception& error) {
+    log << "wfpg-inspect: " << error.what() << '\n';
+    return failure;
+  }
+}
+
+}  // namespace inspect

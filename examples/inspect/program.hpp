@@ -1,0 +1,12 @@
+// wfpg-inspect as a function, for the program and its tests.
+#pragma once
+
+#include <iosfwd>
+
+namespace inspect {
+
+/// Reads the command line, inspects, and names the page on `out`; what it is at, warnings and errors go to
+/// `log`. 0, or 2 on failure.
+int run_program(int argc, const char* const* argv, std::ostream& out, std::ostream& log);
+
+}  // namespace inspect
