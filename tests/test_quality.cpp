@@ -109,7 +109,7 @@ std::vector<std::filesystem::path> cached(const temporary_folder& folder, const 
 
 TEST_CASE("options: presets hold where nothing is given", "[quality]") {
   const quality::settings quick = parsed({"--preset", "quick"});
-  CHECK(quick.scenes.size() == 5);
+  CHECK(quick.scenes.size() == 6);
   CHECK(quick.methods.size() == 3);
   CHECK(quick.scenes[0].options.width == 104);
   CHECK_FALSE(quick.scenes[0].options.nee);
