@@ -109,13 +109,14 @@ path_guider<Exec>::path_guider(const Exec& exec, voxel_fragments<Exec> fragments
 
 template <class Exec>
 void path_guider<Exec>::begin_sample() {
-  ++samples_;
+  const std::uint32_t sample = samples_ + 1;
   // Of many paths fewer do once means have settled.
-  const std::uint32_t fewer = share_shift() > 0 && samples_ > 32 ? 2 : 0;
-  const auto seed = static_cast<std::uint32_t>(detail::hash(options_.seed, samples_));
+  const std::uint32_t fewer = share_shift() > 0 && sample > 32 ? 2 : 0;
+  const auto seed = static_cast<std::uint32_t>(detail::hash(options_.seed, sample));
   recorder_.begin_sample(exec_, seed, fewer);
-  if (keeps_fields()) store_.begin_sample(exec_, samples_);
+  if (keeps_fields()) store_.begin_sample(exec_, sample);
   lights_.begin_sample(seed);
+  samples_ = sample;  // last: a call that threw is made again for the same sample
 }
 
 template <class Exec>
