@@ -185,7 +185,8 @@ light_guide<Exec>::light_guide(const Exec& exec, const sparse_voxel_octree_view&
   while (values >> view_.runs_.shift > wanted) ++view_.runs_.shift;
   sums_ = buffer<float, Exec>(exec, rows * groups);
   means_ = buffer<detail::learnt_mean, Exec>(exec, rows * groups);
-  queue_ = detail::value_queue<Exec>(exec, detail::min(values, 2 * wanted), rows_of(view_.level_) * groups);
+  const std::size_t capacity = detail::min(detail::min(values, 2 * wanted), detail::most_queued);
+  queue_ = detail::value_queue<Exec>(exec, capacity, rows_of(view_.level_) * groups);
   view_.sums_ = sums_.data();
   view_.queue_ = queue_.view();
   forget(exec);
