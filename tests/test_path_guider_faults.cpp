@@ -159,6 +159,19 @@ struct faulty_queries {
   }
 };
 
+/// Whether a view's answer to a query is no density.
+struct ask_densities {
+  wfpg::guide_view view;
+  wfpg::array_view<const test_surface> surfaces;
+  WFPG_HD bool operator()(std::size_t i) const {
+    const auto ray = static_cast<std::uint32_t>(i);
+    const vec3 direction = faulty_queries()(ray);
+    const float whole = view.pdf(ray, faulty_surfaces{surfaces}(ray), direction);
+    const float field = view.guides(ray) ? view.pdf(ray, direction) : 0.0f;
+    return !is_density(whole) || !is_density(field);
+  }
+};
+
 template <class Exec>
 void check_faulty_bsdfs(guided_box<Exec>& box, bsdf_kind kind) {
   const auto host = wall_surfaces(500, 3, kind);
@@ -176,13 +189,8 @@ void check_faulty_bsdfs(guided_box<Exec>& box, bsdf_kind kind) {
     CHECK(unsound == 0);
   }
   const wfpg::guide_view view = box.guider.prepare(wave, box_caster{});
-  const wfpg::array_view<const test_surface> at = const_view<test_surface>(surfaces);
-  CHECK(count_where(box.exec, host.size(), [=] WFPG_HD(std::size_t i) {
-          const auto ray = static_cast<std::uint32_t>(i);
-          const float whole = view.pdf(ray, faulty_surfaces{at}(ray), faulty_queries()(ray));
-          const float field = view.guides(ray) ? view.pdf(ray, faulty_queries()(ray)) : 0.0f;
-          return !is_density(whole) || !is_density(field);
-        }) == 0);
+  const ask_densities asks_unsound{view, const_view<test_surface>(surfaces)};
+  CHECK(count_where(box.exec, host.size(), asks_unsound) == 0);
 }
 
 WFPG_TEST_CASE("path guider: what a BSDF says that is no density counts as none", "[path_guider][faults]") {

@@ -45,6 +45,14 @@ struct ask_straight_up {
   WFPG_HD vec3 operator()(std::uint32_t) const { return {0.0f, 1.0f, 0.0f}; }
 };
 
+struct record_first_vertex {
+  wfpg::path_recorder_view recorder;
+  wfpg::array_view<const test_surface> surfaces;
+  WFPG_HD void operator()(std::size_t i) const {
+    recorder.vertex(i, 0, surfaces[i].position, surfaces[i].outgoing, vec3(1.0f));
+  }
+};
+
 struct choose_lights {
   wfpg::light_guide_view lights;
   wfpg::array_view<const test_surface> surfaces;
@@ -98,11 +106,7 @@ class stepwise_samples {
                       hashed_numbers{100 * sample_ + depth}};
   }
   void record_first() {
-    const wfpg::path_recorder_view recorder = guider_.recorder();
-    const wfpg::array_view<test_surface> at = surfaces_.view();
-    host_.for_each(paths_, [=] WFPG_HD(std::size_t i) {
-      recorder.vertex(i, 0, at[i].position, at[i].outgoing, vec3(1.0f));
-    });
+    host_.for_each(paths_, record_first_vertex{guider_.recorder(), const_view<test_surface>(surfaces_)});
     host_.for_each(paths_, choose_lights{guider_.lights(), const_view<test_surface>(surfaces_)});
   }
   void follow(std::uint32_t depth) {
