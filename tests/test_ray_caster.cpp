@@ -273,4 +273,18 @@ WFPG_TEST_CASE("SVO ray caster: an empty octree and one voxel", "[ray_caster]") 
   CHECK(hits[1].distance == Approx(2.5f).margin(0.1));
 }
 
+WFPG_TEST_CASE("SVO ray caster: a ray that leads nowhere ends at once", "[ray_caster]") {
+  const Exec exec;
+  const auto tree = scattered(exec, 300, 32, 2);
+  const float nan = std::nanf(""), far = 3.0e38f;
+  const std::vector<ray> rays = {
+      make_ray({0.5f, 0.5f, 0.5f}, vec3(0.0f)), make_ray({0.5f, 0.5f, 0.5f}, vec3(nan)),
+      make_ray(vec3(nan), {0, 0, 1}),           make_ray(vec3(2.0f * far), {0, 0, 1}),
+      make_ray(vec3(far), {0, 0, -1}),          make_ray({0.5f, 0.5f, nan}, {0, 1, 0})};
+  for (const ray_hit& hit : cast(exec, svo_ray_caster(tree.view(), 4.0f), rays)) {
+    CHECK(!hit.is_hit());
+    CHECK(hit.radiance == 4.0f);
+  }
+}
+
 }  // namespace

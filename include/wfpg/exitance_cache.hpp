@@ -231,7 +231,8 @@ class exitance_cache {
 
   // Before memory is asked for.
   static std::size_t checked(std::size_t queue_capacity) {
-    detail::require(queue_capacity <= (1u << 31), "deposit queue capacity", queue_capacity, "at most 2^31");
+    detail::require(queue_capacity <= detail::most_queued, "deposit queue capacity", queue_capacity,
+                    "at most 2^31");
     return queue_capacity;
   }
   static std::uint32_t checked_leaves(std::uint32_t leaves) {

@@ -118,11 +118,11 @@ class grid_distribution {
            static_cast<float>(resolution_);
   }
 
-  /// The cell along one side of the square that a coordinate in [0,1] lies in.
+  /// The cell along one side of the square that a coordinate in [0,1] lies in; the first one's of NaN.
   WFPG_HD std::uint32_t cell_along(float coordinate) const {
     const auto last = static_cast<float>(resolution_ - 1);
-    return static_cast<std::uint32_t>(
-        detail::clamp(coordinate * static_cast<float>(resolution_), 0.0f, last));
+    const float along = coordinate * static_cast<float>(resolution_);
+    return static_cast<std::uint32_t>(detail::min(detail::max(0.0f, along), last));  // of NaN, max gives 0
   }
   /// The density at a point, per unit of the square's area.
   WFPG_HD float pdf(vec2 uv) const { return density_of(weight(cell_along(uv.x), cell_along(uv.y))); }

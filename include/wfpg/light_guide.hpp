@@ -190,7 +190,8 @@ light_guide<Exec>::light_guide(const Exec& exec, const sparse_voxel_octree_view&
   while (paths * depth >> view_.runs_.shift > wanted) ++view_.runs_.shift;
   sums_ = buffer<float, Exec>(exec, rows * groups);
   means_ = buffer<detail::learnt_mean, Exec>(exec, rows * groups);
-  queue_ = detail::value_queue<Exec>(exec, view_.runs_.size(paths) * depth, rows_of(view_.level_) * groups);
+  const std::size_t capacity = detail::min(view_.runs_.size(paths) * depth, detail::most_queued);
+  queue_ = detail::value_queue<Exec>(exec, capacity, rows_of(view_.level_) * groups);
   view_.sums_ = sums_.data();
   view_.queue_ = queue_.view();
   forget(exec);

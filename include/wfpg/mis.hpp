@@ -67,6 +67,7 @@ struct basic_guide_mixture {
   std::uint32_t number = no_field;  ///< of the field, which directions carry with them
 
   /// A direction from a number in [0,1) that chooses the technique and u in [0,1)². O(log F) and the BSDF.
+  /// What a BSDF draws with a direction or density that is not finite is a sample that failed.
   template <class Bsdf>
   WFPG_HD sampled_direction sample(const surface<Bsdf>& s, float u_technique, vec2 u) const {
     if (s.bsdf.is_delta()) return from_bsdf(s.bsdf.sample(s.outgoing, u), sampling_technique::delta);
@@ -80,7 +81,7 @@ struct basic_guide_mixture {
       result.technique = sampling_technique::guide;
     } else {
       const bsdf_sample drawn = draw(s, u_technique < shares.guide + shares.glossy, u);
-      if (!(drawn.pdf > 0.0f)) return {};
+      if (!is_drawn(drawn)) return {};
       result.direction = drawn.direction;
       result.technique = sampling_technique::bsdf;
       of_field = field.pdf(drawn.direction);
@@ -89,11 +90,12 @@ struct basic_guide_mixture {
     return result;
   }
 
-  /// The density with which sample() draws a unit direction, per steradian; 0 on delta BSDFs.
+  /// The density with which sample() draws a unit direction, per steradian; 0 on delta BSDFs, and of a
+  /// direction that is not finite. Never NaN, infinite or negative: where the BSDF's is, it counts as 0.
   template <class Bsdf>
   WFPG_HD float pdf(const surface<Bsdf>& s, vec3 direction) const {
-    if (s.bsdf.is_delta()) return 0.0f;
-    if (!guides()) return s.bsdf.pdf(s.outgoing, direction);
+    if (s.bsdf.is_delta() || !detail::is_finite(direction)) return 0.0f;
+    if (!guides()) return sound(s.bsdf.pdf(s.outgoing, direction));
     const mixture_shares shares = shares_of(s);
     return shares.guide * field.pdf(direction) + bsdf_pdf(s, shares, direction);
   }
@@ -117,8 +119,15 @@ struct basic_guide_mixture {
  private:
   WFPG_HD bool guides() const { return fraction > 0.0f && !field.empty(); }
 
+  WFPG_HD static float sound(float density) {
+    return detail::is_finite(density) && density > 0.0f ? density : 0.0f;
+  }
+  WFPG_HD static bool is_drawn(const bsdf_sample& drawn) {
+    return sound(drawn.pdf) > 0.0f && detail::is_finite(drawn.direction);
+  }
+
   WFPG_HD static sampled_direction from_bsdf(const bsdf_sample& drawn, sampling_technique technique) {
-    if (!(drawn.pdf > 0.0f)) return {};
+    if (!is_drawn(drawn)) return {};
     return {drawn.direction, drawn.pdf, technique, no_field};
   }
 
@@ -134,10 +143,13 @@ struct basic_guide_mixture {
   template <class Bsdf>
   WFPG_HD static float bsdf_pdf(const surface<Bsdf>& s, const mixture_shares& shares, vec3 direction) {
     if constexpr (has_separate_parts_v<Bsdf>)
-      return (shares.glossy > 0.0f ? shares.glossy * s.bsdf.pdf_part(true, s.outgoing, direction) : 0.0f) +
-             (shares.smooth > 0.0f ? shares.smooth * s.bsdf.pdf_part(false, s.outgoing, direction) : 0.0f);
+      return part_pdf(s, true, shares.glossy, direction) + part_pdf(s, false, shares.smooth, direction);
     else
-      return shares.smooth * s.bsdf.pdf(s.outgoing, direction);
+      return shares.smooth * sound(s.bsdf.pdf(s.outgoing, direction));
+  }
+  template <class Bsdf>
+  WFPG_HD static float part_pdf(const surface<Bsdf>& s, bool glossy, float share, vec3 direction) {
+    return share > 0.0f ? share * sound(s.bsdf.pdf_part(glossy, s.outgoing, direction)) : 0.0f;
   }
 };
 

@@ -43,8 +43,8 @@ struct alignas(8) recorded_direction {
 }  // namespace detail
 
 /// What a kernel sees of the recorder. Calls for one path come from one thread at a time, vertices in order
-/// of depth. A path or depth beyond the capacity, a vertex that was not recorded, or a direction that is not
-/// finite is dropped and counted; what comes for paths that this sample does not record is not.
+/// of depth. A path or depth beyond the capacity, a vertex that was not recorded, or a direction that is zero
+/// or not finite is dropped and counted; what comes for paths that this sample does not record is not.
 class path_recorder_view {
  public:
   /// Paths of a sample, recorded or not.
@@ -59,7 +59,7 @@ class path_recorder_view {
                       vec3 throughput) const {
     std::uint32_t place;
     if (!find(path, place)) return;
-    if (depth >= max_depth_ || depth != lengths_[place] || !detail::is_finite(outgoing)) return drop();
+    if (depth >= max_depth_ || depth != lengths_[place] || !leads_somewhere(outgoing)) return drop();
     const std::size_t slot = depth * recorded_ + place;
     places_[slot] = {position, pack_direction(outgoing)};
     light_[slot] = {throughput, vec3(0.0f)};
@@ -72,7 +72,7 @@ class path_recorder_view {
   WFPG_HD void scatter(std::size_t path, std::uint32_t depth, const sampled_direction& drawn) const {
     std::uint32_t place;
     if (!learns() || drawn.field == no_field || !find(path, place)) return;
-    if (depth >= max_depth_ || depth + 1 != lengths_[place] || !detail::is_finite(drawn.direction))
+    if (depth >= max_depth_ || depth + 1 != lengths_[place] || !leads_somewhere(drawn.direction))
       return drop();
     directions_[depth * recorded_ + place] = {drawn.field, pack_direction(drawn.direction)};
   }
@@ -117,6 +117,9 @@ class path_recorder_view {
   static constexpr std::uint32_t escaped = 0x80000000u;  // of a length: its last vertex is the environment
 
   WFPG_HD bool learns() const { return directions_ != nullptr; }
+  WFPG_HD static bool leads_somewhere(vec3 direction) {
+    return detail::is_finite(direction) && direction != vec3(0.0f);
+  }
   WFPG_HD void drop() const { detail::atomic_add(dropped_, 1); }
   /// Where a path is among the recorded ones; false where it is not, and dropped where there is no such path.
   WFPG_HD bool find(std::size_t path, std::uint32_t& place) const {

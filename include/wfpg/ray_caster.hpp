@@ -58,14 +58,16 @@ class svo_ray_caster {
                                   float clearance = 2.0f)
       : tree_(tree), environment_(environment), clearance_(clearance) {}
 
-  /// Casts a ray: the distance at which it enters a leaf's voxel.
+  /// Casts a ray: the distance at which it enters a leaf's voxel. One that leads nowhere, since it is not
+  /// finite or its direction is zero, leaves the octree.
   WFPG_HD ray_hit operator()(const ray& r) const {
     const vec3 origin = tree_.grid().to_grid(r.origin);
     const float per_unit = static_cast<float>(tree_.grid().resolution) / tree_.grid().side;
     const auto extent = static_cast<float>(tree_.grid().resolution);
     const float start = detail::max(r.t_min * per_unit, clearance_);
     float t = detail::max(start, distance_to_exit(origin, r.direction, extent, true));
-    const float end = detail::min(distance_to_exit(origin, r.direction, extent, false), r.t_max * per_unit);
+    const float exit = distance_to_exit(origin, r.direction, extent, false);
+    const float end = leads_somewhere(r, exit) ? detail::min(exit, r.t_max * per_unit) : 0.0f;
     for (t = past_face(t); t < end && !tree_.empty(); t = past_face(t)) {
       const vec3 p = origin + t * r.direction;
       const vec3 cell = glm::clamp(p, vec3(0.0f), vec3(extent - 0.5f));
@@ -78,6 +80,10 @@ class svo_ray_caster {
   }
 
  private:
+  WFPG_HD static bool leads_somewhere(const ray& r, float exit) {
+    return exit < 3.0e38f && detail::is_finite(r.origin) && detail::is_finite(r.direction);
+  }
+
   /// A little further along a ray, in voxels: past a face whatever the rounding, however far its origin is.
   WFPG_HD static float past_face(float t) { return t + detail::max(1.0e-3f, t * 0x1p-22f); }
 

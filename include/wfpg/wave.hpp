@@ -29,8 +29,9 @@ wave(std::uint32_t, std::size_t, Surfaces, Random) -> wave<Surfaces, Random>;
 struct depth_statistics {
   std::uint64_t bins = 0;  ///< whose fields were made; of kept fields, made or refreshed
   std::uint64_t rays = 0;  ///< in bins
-  std::uint64_t unbinned =
-      0;                    ///< active rays outside every voxel or without room for a field: their BSDF alone
+  /// Active rays outside every voxel, with a normal that is not of about unit length, or without room for a
+  /// field: their BSDF alone.
+  std::uint64_t unbinned = 0;
   std::uint64_t cones = 0;  ///< cast for them
 };
 

@@ -87,7 +87,6 @@ field_store<Exec>::field_store(const Exec& exec, const sparse_voxel_octree_view&
 template <class Exec>
 void field_store<Exec>::begin_sample(const Exec& exec, std::uint32_t sample) {
   sample_ = sample;
-  counted_samples_ += counts_rays() ? 1 : 0;
   waves_ = 0;
   exec.for_each(
       detail::max<std::size_t>(capacity_, 1),
@@ -98,6 +97,7 @@ void field_store<Exec>::begin_sample(const Exec& exec, std::uint32_t sample) {
                                      free_through.data(), detail::is_free{}, ::thrust::plus<std::uint32_t>());
   exec.for_each(detail::max<std::size_t>(capacity_, 1),
                 detail::index_slots{view(), free_through.data(), free_slots_.data(), state_.data()});
+  counted_samples_ += counts_rays() ? 1 : 0;
 }
 
 template <class Exec>

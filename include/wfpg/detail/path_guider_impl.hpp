@@ -50,7 +50,7 @@ const guider_options& path_guider<Exec>::checked(const guider_options& o) {
   require(o.product_resolution == 0 || o.guide_fraction < 1.0f, "guide_fraction", o.guide_fraction,
           "less than 1 with products, which do not reach all that a BSDF does");
   detail::require_valid(o.lights);
-  require(o.deposit_capacity < 0xffffffffull, "deposit_capacity", o.deposit_capacity, "less than 2^32 - 1");
+  require(o.deposit_capacity <= detail::most_queued, "deposit_capacity", o.deposit_capacity, "at most 2^31");
   require(o.max_paths * o.max_depth < 0xffffffffull, "max_paths times max_depth, the vertices of a sample,",
           o.max_paths * o.max_depth, "less than 2^32 - 1");
   return o;
@@ -76,7 +76,11 @@ std::uint32_t path_guider<Exec>::share_shift() const {
 template <class Exec>
 std::size_t path_guider<Exec>::deposits_of_sample() const {
   if (options_.deposit_capacity > 0) return options_.deposit_capacity;
-  return detail::recorded_runs{share_shift()}.size(options_.max_paths) * options_.max_depth;
+  const std::size_t recorded = detail::recorded_runs{share_shift()}.size(options_.max_paths);
+  detail::require(recorded * options_.max_depth <= detail::most_queued,
+                  "max_paths times max_depth, the vertices that are recorded,", recorded * options_.max_depth,
+                  "at most 2^31: set deposits_per_leaf, or deposit_capacity");
+  return recorded * options_.max_depth;
 }
 
 template <class Exec>
@@ -110,13 +114,14 @@ path_guider<Exec>::path_guider(const Exec& exec, voxel_fragments<Exec> fragments
 
 template <class Exec>
 void path_guider<Exec>::begin_sample() {
-  ++samples_;
+  const std::uint32_t sample = samples_ + 1;
   // Of many paths fewer do once means have settled.
-  const std::uint32_t fewer = share_shift() > 0 && samples_ > 32 ? 2 : 0;
-  const auto seed = static_cast<std::uint32_t>(detail::hash(options_.seed, samples_));
+  const std::uint32_t fewer = share_shift() > 0 && sample > 32 ? 2 : 0;
+  const auto seed = static_cast<std::uint32_t>(detail::hash(options_.seed, sample));
   recorder_.begin_sample(exec_, seed, fewer);
-  if (keeps_fields()) store_.begin_sample(exec_, samples_);
+  if (keeps_fields()) store_.begin_sample(exec_, sample);
   lights_.begin_sample(seed);
+  samples_ = sample;  // last: a call that threw is made again for the same sample
 }
 
 template <class Exec>

@@ -141,7 +141,14 @@ struct resident_sink {
   }
 };
 
-/// A wave's rays as the binner wants them. Delta surfaces are sampled alone and need no bin.
+/// Whether a field can have the normal: of about unit length.
+WFPG_HD inline bool is_normal(vec3 n) {
+  const float square = glm::dot(n, n);
+  return is_finite(square) && square > 0.25f && square < 4.0f;
+}
+
+/// A wave's rays as the binner wants them. Delta surfaces are sampled alone and need no bin; those whose
+/// normal is none have none, as if they lay outside every voxel.
 template <class Surfaces>
 struct wave_rays {
   Surfaces surfaces;
@@ -151,7 +158,8 @@ struct wave_rays {
     ray_to_bin result;
     result.active = s.active && !s.bsdf.is_delta();
     if (!result.active) return result;
-    result.position = s.position;
+    const bool is_sound = is_normal(s.normal) && is_finite(glm::dot(s.geometric_normal, s.geometric_normal));
+    result.position = is_sound ? s.position : vec3(bits_float(0x7fc00000u));
     if (mode == guiding_mode::oriented)
       result.orientation = s.bsdf.transmits() ? static_cast<std::uint32_t>(orientation_transmits)
                                               : dominant_axis(facing_normal(s));

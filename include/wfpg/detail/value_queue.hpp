@@ -12,6 +12,9 @@
 
 namespace wfpg::detail {
 
+/// Values of a queue, at most.
+inline constexpr std::size_t most_queued = std::size_t(1) << 31;
+
 /// What a key has received since the last time.
 struct pending_values {
   std::uint64_t sum = 0;  ///< in units of exact_sum, once it is made
@@ -62,7 +65,11 @@ class value_queue_view {
   /// The first of n entries in a row. Each that fits is then written or dropped, and then counted: writing
   /// all of a thread's first lets a processor overlap look-ups, which the atomics of counting would put in
   /// order.
-  WFPG_HD std::uint32_t reserve(std::uint32_t n) const { return atomic_add(queued_, n); }
+  WFPG_HD std::uint32_t reserve(std::uint32_t n) const {
+    // Asked first, so that what comes to a full queue does not count on until the counter begins again.
+    if (atomic_load(queued_) >= capacity_) return capacity_;
+    return atomic_add(queued_, n);
+  }
   WFPG_HD bool fits(std::uint32_t entry) const { return entry < capacity_; }
 
   /// A non-negative finite value for a key. Precondition: the entry fits.

@@ -1,0 +1,79 @@
+// A memory resource that fails at one allocation of many, and the sweep over all of them.
+#pragma once
+
+#include "support/policies.hpp"
+
+#include <wfpg/error.hpp>
+
+#include <cstddef>
+#include <new>
+
+namespace wfpg_test {
+
+/// Counts what is asked of it and what is given back, and fails at one of the allocations to come.
+class failing_resource : public wfpg::memory_resource {
+ public:
+  explicit failing_resource(wfpg::memory_resource* upstream = default_resource()) : upstream_(upstream) {}
+
+  /// Allocations that are not given back.
+  std::size_t live() const { return live_; }
+  /// Allocations since fail_at().
+  std::size_t asked() const { return asked_; }
+  /// Whether one has failed since fail_at().
+  bool failed() const { return asked_ >= fails_at_ && fails_at_ > 0; }
+
+  /// The k-th allocation from here on fails, counted from 1; 0: none does.
+  void fail_at(std::size_t k) {
+    fails_at_ = k;
+    asked_ = 0;
+  }
+
+ protected:
+  /// What it throws.
+  [[noreturn]] virtual void refuse() const { throw std::bad_alloc(); }
+
+ private:
+  void* do_allocate(std::size_t bytes, std::size_t alignment) override {
+    if (++asked_ == fails_at_) refuse();
+    void* const block = upstream_->allocate(bytes, alignment);
+    ++live_;
+    return block;
+  }
+  void do_deallocate(void* block, std::size_t bytes, std::size_t alignment) override {
+    --live_;
+    upstream_->deallocate(block, bytes, alignment);
+  }
+  bool do_is_equal(const wfpg::memory_resource& other) const noexcept override { return this == &other; }
+
+  wfpg::memory_resource* upstream_;
+  std::size_t live_ = 0, asked_ = 0, fails_at_ = 0;
+};
+
+/// Whether a call throws out_of_memory, which it may only where the resource has failed.
+template <class F>
+bool runs_out(const failing_resource& resource, const F& call) {
+  try {
+    call();
+  } catch (const wfpg::out_of_memory&) {
+    CHECK(resource.failed());
+    return true;
+  }
+  return false;
+}
+
+/// Calls f() with every allocation failing in its turn, until none is left to fail; how many there were. f
+/// takes whatever memory it asks for and gives all of it back.
+template <class F>
+std::size_t fail_at_each(failing_resource& resource, const F& f) {
+  const std::size_t before = resource.live();
+  for (std::size_t k = 1;; ++k) {
+    resource.fail_at(k);
+    INFO("allocation " << k);
+    const bool failed = runs_out(resource, f);
+    CHECK(resource.live() == before);
+    CHECK(failed == resource.failed());
+    if (!failed) return resource.asked();
+  }
+}
+
+}  // namespace wfpg_test

@@ -1,0 +1,120 @@
+// Loops that fail to begin, as a launch on a device may: each loop of samples fails in its turn, and the
+// guider goes on. Of one policy, whose loops fail on request.
+#include "support/catch.hpp"
+#include "support/guiding.hpp"
+#include "support/policies.hpp"
+#include "support/scenes.hpp"
+#include "support/stepwise_samples.hpp"
+
+#include <wfpg/detail/cpu_policy.hpp>
+#include <wfpg/error.hpp>
+
+#include <thrust/system/cpp/execution_policy.h>
+
+#include <cstddef>
+#include <vector>
+
+namespace {
+
+using namespace wfpg_test;
+
+/// Loops since fail_loop(), and the one that fails.
+struct loop_count {
+  std::size_t begun = 0, fails_at = 0;
+
+  void fail_loop(std::size_t k) {
+    begun = 0;
+    fails_at = k;
+  }
+  bool failed() const { return fails_at > 0 && begun >= fails_at; }
+};
+
+/// The serial policy, but that the k-th loop throws before it begins.
+class failing_policy : public wfpg::detail::cpu_policy<failing_policy, 8> {
+ public:
+  explicit failing_policy(wfpg::memory_resource* resource = nullptr) : cpu_policy(resource) {}
+  explicit failing_policy(loop_count& loops) : cpu_policy(nullptr), loops_(&loops) {}
+
+  auto thrust() const { return ::thrust::cpp::par(wfpg::detail::resource_allocator<char>(resource())); }
+  int concurrency() const { return 1; }
+
+  template <class F>
+  void parallel(std::size_t n, std::size_t, const F& f) const {
+    if (loops_ && ++loops_->begun == loops_->fails_at)
+      throw wfpg::device_error(1, "fails on request", "parallel");
+    if (n > 0) f(0, n, 0);
+  }
+
+ private:
+  loop_count* loops_ = nullptr;  // null: none fails
+};
+
+static_assert(wfpg::exec::is_execution_policy_v<failing_policy>);
+
+/// What happens to a sample after a step of it threw.
+enum class afterwards { again, next_sample };
+
+/// Some samples, of which the k-th loop fails; `failed_step`: the step that threw.
+std::vector<wfpg::sampled_direction> sample_with_fault(wfpg::path_guider<failing_policy>& guider,
+                                                       loop_count& loops, std::size_t k, afterwards then,
+                                                       int& failed_step) {
+  stepwise_samples<failing_policy> samples(guider);
+  failed_step = -1;
+  loops.fail_loop(k);
+  for (std::uint32_t sample = 0; sample < 4; ++sample) {
+    samples.start(sample);
+    for (int step = 0; step < samples.steps; ++step) try {
+        samples.step(step);
+      } catch (const wfpg::device_error&) {
+        CHECK(failed_step < 0);
+        failed_step = step;
+        if (then == afterwards::next_sample) break;
+        samples.step(step);
+      }
+  }
+  CHECK(loops.failed() == (failed_step >= 0));
+  loops.fail_loop(0);
+  return samples.drawn();
+}
+
+/// Fails at each loop of some samples; how many there were.
+std::size_t fail_in_samples(const wfpg::guider_options& options, afterwards then) {
+  const box_mesh<failing_policy> mesh{failing_policy()};
+  std::vector<wfpg::sampled_direction> expected;
+  for (std::size_t k = 0;; ++k) {
+    int failed_step;
+    loop_count loops;
+    wfpg::path_guider<failing_policy> guider(failing_policy(loops), mesh.view(), options);
+    const auto drawn = sample_with_fault(guider, loops, k, then, failed_step);
+    if (k == 0) expected = drawn;
+    INFO("loop " << k << ", step " << failed_step);
+    // A wave that is asked for again counts its rays again, which decides where kept fields are.
+    const bool is_alike = failed_step < 0 || failed_step == stepwise_samples<failing_policy>::begin ||
+                          failed_step == stepwise_samples<failing_policy>::end ||
+                          options.fields == wfpg::field_lifetime::transient;
+    if (then == afterwards::again && is_alike) CHECK(same_draws(drawn, expected));
+    check_guides(guider);
+    if (k > 0 && failed_step < 0) return k - 1;
+  }
+}
+
+TEST_CASE("path guider: each loop of samples fails in its turn, and the call is made again",
+          "[path_guider]") {
+  std::size_t covered = 0;
+  for_each_stepwise_options(
+      [&](const wfpg::guider_options& options) { covered += fail_in_samples(options, afterwards::again); });
+  CHECK(covered > 4 * 50);
+  SUCCEED(covered << " loops");
+}
+
+TEST_CASE("path guider: each loop of samples fails in its turn, and the sample is given up",
+          "[path_guider]") {
+  std::size_t covered = 0;
+  for_each_stepwise_options([&](const wfpg::guider_options& options) {
+    covered += fail_in_samples(options, afterwards::next_sample);
+  });
+  CHECK(covered > 4 * 50);
+  SUCCEED(covered << " loops");
+}
+
+}  // namespace

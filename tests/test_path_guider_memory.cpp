@@ -1,0 +1,151 @@
+// Memory that runs out: every allocation of building a guider, of a sample and of loading a guide fails in
+// its turn. The call throws, nothing leaks, and the guider goes on.
+#include "support/catch.hpp"
+#include "support/failing_resource.hpp"
+#include "support/guiding.hpp"
+#include "support/policies.hpp"
+#include "support/scenes.hpp"
+#include "support/stepwise_samples.hpp"
+
+#include <wfpg/guide_file.hpp>
+
+#include <cstdint>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace {
+
+using namespace wfpg_test;
+using wfpg::field_lifetime;
+using wfpg::guider_options;
+using wfpg::path_guider;
+using wfpg::sampled_direction;
+
+WFPG_TEST_CASE("path guider: each allocation of its construction fails in its turn",
+               "[path_guider][memory]") {
+  const box_mesh<Exec> mesh{Exec()};
+  std::size_t covered = 0;
+  for_each_stepwise_options([&](const guider_options& options) {
+    failing_resource resource;
+    const Exec exec = Exec().with_resource(&resource);
+    covered += fail_at_each(resource, [&] { const path_guider<Exec> guider(exec, mesh.view(), options); });
+  });
+  CHECK(covered > 4 * 30);
+  SUCCEED(covered << " allocations");
+}
+
+/// What happens to a sample after a step of it threw.
+enum class afterwards { again, next_sample };
+
+/// Some samples, of which one allocation fails, the k-th; the directions that were drawn. `failed_step`: the
+/// step that threw.
+template <class Exec>
+std::vector<sampled_direction> sample_with_fault(path_guider<Exec>& guider, failing_resource& resource,
+                                                 std::size_t k, afterwards then, int& failed_step) {
+  stepwise_samples<Exec> samples(guider);
+  failed_step = -1;
+  resource.fail_at(k);
+  for (std::uint32_t sample = 0; sample < 4; ++sample) {
+    samples.start(sample);
+    for (int step = 0; step < samples.steps; ++step) {
+      if (!runs_out(resource, [&] { samples.step(step); })) continue;
+      REQUIRE(failed_step < 0);
+      failed_step = step;
+      if (then == afterwards::next_sample) break;
+      samples.step(step);
+    }
+  }
+  resource.fail_at(0);
+  return samples.drawn();
+}
+
+/// Fails at each allocation of some samples; how many there were.
+template <class Exec>
+std::size_t fail_in_samples(const guider_options& options, const box_mesh<Exec>& mesh, afterwards then) {
+  int failed_step = -1;
+  failing_resource unfailing;
+  path_guider<Exec> sound(Exec().with_resource(&unfailing), mesh.view(), options);
+  const auto expected = sample_with_fault(sound, unfailing, 0, then, failed_step);
+  for (std::size_t k = 1;; ++k) {
+    failing_resource resource;
+    {
+      path_guider<Exec> guider(Exec().with_resource(&resource), mesh.view(), options);
+      const auto drawn = sample_with_fault(guider, resource, k, then, failed_step);
+      INFO("allocation " << k << ", step " << failed_step);
+      // A wave that is asked for again counts its rays again, which decides where kept fields are.
+      const bool is_alike = failed_step < 0 || failed_step == stepwise_samples<Exec>::begin ||
+                            failed_step == stepwise_samples<Exec>::end ||
+                            options.fields == field_lifetime::transient;
+      if (then == afterwards::again && is_alike) CHECK(same_draws(drawn, expected));
+      check_guides(guider);
+    }
+    CHECK(resource.live() == 0);
+    if (failed_step < 0) return k - 1;
+  }
+}
+
+WFPG_TEST_CASE("path guider: each allocation of samples fails in its turn, and the call is made again",
+               "[path_guider][memory]") {
+  const box_mesh<Exec> mesh{Exec()};
+  std::size_t covered = 0;
+  for_each_stepwise_options([&](const guider_options& options) {
+    covered += fail_in_samples<Exec>(options, mesh, afterwards::again);
+  });
+  CHECK(covered > 10);
+  SUCCEED(covered << " allocations");
+}
+
+WFPG_TEST_CASE("path guider: each allocation of samples fails in its turn, and the sample is given up",
+               "[path_guider][memory]") {
+  const box_mesh<Exec> mesh{Exec()};
+  std::size_t covered = 0;
+  for_each_stepwise_options([&](const guider_options& options) {
+    covered += fail_in_samples<Exec>(options, mesh, afterwards::next_sample);
+  });
+  CHECK(covered > 10);
+  SUCCEED(covered << " allocations");
+}
+
+WFPG_TEST_CASE("each allocation of loading a guide fails in its turn", "[guide_file][memory]") {
+  const box_mesh<Exec> mesh{Exec()};
+  std::size_t covered = 0;
+  for_each_stepwise_options([&](const guider_options& options) {
+    path_guider<Exec> guider(Exec(), mesh.view(), options);
+    int failed_step;
+    failing_resource unused;
+    sample_with_fault(guider, unused, 0, afterwards::again, failed_step);
+    std::ostringstream out;
+    wfpg::save_guide(guider, out);
+
+    failing_resource resource;
+    const Exec exec = Exec().with_resource(&resource);
+    covered += fail_at_each(resource, [&] {
+      std::istringstream in(out.str());
+      path_guider<Exec> loaded = wfpg::load_guide(exec, in, options);
+      check_guides(loaded);
+    });
+  });
+  CHECK(covered > 4 * 30);
+  SUCCEED(covered << " allocations");
+}
+
+/// Of a host whose arena has an error of its own.
+class throwing_resource : public failing_resource {
+  [[noreturn]] void refuse() const override { throw std::length_error("the arena is full"); }
+};
+
+WFPG_TEST_CASE("path guider: what a resource throws by itself comes through", "[path_guider][memory]") {
+  const box_mesh<Exec> mesh{Exec()};
+  throwing_resource resource;
+  const Exec exec = Exec().with_resource(&resource);
+  const guider_options options = stepwise_options(field_lifetime::kept, 0);
+  for (const std::size_t k : {1, 2, 7, 20}) {
+    resource.fail_at(k);
+    CHECK_THROWS_AS((path_guider<Exec>(exec, mesh.view(), options)), std::length_error);
+    CHECK(resource.live() == 0);
+  }
+}
+
+}  // namespace
