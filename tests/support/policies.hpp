@@ -2,6 +2,7 @@
 // per policy and warp width, named "NAME - tbb16" and tagged [tbb][w16]. A CUDA compiler makes of the same
 // sources the CUDA policy's tests, "NAME - cuda" and tagged [cuda].
 //
+// WFPG_TEST_ONE_WIDTH compiles one width of each, another each, which is quick and runs nearly as many lines;
 // WFPG_TEST_ONLY_TBB leaves the other policies out, for the thread sanitizer; WFPG_TEST_SEVERAL_POLICIES says
 // that seq, omp and tbb are there side by side.
 #pragma once
@@ -45,6 +46,11 @@
   TEST_CASE(name " - cuda", tags "[cuda]") {     \
     function<wfpg::exec::cuda>();                \
   }
+#elif defined(WFPG_TEST_ONE_WIDTH)
+#define WFPG_TEST_POLICIES(function, name, tags) \
+  WFPG_TEST_ONE(function, name, tags, seq, 8)    \
+  WFPG_TEST_ONE(function, name, tags, omp, 16)   \
+  WFPG_TEST_ONE(function, name, tags, tbb, 32)
 #elif defined(WFPG_TEST_ONLY_TBB)
 #define WFPG_TEST_POLICIES(function, name, tags) WFPG_TEST_WIDTHS(function, name, tags, tbb)
 #else
