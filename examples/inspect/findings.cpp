@@ -92,16 +92,15 @@ predicted_noise predict(const pixel_sampler& sampler, const findings& found, con
 }
 
 /// What a sample brings in each fine cell over the mean of all samples.
-map contributions_of(const pixel_sampler& sampler, const findings& found, const light_maps& light) {
+map contributions_of(const pixel_sampler& sampler, const findings& found, const light_maps& light,
+                     const map& bsdf_values) {
   map values = times(cell_means(found.fine_cells, fine_points,
                                 [&](vec3 direction) {
                                   const double value = eval(sampler, direction);
                                   return value > 0.0 ? value / sampler.pdf(direction) : 0.0;
                                 }),
                      light.mean);
-  const map whole = times(
-      cell_means(found.fine_cells, fine_points, [&](vec3 direction) { return eval(sampler, direction); }),
-      light.mean);
+  const map whole = times(bsdf_values, light.mean);
   double sum = 0.0;
   for (const double value : whole) sum += value * double(found.fine_cells.solid_angle());
   if (sum > 0.0)
@@ -148,7 +147,7 @@ findings find(const learnt_scene& learnt, std::uint32_t pixel, const finding_opt
   }
   found.sampler = cell_means(found.cells, 2 * points, [&](vec3 d) { return sampler.pdf(d); });
   found.counted = count_samples(sampler, found.cells, options.histogram);
-  found.contributions = contributions_of(sampler, found, light);
+  found.contributions = contributions_of(sampler, found, light, values);
   found.noise = predict(sampler, found, light);
   compare(cosines, light, refinement, found);
   return found;

@@ -76,14 +76,8 @@ struct learnt_scene::state {
         lights(exec, scene, options.light_groups),
         accelerated(exec, scene, geometry.view()),
         camera(scene.view, options.width, options.height),
-        guider(render::begin_guider(exec, {geometry.view().positions, geometry.view().triangles}, guided(),
-                                    options, "")) {}
-
-  wfpg::guider_options guided() const {
-    wfpg::guider_options told = render::guider_options_of(options);
-    if (options.nee && lights.shares().size() > 1) told.lights.weights = lights.shares();
-    return told;
-  }
+        guider(render::begin_guider(exec, {geometry.view().positions, geometry.view().triangles},
+                                    render::guider_options_of(options, lights.shares()), options, "")) {}
 
   void learn(const render::progress_callback& progress) {
     tracer_type tracer(exec, settings_of(options), {geometry.view(), lights.view(), options.nee},
@@ -145,9 +139,8 @@ struct learnt_scene::state {
 void require_fields(const render::render_options& options) {
   using wfpg::detail::require;
   const std::string& method = render::name_of(render::method_names(), options.method);
-  require(options.method == render::sampling_method::wfpg ||
-              options.method == render::sampling_method::wfpg_product,
-          "method", method, "wfpg or wfpg-product: others have no fields to look at");
+  require(render::is_wfpg(options.method), "method", method,
+          "wfpg or wfpg-product: others have no fields to look at");
   require(options.where == render::device::cpu, "device",
           render::name_of(render::device_names(), options.where), "cpu: fields are looked at in its memory");
   require(options.max_depth >= 2, "max_depth", options.max_depth, "at least 2, for light to arrive from");

@@ -64,6 +64,15 @@ class scene_builder {
     return add(m);
   }
 
+  /// A plastic or a metal.
+  std::uint32_t glossy(material_kind kind, vec3 colour, float alpha) {
+    material m;
+    m.kind = kind;
+    m.base_color = colour;
+    m.alpha = alpha;
+    return add(m);
+  }
+
   /// The planar quad p0 p1 p2 p3, corners in order around it, counter-clockwise seen from where `facing`
   /// points to.
   void quad(const vec3 (&p)[4], vec3 facing, std::uint32_t material_index) {
@@ -217,16 +226,8 @@ scene ajar() {
   scene_builder b("ajar");
   const auto white = b.diffuse(vec3(0.75f)), wood = b.diffuse({0.6f, 0.42f, 0.28f});
   const auto light = b.lamp(vec3(6000.0f));
-  material glossy;
-  glossy.kind = material_kind::plastic;
-  glossy.base_color = {0.5f, 0.45f, 0.4f};
-  glossy.alpha = 0.25f;
-  const auto floor = b.add(glossy);
-  material metal;
-  metal.kind = material_kind::conductor;
-  metal.base_color = {0.95f, 0.79f, 0.55f};
-  metal.alpha = 0.2f;
-  const auto brass = b.add(metal);
+  const auto floor = b.glossy(material_kind::plastic, {0.5f, 0.45f, 0.4f}, 0.25f);
+  const auto brass = b.glossy(material_kind::conductor, {0.95f, 0.79f, 0.55f}, 0.2f);
   // Two rooms of 4 x 3 x 4 and the thickness of the wall between them; z > 0 is the dark one.
   b.room({{-2.0f, 0.0f, -4.05f}, {2.0f, 3.0f, 4.05f}}, {white, white, floor, white, white, white});
   wall_with_doorway(b, white);
@@ -257,14 +258,8 @@ scene thin_wall() {
 scene glossy_room() {
   scene_builder b("glossy-room");
   const auto white = b.diffuse(vec3(0.75f));
-  const auto metal = [&](vec3 colour, float alpha) {
-    material m;
-    m.kind = material_kind::conductor;
-    m.base_color = colour;
-    m.alpha = alpha;
-    return b.add(m);
-  };
-  const auto steel = metal(vec3(0.75f), 0.3f), copper = metal({0.9f, 0.6f, 0.45f}, 0.3f);
+  const auto steel = b.glossy(material_kind::conductor, vec3(0.75f), 0.3f),
+             copper = b.glossy(material_kind::conductor, {0.9f, 0.6f, 0.45f}, 0.3f);
   const auto light = b.lamp(vec3(150.0f));
   b.room({{-2.0f, 0.0f, -2.0f}, {2.0f, 3.0f, 2.0f}}, {copper, steel, steel, white, steel, steel});
   // A trough hides the lamp from below: all light comes by way of the ceiling.
@@ -283,11 +278,7 @@ scene glossy_room() {
 scene many_lamps() {
   scene_builder b("many-lamps");
   const auto white = b.diffuse(vec3(0.7f)), left = b.diffuse(red), right = b.diffuse(green);
-  material tiles;
-  tiles.kind = material_kind::plastic;
-  tiles.base_color = {0.45f, 0.42f, 0.38f};
-  tiles.alpha = 0.2f;
-  const auto floor = b.add(tiles);
+  const auto floor = b.glossy(material_kind::plastic, {0.45f, 0.42f, 0.38f}, 0.2f);
   b.room({{-2.0f, 0.0f, -8.5f}, {2.0f, 3.0f, 1.5f}}, {left, right, floor, white, white, white});
   const float brightness[4][3] = {
       {40.0f, 5.0f, 15.0f}, {2.0f, 30.0f, 8.0f}, {60.0f, 1.0f, 15.0f}, {5.0f, 90.0f, 40.0f}};

@@ -215,8 +215,7 @@ struct query_lights {
     const wfpg::light_choice choice = world.choose(vertex, at.draw(path, dimension::light_group).x);
     const light_sample light = world.lights.sample(world.scene, vertex.position, choice,
                                                    [&](std::uint32_t use) { return at.draw(path, use); });
-    light_query nothing;
-    nothing.choice = choice.key;
+    const light_query nothing(choice.key);
     if (!(light.pdf > 0.0f)) return nothing;
     light_query result = nothing;
     result.direction = light.direction;
@@ -248,10 +247,7 @@ struct drop_hidden {
   tiled_view<light_query> queries;
 
   WFPG_HD void operator()(std::size_t slot) const {
-    if (hidden[slot] == 0) return;
-    light_query nothing;
-    nothing.choice = queries[slot].choice;
-    queries.emplace(slot, nothing);
+    if (hidden[slot] != 0) queries.emplace(slot, light_query(queries[slot].choice));
   }
 };
 

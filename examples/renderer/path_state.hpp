@@ -85,6 +85,10 @@ struct light_query {
   float pdf = 0.0f;      ///< of the direction by light sampling, per steradian; huge where nothing rivals it
   vec3 value{0.0f};      ///< BSDF, cosine and radiance over that pdf
   std::uint32_t choice = wfpg::no_light_choice;  ///< of its group
+
+  light_query() = default;
+  /// Nothing to add came of a choice.
+  WFPG_HD explicit light_query(std::uint32_t of) : choice(of) {}
 };
 
 /// The paths that go on, in the order of their materials: slot -> path.

@@ -27,9 +27,7 @@ constexpr int largest_depth = 1024;
 void require_guided_files(const render_options& options) {
   using wfpg::detail::require;
   const std::string& method = name_of(method_names(), options.method);
-  const bool guided =
-      options.method == sampling_method::wfpg || options.method == sampling_method::wfpg_product;
-  require(guided || (options.load_guide.empty() && !options.keep_guide), "method", method,
+  require(is_wfpg(options.method) || (options.load_guide.empty() && !options.keep_guide), "method", method,
           "wfpg or wfpg-product where a guide is loaded or saved");
   require(!is_openpgl(options.method) || (options.resume.empty() && !options.keep_state), "method", method,
           "none of Open PGL's where a rendering's state is resumed or saved");

@@ -164,6 +164,10 @@ render_result render_with_openpgl(const scene& scene, const render_options& opti
 /// False where this was built without Open PGL.
 bool has_openpgl();
 
+inline bool is_wfpg(sampling_method method) {
+  return method == sampling_method::wfpg || method == sampling_method::wfpg_product;
+}
+
 inline bool is_openpgl(sampling_method method) {
   return method == sampling_method::openpgl_vmm || method == sampling_method::openpgl_dqt;
 }

@@ -89,7 +89,9 @@ void take_samples(path_tracer<Exec, Caster>& tracer, Guider& guider, const pinho
   result.report.spp = budget.samples();
 }
 
-inline wfpg::guider_options guider_options_of(const render_options& options) {
+/// `shares`: of the groups of lights that there are to choose from.
+inline wfpg::guider_options guider_options_of(const render_options& options,
+                                              const std::vector<float>& shares) {
   wfpg::guider_options guided;
   guided.octree_resolution = options.octree_resolution;
   guided.fields =
@@ -99,6 +101,7 @@ inline wfpg::guider_options guider_options_of(const render_options& options) {
   guided.kept.recast = options.recast;
   guided.kept.budget_bytes = options.field_budget;
   guided.caster_buffer_bytes = options.caster_buffer;
+  if (options.nee && shares.size() > 1) guided.lights.weights = shares;
   if (options.method == sampling_method::wfpg_product) guided.product_resolution = options.product_resolution;
   guided.rays_per_bin = options.rays_per_bin;
   guided.min_bin_level = options.min_bin_level;
@@ -139,9 +142,7 @@ render_result render_by(const Exec& exec, const scene& scene, const render_optio
 
   const device_scene<Exec> geometry(exec, scene);
   // Groups are for who learns to choose between them.
-  const bool chooses =
-      options.method == sampling_method::wfpg || options.method == sampling_method::wfpg_product;
-  const light_distribution<Exec> lights(exec, scene, chooses ? options.light_groups : 1);
+  const light_distribution<Exec> lights(exec, scene, is_wfpg(options.method) ? options.light_groups : 1);
   std::unique_ptr<const Accelerated> accelerated;
   building.measure(Accelerated::name,
                    [&] { accelerated = std::make_unique<const Accelerated>(exec, scene, geometry.view()); });
@@ -178,9 +179,8 @@ render_result render_on(const Exec& exec, const scene& scene, const render_optio
         } else {
           const wfpg::triangle_mesh_view mesh{geometry.positions, geometry.triangles};
           const stopwatch build;
-          wfpg::guider_options guided = guider_options_of(options);
-          if (options.nee && lights.shares().size() > 1) guided.lights.weights = lights.shares();
-          wfpg::path_guider<Exec> guider = begin_guider(exec, mesh, guided, options, result.guide);
+          wfpg::path_guider<Exec> guider =
+              begin_guider(exec, mesh, guider_options_of(options, lights.shares()), options, result.guide);
           building.add("octree", build.seconds());
           result.report.octree.build_seconds = build.seconds();
           take_samples(tracer, guider, camera, options, progress, result);

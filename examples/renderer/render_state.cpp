@@ -47,6 +47,7 @@ void add_guider_values(const render_options& o, named_values& values) {
     values.emplace_back("--field-resolution", to_string(o.field_resolution));
   if (o.method == sampling_method::wfpg_product)
     values.emplace_back("--product-resolution", to_string(o.product_resolution));
+  if (o.nee) values.emplace_back("--light-groups", to_string(o.light_groups));
 }
 
 named_values values_of(const render_options& o) {
@@ -57,8 +58,6 @@ named_values values_of(const render_options& o) {
                          {"--method", name_of(method_names(), o.method)},
                          {"--combine", name_of(combination_names(), combination_of(o))}};
   if (o.method != sampling_method::pt) add_guider_values(o, values);
-  if (o.method != sampling_method::pt && o.nee)
-    values.emplace_back("--light-groups", std::to_string(o.light_groups));
   return values;
 }
 

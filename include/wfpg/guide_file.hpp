@@ -3,18 +3,16 @@
 // waves it draws the same directions, to the bit on the CPU policies, whichever of them saved it.
 //
 // A guide file of version 1, little-endian; detail/section_file.hpp has what is around the sections:
-//   options  octree_resolution, mode, fields, kept.resolution and kept.learn (0 of transient fields), groups
-//   of
-//            lights and lights.resolution (0 without), 4 each
+//   options  octree_resolution, mode, fields, kept.resolution and kept.learn (0 of transient fields),
+//            groups of lights and lights.resolution (0 without), 4 each
 //   octree   origin and side of its cube (4 floats), Morton codes of the leaves in order (8 each)
 //   cache    normals (2 a node), swapped sides (1 an inner node); a leaf and side: mean (8) and count (4);
 //            deposits dropped (3 x 4)
 //   counts   samples, triangles left out (3), vertices dropped, 4 each; a depth: bins, rays, unbinned, cones,
 //            8 each
 // and of kept fields
-//   levels   samples counted, sample until which fields are built in every wave, 4 each; rays a leaf (4
-//   each),
-//            level of the node that they belong to (1 each)
+//   levels   samples counted, sample until which fields are built in every wave, 4 each; rays a leaf
+//            (4 each), level of the node that they belong to (1 each)
 //   fields   pressure, births refused, delayed, refused since the last marking (4 each), born, refreshed (8
 //            each), whether fields learn (4); a slot in use: its number, key, last use, last build, builds (4
 //            each), normal and fraction (4 floats), and where the fraction is positive its cells: summed-area
@@ -51,12 +49,11 @@ void save_guide(const path_guider<Exec>& guider, const std::string& path) {
 
 /// A guider in the state that was saved. Those of `options` that decide how state is laid out
 /// (octree_resolution, mode, fields, kept.resolution, kept.learn, the number of lights.weights and
-/// lights.resolution) are to be what they were, and
-/// kept.budget_bytes to have room; the others may differ, and are not in the file. Reads up to the guide's
-/// end and no further. Throws file_error that says what is wrong: no guide file, a newer version, where it is
-/// truncated, which section is altered, which option differs; std::invalid_argument for options out of range,
-/// out_of_memory. What is there decides the memory taken, not what the file says. O(bytes), and the octree is
-/// built.
+/// lights.resolution) are to be what they were, and kept.budget_bytes to have room; the others may differ,
+/// and are not in the file. Reads up to the guide's end and no further. Throws file_error that says what is
+/// wrong: no guide file, a newer version, where it is truncated, which section is altered, which option
+/// differs; std::invalid_argument for options out of range, out_of_memory. What is there decides the memory
+/// taken, not what the file says. O(bytes), and the octree is built.
 template <class Exec>
 path_guider<Exec> load_guide(const Exec& exec, std::istream& in, const guider_options& options,
                              const std::string& name = "the guide") {

@@ -13,6 +13,7 @@
 #include <wfpg/detail/value_queue.hpp>
 #include <wfpg/error.hpp>
 #include <wfpg/sparse_voxel_octree.hpp>
+#include <wfpg/spatial_binner.hpp>
 
 #include <vector>
 
@@ -54,7 +55,7 @@ class light_guide_view {
   WFPG_HD std::uint32_t find(vec3 position, vec3 normal) const {
     const node_id leaf = tree_.nearest_leaf(position);
     const node_id node = leaf == invalid_node ? 0 : tree_.ancestor(leaf, level_);
-    return static_cast<std::uint32_t>(rows_.row(node, detail::light_rows::face_along(normal)));
+    return static_cast<std::uint32_t>(rows_.row(node, dominant_axis(normal)));
   }
 
   /// A group of lights for a row from u in [0, 1). O(log groups).
@@ -74,8 +75,7 @@ class light_guide_view {
   /// The probability with which choose() gives a group: what the MIS weight of an emitter hit by chance
   /// needs.
   WFPG_HD float probability(std::uint32_t row, std::uint32_t group) const {
-    const float* const sums = sums_ + std::size_t(row) * rows_.groups;
-    return group > 0 ? sums[group] - sums[group - 1] : sums[0];
+    return rows_.probability(sums_, row, group);
   }
 
   /// What came of a choice: the estimate of the luminance that the point scatters toward the viewer, BSDF,

@@ -6,7 +6,8 @@
 
 namespace wfpg::detail {
 
-/// Rows of an octree's nodes, one for each of six faces, and in each row one element a group of lights.
+/// Rows of an octree's nodes, one for each dominant_axis of a normal, and in each row one element a group of
+/// lights.
 struct light_rows {
   static constexpr std::uint32_t faces = 6;
 
@@ -20,12 +21,10 @@ struct light_rows {
     return row(tree.level_begin(level), 0);
   }
 
-  /// The face that a unit normal points to most: +x, -x, +y, -y, +z, -z.
-  WFPG_HD static std::uint32_t face_along(vec3 n) {
-    const vec3 a = glm::abs(n);
-    const std::uint32_t axis = a.x >= a.y && a.x >= a.z ? 0u : (a.y >= a.z ? 1u : 2u);
-    const float along = axis == 0 ? n.x : (axis == 1 ? n.y : n.z);
-    return 2 * axis + (along < 0.0f ? 1u : 0u);
+  /// The probability of a group; `sums` are of the probabilities of each row's groups and those before them.
+  WFPG_HD float probability(const float* sums, std::size_t row, std::uint32_t group) const {
+    const float* const through = sums + row * groups;
+    return group > 0 ? through[group] - through[group - 1] : through[0];
   }
 };
 
@@ -82,36 +81,38 @@ struct choose_light_groups {
 
   WFPG_HD void operator()(std::size_t i) const {
     const std::size_t row = first + i;
+    const node_id up = tree.parent(rows.node_of(row));
+    const std::size_t above = up == invalid_node ? none : rows.row(up, rows.face_of(row));
     float found = 0.0f, expected = 0.0f;
     for (std::uint32_t g = 0; g < rows.groups; ++g) {
       const learnt_mean& mean = means[row * rows.groups + g];
       const auto n = static_cast<float>(mean.count());
       found += n * mean.mean();
-      expected += n * prior(row, g);
+      expected += n * prior(above, g);
     }
     // What a prior of 1 amounts to here. Nothing is known where nothing has been found.
     const float scale = found / max(expected, 1e-6f);
     float total = 0.0f;
-    for (std::uint32_t g = 0; g < rows.groups; ++g) total += estimate(row, g, scale);
+    for (std::uint32_t g = 0; g < rows.groups; ++g) total += estimate(row, above, g, scale);
     float sum = 0.0f;
     for (std::uint32_t g = 0; g < rows.groups; ++g) {
-      sum = min(sum + floor * defensive[g] + (1.0f - floor) * estimate(row, g, scale) / total, 1.0f);
+      sum = min(sum + floor * defensive[g] + (1.0f - floor) * estimate(row, above, g, scale) / total, 1.0f);
       sums[row * rows.groups + g] = sum;
     }
     sums[row * rows.groups + rows.groups - 1] = 1.0f;
   }
 
  private:
-  WFPG_HD float estimate(std::size_t row, std::uint32_t g, float scale) const {
-    if (!(scale > 0.0f)) return prior(row, g);
-    return means[row * rows.groups + g].mixed_with(scale * prior(row, g), parent_weight);
+  static constexpr std::size_t none = ~std::size_t(0);  // what is above the root
+
+  WFPG_HD float estimate(std::size_t row, std::size_t above, std::uint32_t g, float scale) const {
+    if (!(scale > 0.0f)) return prior(above, g);
+    return means[row * rows.groups + g].mixed_with(scale * prior(above, g), parent_weight);
   }
-  WFPG_HD float prior(std::size_t row, std::uint32_t g) const {
-    const node_id up = tree.parent(rows.node_of(row));
-    if (up == invalid_node) return weights[g];
-    const float* const above = sums + rows.row(up, rows.face_of(row)) * rows.groups;
-    const float probability = g > 0 ? above[g] - above[g - 1] : above[0];
-    return max((probability - floor * defensive[g]) / (1.0f - floor), 0.0f);
+  /// `above`: the parent's row.
+  WFPG_HD float prior(std::size_t above, std::uint32_t g) const {
+    if (above == none) return weights[g];
+    return max((rows.probability(sums, above, g) - floor * defensive[g]) / (1.0f - floor), 0.0f);
   }
 };
 
