@@ -231,7 +231,7 @@ std::vector<test_surface> faulty_surfaces_of(std::size_t n) {
   return surfaces;
 }
 
-WFPG_TEST_CASE("path guider: surfaces that are not finite have their BSDF alone, and are counted",
+WFPG_TEST_CASE("path guider: surfaces that are not finite draw nothing without a density",
                "[path_guider][faults]") {
   const auto surfaces = faulty_surfaces_of(360);
   for_each_kind([&](const guider_options& options) {
@@ -241,7 +241,7 @@ WFPG_TEST_CASE("path guider: surfaces that are not finite have their BSDF alone,
     CHECK(count_unsound(box.sample_again(surfaces)) == 0);
     CHECK(count_unsound(box.sample_again(surfaces, marcher)) == 0);
     const auto depth = box.guider.statistics().depths[0];
-    CHECK(depth.unbinned >= 8 * 120);
+    CHECK(depth.unbinned >= 8 * 80);  // by their position or shading normal
     CHECK(depth.rays >= 6 * 240);
     box.guider.end_sample();
     check_guides(box.guider);

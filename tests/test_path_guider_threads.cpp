@@ -52,7 +52,6 @@ std::vector<float> picture_of(std::size_t i) {
   return trace_paths(exec, guider, 3, paths, box_caster());
 }
 
-#if !defined(__CUDACC__)
 WFPG_TEST_CASE("path guider: guiders on threads of their own draw what they draw alone",
                "[path_guider][threads]") {
   std::vector<std::vector<float>> together(threads);
@@ -63,6 +62,7 @@ WFPG_TEST_CASE("path guider: guiders on threads of their own draw what they draw
   }
 }
 
+#if !defined(__CUDACC__)
 /// What the cache's view answers along rays through the box.
 std::vector<float> read_all(const wfpg::exitance_cache_view& cache) {
   std::vector<float> result;

@@ -146,11 +146,13 @@ WFPG_HD grid_distribution finish_field(Block& block, const cell_words& cells, in
                             options.absolute_floor ? 0.0f : options.floor);
 }
 
-/// Where cones from a surface start: off it, on the outgoing side.
+/// Where cones from a surface start: off it, on the outgoing side. A geometric normal that is not finite
+/// gives way to the shading normal.
 template <class Bsdf>
 WFPG_HD vec3 off_surface(const surface<Bsdf>& s, const sparse_voxel_octree_view& tree) {
-  const vec3 off =
-      glm::dot(s.geometric_normal, s.outgoing) >= 0.0f ? s.geometric_normal : -s.geometric_normal;
+  const vec3 n =
+      detail::is_finite(glm::dot(s.geometric_normal, s.geometric_normal)) ? s.geometric_normal : s.normal;
+  const vec3 off = glm::dot(n, s.outgoing) >= 0.0f ? n : -n;
   const float magnitude = max(fabsf(s.position.x), max(fabsf(s.position.y), fabsf(s.position.z)));
   return s.position + off * max(1.0e-4f * magnitude, 1.0e-3f * tree.grid().voxel_size());
 }

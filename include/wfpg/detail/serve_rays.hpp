@@ -158,8 +158,7 @@ struct wave_rays {
     ray_to_bin result;
     result.active = s.active && !s.bsdf.is_delta();
     if (!result.active) return result;
-    const bool is_sound = is_normal(s.normal) && is_finite(glm::dot(s.geometric_normal, s.geometric_normal));
-    result.position = is_sound ? s.position : vec3(bits_float(0x7fc00000u));
+    result.position = is_normal(s.normal) ? s.position : vec3(bits_float(0x7fc00000u));
     if (mode == guiding_mode::oriented)
       result.orientation = s.bsdf.transmits() ? static_cast<std::uint32_t>(orientation_transmits)
                                               : dominant_axis(facing_normal(s));
