@@ -104,11 +104,15 @@ def print_gains(scenes):
                 cells.append(f"{mse:.2f} ({relative:.2f}; {equal:.2f})")
             print(f"| {method} |", " | ".join(cells), "|")
         print()
-    print("| MiB kept |", " | ".join(names), "|")
+    print("| MiB kept (in use) |", " | ".join(names), "|")
     print("| --- " * (1 + len(names)) + "|")
     for i, method in enumerate(methods):
-        kept = [scene["summary"][-1]["methods"][i]["persistent_bytes"] / 2**20 for scene in scenes]
-        print(f"| {method} |", " | ".join(f"{k:.1f}" for k in kept), "|")
+        cells = []
+        for scene in scenes:
+            cost = scene["summary"][-1]["methods"][i]
+            used = f" ({cost['used_bytes'] / 2**20:.1f})" if "used_bytes" in cost else ""
+            cells.append(f"{cost['persistent_bytes'] / 2**20:.1f}{used}")
+        print(f"| {method} |", " | ".join(cells), "|")
 
 
 def print_compilers(compilers):

@@ -281,7 +281,7 @@ TEST_CASE("records survive JSON, infinite errors too", "[quality]") {
   error.relmse_robust = 0.25;
   error.non_finite = 3;
   record.points = {{1, 0.5, {}}, {2, 1.5, error}};
-  record.cost = {2, 1.5, 2.0, 12345678901u, 10, 20, 0.75};
+  record.cost = {2, 1.5, 2.0, 12345678901u, 10, 8, 20, 0.75};
   const json object = quality::to_json(record);
   const quality::run_record back = quality::record_from_json(json::parse(object.dump()));
   CHECK(quality::to_json(back) == object);

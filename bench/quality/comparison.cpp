@@ -6,6 +6,7 @@
 #include "single_samples.hpp"
 #include "stats_json.hpp"
 #include "summary.hpp"
+#include "tiles.hpp"
 
 #include <utility>
 
@@ -58,6 +59,31 @@ std::optional<double> add_flip(std::vector<measured_run>& runs, const reference_
   if (!errors) return std::nullopt;
   for (std::size_t i = 0; i < runs.size(); ++i) runs[i].flip = (*errors)[i + 1];
   return errors->front() ? std::optional<double>(*errors->front() / 2.0) : std::nullopt;
+}
+
+std::vector<std::vector<double>> tiles_by_seed(const std::vector<measured_run>& runs, std::size_t budget,
+                                               std::size_t method) {
+  std::vector<std::vector<double>> seeds;
+  for (const measured_run& run : runs)
+    if (run.budget == budget && run.method == method)
+      seeds.push_back(tiles_of(render::read_exr(run.picture.string())));
+  return seeds;
+}
+
+/// Adds to each method's summary whether its pictures have the baseline's mean.
+void add_agreement(const settings& given, const std::vector<measured_run>& runs, json& summary) {
+  if (given.seeds < least_seeds_for_tiles) return;
+  for (std::size_t b = 0; b < given.budgets.size(); ++b) {
+    const auto baseline = tiles_by_seed(runs, b, baseline_of(given.methods));
+    for (std::size_t m = 0; m < given.methods.size(); ++m) {
+      if (m == baseline_of(given.methods)) continue;
+      const tile_agreement found = agreement_of(tiles_by_seed(runs, b, m), baseline);
+      summary[b]["methods"][m]["tiles"] = {{"count", found.tiles},
+                                           {"beyond_4", found.beyond_4},
+                                           {"worst", found.worst},
+                                           {"mean_square", found.mean_square}};
+    }
+  }
 }
 
 json runs_json(const settings& given, const std::vector<measured_run>& runs) {
@@ -118,6 +144,8 @@ json measure_scene(const settings& given, const scene_plan& plan, runner& runs) 
 
   const scene_files files(given, plan.scene, truth);
   reference_noise noise{truth.noise, add_flip(measured, files.reference(), given.output)};
+  json summary = summary_of(given, measured, noise);
+  add_agreement(given, measured, summary);
   const render::render_options& options = plan.scene.options;
   return {{"scene", plan.scene.title},
           {"identity", plan.identity},
@@ -130,7 +158,7 @@ json measure_scene(const settings& given, const scene_plan& plan, runner& runs) 
             {"noise", render::to_json(noise.error)},
             {"flip_noise", noise.flip ? json(*noise.flip) : json()}}},
           {"files", files.write(measured, single)},
-          {"summary", summary_of(given, measured, noise)},
+          {"summary", summary},
           {"runs", runs_json(given, measured)},
           {"single_samples", single_json(given, single)}};
 }

@@ -44,6 +44,7 @@ json to_json(const run_record& record) {
           {"total_seconds", cost.total_seconds},
           {"segments", cost.segments},
           {"persistent_bytes", cost.persistent_bytes},
+          {"used_bytes", cost.used_bytes},
           {"transient_bytes", cost.transient_bytes},
           {"cones_per_segment", cost.cones_per_segment},
           {"points", points}};
@@ -60,6 +61,7 @@ run_record record_from_json(const json& object) {
   cost.total_seconds = object.at("total_seconds").get<double>();
   cost.segments = object.at("segments").get<std::uint64_t>();
   cost.persistent_bytes = object.at("persistent_bytes").get<std::size_t>();
+  cost.used_bytes = object.at("used_bytes").get<std::size_t>();
   cost.transient_bytes = object.at("transient_bytes").get<std::size_t>();
   cost.cones_per_segment = object.at("cones_per_segment").get<double>();
   return record;
@@ -112,6 +114,7 @@ run_record measured(const render::render_result& result, const render::image& re
                  report.total_seconds,
                  report.segments,
                  report.persistent_bytes,
+                 report.used_bytes,
                  report.transient_bytes,
                  report.cones_per_segment};
   return record;

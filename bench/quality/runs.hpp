@@ -33,6 +33,7 @@ struct run_cost {
   double total_seconds = 0.0;  ///< and of building
   std::uint64_t segments = 0;
   std::size_t persistent_bytes = 0;
+  std::size_t used_bytes = 0;  ///< of them
   std::size_t transient_bytes = 0;
   double cones_per_segment = 0.0;
 };

@@ -90,6 +90,7 @@ json summary_of_method(const runs_of_method& runs, const runs_of_method& baselin
           {"total_seconds", to_json(cost(&run_cost::total_seconds))},
           {"segments", cost(&run_cost::segments).mean},
           {"persistent_bytes", cost(&run_cost::persistent_bytes).mean},
+          {"used_bytes", cost(&run_cost::used_bytes).mean},
           {"transient_bytes", cost(&run_cost::transient_bytes).mean},
           {"cones_per_segment", cost(&run_cost::cones_per_segment).mean},
           {"worst_share",

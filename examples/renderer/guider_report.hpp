@@ -41,6 +41,7 @@ void report_guider(const wfpg::path_guider<Exec>& guider, std::uint64_t segments
   report.slots.capacity = kept.capacity;
   report.slots.live = kept.live;
   report.slots.live_bytes = kept.live * kept.bytes_a_slot;
+  report.used_bytes = report.persistent_bytes - (kept.capacity - kept.live) * kept.bytes_a_slot;
   report.slots.born = static_cast<double>(kept.born) / samples;
   report.slots.freed = static_cast<double>(kept.freed) / samples;
   report.slots.refreshed = static_cast<double>(kept.refreshed) / samples;

@@ -57,6 +57,7 @@ void report_openpgl(const openpgl_guider& guider, render_report& report) {
   // Of a field that has been shown no sample there is nothing to ask.
   if (samples > 0) {
     report.persistent_bytes = stored_bytes(guider.field());
+    report.used_bytes = report.persistent_bytes;
     report.regions = regions_of(guider.field().GetSurfaceStatistics());
   }
   report.transient_bytes = segments + samples;

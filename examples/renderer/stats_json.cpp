@@ -21,6 +21,7 @@ json memory_of(const render_report& report) {
   json memory = json::object();
   for (const auto& [part, bytes] : report.memory) memory[part] = bytes;
   memory["persistent"] = report.persistent_bytes;
+  memory["used"] = report.used_bytes;
   memory["transient"] = report.transient_bytes;
   return memory;
 }
