@@ -172,6 +172,7 @@ TEST_CASE("a rendering does not go on as another one", "[renderer][state]") {
   refused("--octree-resolution 32, not 64", [](render_options& o) { o.octree_resolution = 64; });
   refused("--rays-per-bin 128, not 64", [](render_options& o) { o.rays_per_bin = 64; });
   refused("--min-bin-level 2, not 3", [](render_options& o) { o.min_bin_level = 3; });
+  refused("--deposits-per-leaf 16, not 8", [](render_options& o) { o.deposits_per_leaf = 8; });
   refused("--guide-fraction 0, not 0.25", [](render_options& o) { o.guide_fraction = 0.25f; });
   refused("--slot-resolution 8, not 16", [](render_options& o) { o.slot_resolution = 16; });
   refused("--recast 4, not 8", [](render_options& o) { o.recast = 8; });
