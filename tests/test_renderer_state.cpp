@@ -220,6 +220,7 @@ TEST_CASE("state files that are cut off, altered or foreign are told apart", "[r
   refused(with_number(bytes, "film", 0, 4, 0), "section film has a number of samples out of range");
   refused(with_number(bytes, "film", 4, 8, ~0ull), "section film has a weight out of range");
   refused(with_number(bytes, "guide", 0, 8, ~0ull), "section guide is too short");
+  refused(wfpg_test::with_payload(bytes, "guide", std::string(8, '\0')), ": its guide is not a guide file");
   std::string guide = wfpg_test::payload_of(bytes, "guide");
   guide[guide.size() / 2] ^= 1;
   refused(wfpg_test::with_payload(bytes, "guide", guide), ": its guide is altered: the checksum of section ");
