@@ -1,5 +1,6 @@
 // Owning storage: moves, transfers, what happens when memory runs out, and the resource that keeps blocks.
 #include "support/catch.hpp"
+#include "support/failing_resource.hpp"
 #include "support/policies.hpp"
 
 #include <wfpg/buffer.hpp>
@@ -11,6 +12,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <memory_resource>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -190,6 +192,54 @@ TEST_CASE("a retaining resource gives blocks large enough", "[buffer]") {
     REQUIRE((upstream.live == before || upstream.live - before >= bytes));
   }
   CHECK(upstream.live < 20000);
+}
+
+/// Makes a resource the default one.
+class default_resource_scope {
+ public:
+  explicit default_resource_scope(wfpg::memory_resource* resource)
+      : before_(std::pmr::set_default_resource(resource)) {}
+  default_resource_scope(const default_resource_scope&) = delete;
+  default_resource_scope& operator=(const default_resource_scope&) = delete;
+  ~default_resource_scope() { std::pmr::set_default_resource(before_); }
+
+ private:
+  wfpg::memory_resource* before_;
+};
+
+/// Blocks of some sizes, given back in another order, twice, and all released.
+template <class Exec>
+void use_blocks(const Exec& exec) {
+  for (int round = 0; round < 2; ++round) {
+    wfpg::buffer<char, Exec> first(exec, 1000);
+    const wfpg::buffer<char, Exec> second(exec, 1000), third(exec, 9), fourth(exec, 50000);
+    first = wfpg::buffer<char, Exec>(exec, 300);
+  }
+}
+
+WFPG_TEST_CASE("a retaining resource fails where blocks are asked for, never where they are given back",
+               "[buffer]") {
+  failing_resource upstream, entries(std::pmr::new_delete_resource());
+  const default_resource_scope scope(&entries);
+  const auto use = [&] {
+    wfpg::retaining_resource arena(&upstream);
+    use_blocks(Exec().with_resource(&arena));
+    CHECK(arena.bytes() > 50000);
+  };
+  CHECK(fail_at_each(upstream, use) == 5);
+  upstream.fail_at(0);
+  CHECK(fail_at_each(entries, use) == 5);
+  CHECK((upstream.live() == 0 && entries.live() == 0));
+
+  entries.fail_at(0);
+  wfpg::retaining_resource arena(&upstream);
+  void* const block = arena.allocate(1000, 64);
+  entries.fail_at(1);
+  arena.deallocate(block, 1000, 64);
+  CHECK(entries.asked() == 0);
+  CHECK(arena.allocate(999, 64) == block);
+  arena.deallocate(block, 999, 64);
+  CHECK(entries.asked() == 0);
 }
 
 TEST_CASE("errors name what was wrong", "[error]") {

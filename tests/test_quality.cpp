@@ -1,9 +1,9 @@
-// wfpg-quality: its options, its cache, its statistics and pictures; and whole runs on tiny pictures.
+// The parts of wfpg-quality: statistics, pictures, its cache, references, progress, samples alone. Its
+// options are test_quality_options.cpp's, whole runs test_quality_program.cpp's.
 #include "builtin_scenes.hpp"
 #include "cache.hpp"
 #include "flip.hpp"
 #include "pictures.hpp"
-#include "program.hpp"
 #include "progress.hpp"
 #include "reference.hpp"
 #include "runs.hpp"
@@ -12,13 +12,15 @@
 #include "statistic.hpp"
 #include "summary.hpp"
 #include "support/catch.hpp"
+#include "support/measurements.hpp"
 #include "support/renderer_io.hpp"
 
-#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <optional>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -27,183 +29,23 @@ namespace {
 using namespace render_test;
 using quality::json;
 using render::image;
-using strings = std::vector<std::string>;
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-quality::settings parsed(strings arguments) {
-  arguments.insert(arguments.end(), {"--output", "out"});
-  std::ostringstream out;
-  return quality::parse_settings(arguments, out).value();
-}
-
-/// The message of arguments that cannot be right.
-std::string refused(const strings& arguments) {
-  try {
-    parsed(arguments);
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "nothing was thrown";
-}
-
-/// Runs the program in a folder and says what it logged.
-struct outcome {
-  int code = 0;
-  std::string out, log;
-};
-
-outcome run(strings arguments) {
-  std::ostringstream out, log;
-  const int code = quality::run_program(arguments, out, log);
-  return {code, out.str(), log.str()};
-}
-
-std::size_t count_of(const std::string& text, const std::string& part) {
-  std::size_t count = 0;
-  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++count;
-  return count;
-}
-
-/// A tiny measurement: a reference in two chunks a half, two methods, two seeds.
-strings tiny(const temporary_folder& folder, const strings& more = {}, const std::string& size = "16x16",
-             const std::string& scene = "cornell-box") {
-  strings arguments{"--scenes",
-                    scene,
-                    "--size",
-                    size,
-                    "--spp",
-                    "2",
-                    "--seeds",
-                    "2",
-                    "--reference-spp",
-                    "8",
-                    "--reference-chunk",
-                    "2",
-                    "--method",
-                    "small=--method wfpg --octree-resolution 16 --slot-resolution 8 --field-budget 1MiB",
-                    "--cache",
-                    folder.file("cache"),
-                    "--output",
-                    folder.file("out")};
-  arguments.insert(arguments.end(), more.begin(), more.end());
-  return arguments;
-}
-
-json results_of(const temporary_folder& folder) {
-  return json::parse(content_of(folder.file("out/results.json")));
-}
-
-/// Files of the cache whose names begin so.
-std::vector<std::filesystem::path> cached(const temporary_folder& folder, const std::string& begin,
-                                          const std::string& extension) {
-  std::vector<std::filesystem::path> found;
-  for (const auto& entry : std::filesystem::directory_iterator(folder.file("cache")))
-    if (entry.path().filename().string().rfind(begin, 0) == 0 && entry.path().extension() == extension)
-      found.push_back(entry.path());
-  std::sort(found.begin(), found.end());
-  return found;
+quality::measured_run hand_made(std::size_t method, int seed, double error, double seconds) {
+  quality::measured_run run;
+  run.method = method;
+  run.seed = seed;
+  render::image_error e;
+  e.mse_reinhard = error;
+  e.smape = error;
+  run.record.points = {{4, seconds, e}};
+  run.record.cost.samples = 4;
+  run.record.cost.seconds = seconds;
+  return run;
 }
 
 }  // namespace
-
-TEST_CASE("options: presets hold where nothing is given", "[quality]") {
-  const quality::settings quick = parsed({"--preset", "quick"});
-  CHECK(quick.scenes.size() == 6);
-  CHECK(quick.methods.size() == 3);
-  CHECK(quick.scenes[0].options.width == 104);
-  CHECK_FALSE(quick.scenes[0].options.nee);
-  CHECK(quick.scenes[1].options.nee);
-  const quality::settings own =
-      parsed({"--preset", "quick", "--size", "32x16", "--spp", "1,4", "--seconds", "0.5", "--scenes", "ajar",
-              "ajar --nee off --max-depth 3", "--seeds", "7"});
-  CHECK(own.seeds == 7);
-  CHECK(own.scenes[1].options.height == 16);
-  CHECK(own.scenes[1].options.max_depth == 3);
-  CHECK(own.scenes[1].title == "ajar --nee off --max-depth 3");
-  REQUIRE(own.budgets.size() == 3);
-  CHECK(quality::title_of(own.budgets[0]) == "1 sample");
-  CHECK(quality::title_of(own.budgets[2]) == "0.5 s");
-  const quality::settings paper = parsed({"--preset", "paper"});
-  const render::render_options options = quality::options_of(paper.scenes[0], paper.methods[1]);
-  CHECK(options.min_bin_level == 5);
-  CHECK(options.rays_per_bin == 512);
-  CHECK(options.octree_resolution == 128);
-  CHECK(options.field_resolution == 128);
-  CHECK(options.lifetime == render::fields::transient);
-  CHECK(options.combine == wfpg::sample_combination::pt_first);
-  CHECK(options.nee);
-}
-
-TEST_CASE("options: methods are known, one's own, or wfpg-render's", "[quality]") {
-  const quality::settings given = parsed({"--methods", "pt,small,wfpg-transient-plain", "--method",
-                                          "small=--method wfpg --slot-resolution 16 --nee off --device seq",
-                                          "--method", "more=--recast 4"});
-  REQUIRE(given.methods.size() == 4);
-  CHECK(given.methods[1].name == "small");
-  CHECK(given.methods[3].name == "more");
-  const render::render_options small = quality::options_of(given.scenes[1], given.methods[1]);
-  CHECK(small.slot_resolution == 16);
-  CHECK_FALSE(small.nee);
-  CHECK(small.where == render::device::seq);
-  CHECK(quality::options_of(given.scenes[0], given.methods[2]).mode == render::guiding::plain);
-  // Beside path tracing where no others are named.
-  const quality::settings own = parsed({"--method", "more=--recast 4"});
-  REQUIRE(own.methods.size() == 2);
-  CHECK(own.methods[0].name == "pt");
-}
-
-TEST_CASE("options: what cannot be right is said", "[quality]") {
-  CHECK(contains(refused({"--preset", "best"}), "best"));
-  CHECK(contains(refused({"--spp", "0"}), "0"));
-  CHECK(contains(refused({"--seconds", "-1"}), "seconds"));
-  CHECK(contains(refused({"--seeds", "0"}), "seeds"));
-  CHECK(contains(refused({"--reference-spp", "1"}), "reference-spp"));
-  CHECK(contains(refused({"--per-sample", "1"}), "per-sample"));
-  CHECK(contains(refused({"--device", "abacus"}), "abacus"));
-  CHECK(contains(refused({"--size", "12"}), "WIDTHxHEIGHT"));
-  CHECK(contains(refused({"--crop", "1,2,3"}), "--crop"));
-  CHECK(contains(refused({"--crop", "1,2,3x0"}), "--crop"));
-  CHECK(contains(refused({"--exposure", "0"}), "exposure"));
-  CHECK(contains(refused({"--methods", "best"}), "best"));
-  CHECK(contains(refused({"--method", "without-equals"}), "NAME=OPTIONS"));
-  CHECK(contains(refused({"--method", "=--method pt"}), "NAME=OPTIONS"));
-  CHECK(contains(refused({"--method", "a b=--method pt"}), "NAME=OPTIONS"));
-  CHECK(contains(refused({"--method", "a=--method best"}), "method a"));
-  CHECK(contains(refused({"--method", "a=--spp 3"}), "--spp"));
-  CHECK(contains(refused({"--method", "a=--product-resolution 8"}), "wfpg-product"));
-  CHECK(contains(refused({"--methods", "pt", "pt"}), "two methods"));
-  CHECK(contains(refused({"--scenes", "ajar --spp 3"}), "--spp"));
-  CHECK(contains(refused({"--scenes", "ajar", "ajar"}), "two scenes"));
-  CHECK(contains(refused({"--scene", "ajar"}), "--scene"));
-  std::ostringstream out;
-  CHECK_FALSE(quality::parse_settings({"--help"}, out).has_value());
-  for (const char* const option :
-       {"--preset", "--scenes", "--methods", "--method", "--spp", "--seconds", "--seeds", "--size",
-        "--reference-spp", "--nee", "--device", "--per-sample", "--cache"})
-    CHECK(contains(out.str(), option));
-}
-
-TEST_CASE("options: scenes in files", "[quality]") {
-  temporary_folder folder;
-  const std::string spaced = folder.write("a room --nee off.glb", "");
-  const quality::settings given = parsed({"--scenes", "a/b/room.glb --nee off", "c/hall.gltf", spaced});
-  CHECK(given.scenes[0].source == "a/b/room.glb");
-  CHECK(given.scenes[0].title == "room.glb --nee off");
-  CHECK_FALSE(given.scenes[0].options.nee);
-  CHECK(given.scenes[1].title == "hall.gltf");
-  CHECK(given.scenes[2].source == spaced);
-  CHECK(given.scenes[2].title == "a room --nee off.glb");
-  CHECK(given.scenes[2].options.nee);
-}
-
-TEST_CASE("options: names of files", "[quality]") {
-  CHECK(quality::file_name_of("ajar --nee off") == "ajar-nee-off");
-  CHECK(quality::file_name_of("a/b: c*") == "a-b-c-");
-  CHECK(quality::title_of_seconds(3.2) == "4 s");
-  CHECK(quality::title_of_seconds(600.0) == "10 min");
-  CHECK(quality::title_of_seconds(9000.0) == "2.5 h");
-}
 
 TEST_CASE("statistics of hand-made values", "[quality]") {
   const quality::statistic one = quality::statistic_of({3.0});
@@ -221,23 +63,6 @@ TEST_CASE("statistics of hand-made values", "[quality]") {
   CHECK_FALSE(quality::ratio_of(one, {-1.0, {}, {}}).has_value());
   CHECK_FALSE(quality::ratio_of({infinite, {}, {}}, one).has_value());
 }
-
-namespace {
-
-quality::measured_run hand_made(std::size_t method, int seed, double error, double seconds) {
-  quality::measured_run run;
-  run.method = method;
-  run.seed = seed;
-  render::image_error e;
-  e.mse_reinhard = error;
-  e.smape = error;
-  run.record.points = {{4, seconds, e}};
-  run.record.cost.samples = 4;
-  run.record.cost.seconds = seconds;
-  return run;
-}
-
-}  // namespace
 
 TEST_CASE("summaries: noise, gains and equal time by hand", "[quality]") {
   const quality::settings given = parsed({"--methods", "pt,wfpg", "--spp", "4", "--seeds", "2"});
@@ -454,105 +279,6 @@ TEST_CASE("single samples add up to what the renderer combines itself", "[qualit
   one.alone.by_measure["smape"] = {1.0, 2.0};
   two.alone.by_measure["smape"] = {3.0, 6.0};
   CHECK(quality::mean_of({one, two}).alone.by_measure.at("smape") == std::vector<double>{2.0, 4.0});
-}
-
-TEST_CASE("a whole run, and one after it that renders nothing", "[quality]") {
-  temporary_folder folder;
-  const outcome first = run(tiny(folder, {"--per-sample", "3"}));
-  INFO(first.log);
-  REQUIRE(first.code == 0);
-  CHECK(count_of(first.log, "in the cache") == 0);
-  CHECK(count_of(first.log, "] cornell-box, ") == 12);
-  const json results = results_of(folder);
-  const json& scene = results["scenes"][0];
-  CHECK(results["command"].get<std::string>().rfind("wfpg-quality --scenes", 0) == 0);
-  CHECK(scene["runs"].size() == 4);
-  CHECK(scene["runs"][0]["points"].size() == 2);
-  CHECK(scene["summary"][0]["methods"][1]["method"] == "small");
-  CHECK(scene["summary"][0]["methods"][1]["persistent_bytes"].get<double>() > 0.0);
-  CHECK(scene["summary"][0]["methods"][0]["persistent_bytes"].get<double>() == 0.0);
-  CHECK(scene["single_samples"]["small"]["combined"].size() == 7);
-  CHECK(scene["reference"]["noise"]["mse_reinhard"].get<double>() > 0.0);
-  const std::string markdown = content_of(folder.file("out/results.md"));
-  CHECK(contains(markdown, "| small | 2 |"));
-  CHECK(contains(markdown, "| small | pt-linear |"));
-  CHECK(scene["files"]["plots"].size() == 3);
-  for (const json& row : scene["files"]["plots"])
-    for (const json& file : row)
-      CHECK(std::filesystem::exists(folder.file("out/" + file.get<std::string>())));
-  CHECK(scene["files"]["single_samples"][0].size() == 2);
-  CHECK(std::filesystem::exists(
-      folder.file("out/" + scene["files"]["pictures"][0]["crops"].get<std::string>())));
-  CHECK(std::filesystem::exists(
-      folder.file("out/" + scene["files"]["pictures"][0]["errors"].get<std::string>())));
-
-  const outcome second = run(tiny(folder, {"--per-sample", "3"}));
-  CHECK(count_of(second.log, "in the cache") == 12);
-  CHECK(results_of(folder) == results);
-  CHECK(content_of(folder.file("out/results.md")) == markdown);
-}
-
-TEST_CASE("an interrupted run goes on, and damage is rendered again", "[quality]") {
-  temporary_folder folder;
-  REQUIRE(run(tiny(folder)).code == 0);
-  const auto errors = [&folder] {
-    std::vector<double> values;
-    const json results = results_of(folder);
-    for (const json& r : results["scenes"][0]["runs"])
-      values.push_back(r["points"].back()["error"]["mse_reinhard"]);
-    return values;
-  };
-  const std::vector<double> before = errors();
-  // As if interrupted: one chunk of the reference and one rendering are not there yet.
-  std::filesystem::remove(cached(folder, "reference-", ".json").at(2));
-  std::filesystem::remove(cached(folder, "cornell-box-small-2-samples-2", ".json").at(0));
-  outcome again = run(tiny(folder));
-  CHECK(again.code == 0);
-  CHECK(count_of(again.log, "in the cache") == 6);
-  CHECK(errors() == before);
-  // Damaged: a picture and a record.
-  const std::string picture = cached(folder, "cornell-box-pt-2-samples-1", ".exr").at(0).string();
-  std::filesystem::resize_file(picture, 100);
-  const std::string record = cached(folder, "cornell-box-small-2-samples-1", ".json").at(0).string();
-  std::filesystem::resize_file(record, 50);
-  again = run(tiny(folder));
-  CHECK(again.code == 0);
-  CHECK(count_of(again.log, "in the cache") == 6);
-  CHECK(contains(again.log, picture));
-  CHECK(contains(again.log, record));
-  CHECK(errors() == before);
-  // Another size is another rendering.
-  again = run(tiny(folder, {}, "8x8"));
-  CHECK(again.code == 0);
-  CHECK(count_of(again.log, "in the cache") == 0);
-}
-
-TEST_CASE("failures are one message and exit code 2", "[quality]") {
-  temporary_folder folder;
-  const auto message_of = [&folder](const strings& more, const std::string& scene = "cornell-box") {
-    const outcome failed = run(tiny(folder, more, "16x16", scene));
-    CHECK(failed.code == 2);
-    return failed.log;
-  };
-  CHECK(contains(message_of({}, "nowhere"), "nowhere"));
-  CHECK(contains(message_of({}, folder.file("none.glb")), "none.glb"));
-  CHECK(contains(message_of({"--method", "odd=--octree-resolution 100"}), "method odd: "));
-  CHECK(contains(message_of({"--method", "odd=--combine discard-first", "--spp", "1"}), "method odd: "));
-  CHECK(contains(message_of({"--crop", "10,10,16x16"}), "--crop"));
-  CHECK(run({"--help"}).code == 0);
-  CHECK(run({}).code == 2);
-}
-
-TEST_CASE("seconds are a budget too", "[quality]") {
-  temporary_folder folder;
-  const outcome timed = run(tiny(folder, {"--seconds", "0.02"}));
-  INFO(timed.log);
-  REQUIRE(timed.code == 0);
-  const json scene = results_of(folder)["scenes"][0];
-  CHECK(scene["summary"].size() == 2);
-  CHECK(scene["summary"][1]["budget"] == "0.02 s");
-  for (const json& r : scene["runs"])
-    if (r["budget"] == "0.02 s") CHECK(r["points"].back()["samples"] == r["samples"]);
 }
 
 TEST_CASE("HDR-FLIP: nothing where it cannot be had, zero of a picture against itself", "[quality]") {

@@ -172,6 +172,7 @@ TEST_CASE("a rendering does not go on as another one", "[renderer][state]") {
   refused("--octree-resolution 32, not 64", [](render_options& o) { o.octree_resolution = 64; });
   refused("--rays-per-bin 128, not 64", [](render_options& o) { o.rays_per_bin = 64; });
   refused("--min-bin-level 2, not 3", [](render_options& o) { o.min_bin_level = 3; });
+  refused("--deposits-per-leaf 16, not 8", [](render_options& o) { o.deposits_per_leaf = 8; });
   refused("--guide-fraction 0, not 0.25", [](render_options& o) { o.guide_fraction = 0.25f; });
   refused("--slot-resolution 8, not 16", [](render_options& o) { o.slot_resolution = 16; });
   refused("--recast 4, not 8", [](render_options& o) { o.recast = 8; });
@@ -219,6 +220,7 @@ TEST_CASE("state files that are cut off, altered or foreign are told apart", "[r
   refused(with_number(bytes, "film", 0, 4, 0), "section film has a number of samples out of range");
   refused(with_number(bytes, "film", 4, 8, ~0ull), "section film has a weight out of range");
   refused(with_number(bytes, "guide", 0, 8, ~0ull), "section guide is too short");
+  refused(wfpg_test::with_payload(bytes, "guide", std::string(8, '\0')), ": its guide is not a guide file");
   std::string guide = wfpg_test::payload_of(bytes, "guide");
   guide[guide.size() / 2] ^= 1;
   refused(wfpg_test::with_payload(bytes, "guide", guide), ": its guide is altered: the checksum of section ");

@@ -1,6 +1,6 @@
 // Guiding changes the noise of a picture and not its mean: tile means of pt and wfpg agree within their
-// standard errors. Pictures are bit-identical on all policies (test_renderer.cpp), so one policy speaks for
-// all.
+// standard errors. Pictures are bit-identical on all policies (test_renderer_render.cpp), so one policy
+// speaks for all.
 #include "support/catch.hpp"
 #include "support/renderings.hpp"
 

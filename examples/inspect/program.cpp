@@ -16,7 +16,8 @@ namespace {
 constexpr int failure = 2;
 
 struct arguments {
-  std::string scene, environment, output = "inspection";
+  render::scene_arguments scene;
+  std::string output = "inspection";
   inspection asked;
 };
 
@@ -27,16 +28,13 @@ void parse_pixel(const std::string& text, inspection& asked) {
 }
 
 void add_options(CLI::App& app, arguments& given) {
-  app.add_option("SCENE", given.scene, "a .glb or .gltf file, or one of: " + render::listed_builtin_scenes())
-      ->required();
+  render::add_scene_options(app, given.scene);
   app.add_option_function<std::string>(
          "--pixel", [&given](const std::string& text) { parse_pixel(text, given.asked); },
          "X,Y from the upper left: what its middle hits is looked at")
       ->required();
   app.add_option("-o,--output", given.output, "folder of the page and its pictures (default: inspection)");
   app.add_option("--vdb", given.asked.vdb, "the octree's voxels, OpenVDB");
-  app.add_option("--environment", given.environment,
-                 "light from all directions, OpenEXR or .hdr, equirectangular (default: the scene's)");
   app.add_option("--load-guide", given.asked.learning.load_guide,
                  "guide to begin with, of the same scene and options");
   app.add_option("--reference-spp", given.asked.reference_spp,
@@ -54,11 +52,7 @@ void add_options(CLI::App& app, arguments& given) {
 }
 
 void inspect_scene(arguments& given, std::ostream& out, std::ostream& log) {
-  render::scene scene = render::load_scene(given.scene);
-  if (!given.environment.empty()) scene.sky = render::read_environment(given.environment);
-  for (const std::string& warning : scene.warnings) log << "wfpg-inspect: warning: " << warning << '\n';
-  if (render::is_dark(scene))
-    log << "wfpg-inspect: warning: the scene has no light: there is nothing to learn\n";
+  const render::scene scene = render::load_scene(given.scene, given.asked.learning, "wfpg-inspect", log);
   given.asked.output = given.output;
   run(scene, given.asked, log);
   out << (given.asked.output / "index.html").string() << '\n';

@@ -21,16 +21,13 @@ constexpr int failure = 2;
 constexpr int interrupted = 3;
 
 struct arguments {
-  std::string scene, environment, output, png, stats, reference, save_guide, save_state;
+  render::scene_arguments scene;
+  std::string output, png, stats, reference, save_guide, save_state;
   float exposure = 1.0f;  // of the PNG
   render::render_options options;
 };
 
 void add_file_options(CLI::App& app, arguments& given) {
-  app.add_option("SCENE", given.scene, "a .glb or .gltf file, or one of: " + render::listed_builtin_scenes())
-      ->required();
-  app.add_option("--environment", given.environment,
-                 "light from all directions, OpenEXR or .hdr, equirectangular (default: the scene's)");
   app.add_option("-o,--output", given.output, "picture, OpenEXR");
   app.add_option("--png", given.png, "picture, sRGB PNG");
   app.add_option("--exposure", given.exposure, "multiplies the PNG's values (default: 1)")
@@ -68,13 +65,7 @@ void print_error(const render::image_error& error) {
 }
 
 int run(arguments& given) {
-  render::scene scene = render::load_scene(given.scene);
-  if (!given.environment.empty()) scene.sky = render::read_environment(given.environment);
-  for (const std::string& warning : scene.warnings) std::cerr << "wfpg-render: warning: " << warning << '\n';
-  if (!scene.punctual_lights.empty() && !given.options.nee)
-    std::cerr << "wfpg-render: warning: point, spot and directional lights are lost with --nee off\n";
-  if (render::is_dark(scene))
-    std::cerr << "wfpg-render: warning: the scene has no light: the picture is black\n";
+  const render::scene scene = render::load_scene(given.scene, given.options, "wfpg-render", std::cerr);
   // Read before rendering, so that a wrong path costs no time.
   std::optional<render::image> reference;
   if (!given.reference.empty()) reference = render::read_exr(given.reference);
@@ -102,6 +93,7 @@ int run(arguments& given) {
 int main(int argc, char** argv) {
   arguments given;
   CLI::App app{"Renders a scene by wavefront path tracing, with or without path guiding."};
+  render::add_scene_options(app, given.scene);
   add_file_options(app, given);
   add_state_options(app, given);
   render::add_method_options(app, given.options);

@@ -3,6 +3,7 @@
 
 #include "builtin_scenes.hpp"
 #include "gltf_loader.hpp"
+#include "image_io.hpp"
 #include "option_names.hpp"
 
 #include <CLI/CLI.hpp>
@@ -35,6 +36,13 @@ void parse_size(const std::string& text, render_options& options) {
 }
 
 }  // namespace
+
+void add_scene_options(CLI::App& app, scene_arguments& given) {
+  app.add_option("SCENE", given.name, "a .glb or .gltf file, or one of: " + listed_builtin_scenes())
+      ->required();
+  app.add_option("--environment", given.environment,
+                 "light from all directions, OpenEXR or .hdr, equirectangular (default: the scene's)");
+}
 
 void add_method_options(CLI::App& app, render_options& options) {
   add_choice<sampling_method>(app, "--method", options.method, method_names(),
@@ -100,6 +108,8 @@ void add_guider_options(CLI::App& app, render_options& options) {
       ->check(CLI::IsMember({4, 8, 16}));
   app.add_option("--rays-per-bin", options.rays_per_bin, "rays that a bin should have (default: 64)");
   app.add_option("--min-bin-level", options.min_bin_level, "octree level of the largest bins (default: 3)");
+  app.add_option("--deposits-per-leaf", options.deposits_per_leaf,
+                 "so many deposits a leaf of the octree are recorded in a sample; 0: all (default: 16)");
   app.add_option("--guide-fraction", options.guide_fraction,
                  "samples drawn from fields (default: the mode's)")
       ->check(CLI::Range(0.0, 1.0));
@@ -128,6 +138,18 @@ scene load_scene(const std::string& name) {
   if (extension == ".glb" || extension == ".gltf") return load_gltf(name);
   throw std::invalid_argument("SCENE is " + name + ", expected a .glb or .gltf file or one of " +
                               listed_builtin_scenes());
+}
+
+scene load_scene(const scene_arguments& given, const render_options& options, const std::string& program,
+                 std::ostream& log) {
+  scene scene = load_scene(given.name);
+  if (!given.environment.empty()) scene.sky = read_environment(given.environment);
+  const std::string begin = program + ": warning: ";
+  for (const std::string& warning : scene.warnings) log << begin << warning << '\n';
+  if (!scene.punctual_lights.empty() && !options.nee)
+    log << begin << "point, spot and directional lights are lost with --nee off\n";
+  if (is_dark(scene)) log << begin << "the scene has no light: the picture is black\n";
+  return scene;
 }
 
 bool is_dark(const scene& scene) {

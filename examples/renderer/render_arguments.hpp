@@ -4,6 +4,7 @@
 #include "render.hpp"
 #include "scene.hpp"
 
+#include <ostream>
 #include <string>
 
 namespace CLI {
@@ -12,7 +13,13 @@ class App;
 
 namespace render {
 
-/// Options that write to `options`, which outlives the parsing; what is not given keeps its value.
+/// The scene of a command line.
+struct scene_arguments {
+  std::string name, environment;  ///< the environment's file: in place of the scene's own where there is one
+};
+
+/// Options that write to their last argument, which outlives the parsing; what is not given keeps its value.
+void add_scene_options(CLI::App& app, scene_arguments& given);  ///< SCENE, --environment
 void add_method_options(CLI::App& app,
                         render_options& options);                ///< --method, --guiding, --fields, --combine
 void add_device_option(CLI::App& app, render_options& options);  ///< --device
@@ -30,6 +37,11 @@ std::string listed_builtin_scenes();
 /// A built-in scene, or a .glb or .gltf file's. Throws std::invalid_argument for other names,
 /// std::runtime_error for files that cannot be read.
 scene load_scene(const std::string& name);
+
+/// The same for a command line, with its environment. Warns, in the name of `program`, of what its file asks
+/// for and is not done, of lights that are lost, and where there are none.
+scene load_scene(const scene_arguments& given, const render_options& options, const std::string& program,
+                 std::ostream& log);
 
 /// Nothing in the scene emits: its picture is black.
 bool is_dark(const scene& scene);

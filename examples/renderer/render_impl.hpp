@@ -105,6 +105,7 @@ inline wfpg::guider_options guider_options_of(const render_options& options,
   if (options.method == sampling_method::wfpg_product) guided.product_resolution = options.product_resolution;
   guided.rays_per_bin = options.rays_per_bin;
   guided.min_bin_level = options.min_bin_level;
+  guided.deposits_per_leaf = options.deposits_per_leaf;
   guided.mode = options.mode == guiding::plain ? wfpg::guiding_mode::plain : wfpg::guiding_mode::oriented;
   guided.guide_fraction = options.guide_fraction;
   guided.kept.learn = options.learn;

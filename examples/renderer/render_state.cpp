@@ -37,6 +37,7 @@ void add_guider_values(const render_options& o, named_values& values) {
                                {"--octree-resolution", to_string(o.octree_resolution)},
                                {"--rays-per-bin", to_string(o.rays_per_bin)},
                                {"--min-bin-level", to_string(o.min_bin_level)},
+                               {"--deposits-per-leaf", to_string(o.deposits_per_leaf)},
                                {"--guide-fraction", fraction}});
   if (o.lifetime == fields::kept)
     values.insert(values.end(), {{"--slot-resolution", to_string(o.slot_resolution)},

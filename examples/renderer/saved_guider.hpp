@@ -10,14 +10,14 @@
 
 namespace render {
 
-/// A guider over a scene's triangles: in the state that a guide file's bytes hold, where there are some, or a
-/// file that options name, and else one that knows nothing yet. Throws wfpg::file_error.
+/// A guider over a scene's triangles: in the state that a guide file's bytes hold, where a rendering goes on,
+/// or a file that options name, and else one that knows nothing yet. Throws wfpg::file_error.
 template <class Exec>
 wfpg::path_guider<Exec> begin_guider(const Exec& exec, const wfpg::triangle_mesh_view& mesh,
                                      const wfpg::guider_options& guided, const render_options& options,
                                      const std::string& saved) {
   if (!options.load_guide.empty()) return wfpg::load_guide(exec, options.load_guide, guided);
-  if (saved.empty()) return wfpg::path_guider<Exec>(exec, mesh, guided);
+  if (options.resume.empty()) return wfpg::path_guider<Exec>(exec, mesh, guided);
   std::istringstream bytes(saved);
   return wfpg::load_guide(exec, bytes, guided, options.resume + ": its guide");
 }

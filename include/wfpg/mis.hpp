@@ -155,8 +155,7 @@ struct basic_guide_mixture {
 
 /// A field and a BSDF.
 using guide_mixture = basic_guide_mixture<directional_field>;
-/// `fraction` below 1: where a product is 0 and the BSDF is not, the BSDF has to draw.
-/// A product and a BSDF.
+/// A product and a BSDF. `fraction` below 1: where a product is 0 and the BSDF is not, the BSDF has to draw.
 using product_mixture = basic_guide_mixture<product_field>;
 
 }  // namespace wfpg

@@ -1,41 +1,18 @@
 // The glTF loader on any bytes: a scene that holds together, or an error with the path and a reason.
 #include "gltf_loader.hpp"
+#include "memory_file.hpp"
+#include "require.hpp"
 
 #include <wfpg/detail/math.hpp>
 
-#include <sys/mman.h>
-#include <unistd.h>
-
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <stdexcept>
 #include <string>
 
 namespace {
 
 using wfpg::detail::is_finite;
-
-/// A file that lives in memory, with a path that others can open.
-class memory_file {
- public:
-  memory_file() : descriptor_(memfd_create("scene", 0)) { require(descriptor_ >= 0, "no file in memory"); }
-
-  std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
-  void hold(const std::uint8_t* bytes, std::size_t size) const {
-    require(ftruncate(descriptor_, 0) == 0, "the file cannot be emptied");
-    require(pwrite(descriptor_, bytes, size, 0) == static_cast<ssize_t>(size), "the file cannot be written");
-  }
-
-  static void require(bool holds, const char* what) {
-    if (holds) return;
-    std::fprintf(stderr, "%s\n", what);
-    std::abort();
-  }
-
- private:
-  int descriptor_;
-};
+using wfpg_fuzz::require;
 
 bool is_texture(const render::scene& scene, const render::texture_reference& reference) {
   return reference.index < 0 || static_cast<std::size_t>(reference.index) < scene.textures.size();
@@ -43,7 +20,6 @@ bool is_texture(const render::scene& scene, const render::texture_reference& ref
 
 /// What the renderer relies on.
 void check(const render::scene& scene) {
-  const auto require = memory_file::require;
   const std::size_t vertices = scene.positions.size();
   require(scene.normals.empty() || scene.normals.size() == vertices, "as many normals as positions");
   require(scene.uvs.empty() || scene.uvs.size() == vertices, "as many texture coordinates as positions");
@@ -68,12 +44,12 @@ void check(const render::scene& scene) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  static const memory_file file;
-  file.hold(bytes, size);
+  static const wfpg_fuzz::memory_file file;
+  file.hold({reinterpret_cast<const char*>(bytes), size});
   try {
     check(render::load_gltf(file.path()));
   } catch (const std::runtime_error& error) {
-    memory_file::require(std::string(error.what()).rfind(file.path() + ": ", 0) == 0, "errors name the path");
+    require(std::string(error.what()).rfind(file.path() + ": ", 0) == 0, "errors name the path");
   }
   return 0;
 }

@@ -1,10 +1,10 @@
 // Guide files of any bytes: a guider that guides, or an error that names what is read. Each input is read as
 // it is, and with its checksums put right, so that what is behind them is reached.
+#include "checksums.hpp"
 #include "guided_samples.hpp"
 
 #include <wfpg/guide_file.hpp>
 
-#include <algorithm>
 #include <cstdint>
 #include <sstream>
 #include <string>
@@ -45,30 +45,6 @@ void read(const std::string& bytes) {
   } catch (const wfpg::file_error& error) {
     require(std::string(error.what()).rfind("wfpg: it ", 0) == 0, "errors name what is read");
   }
-}
-
-template <class T>
-void set(std::string& bytes, std::size_t at, T value) {
-  std::string number;
-  wfpg::detail::put_number(number, value);
-  bytes.replace(at, sizeof(T), number);
-}
-
-std::string with_checksums(std::string bytes) {
-  using wfpg::detail::checksum;
-  if (bytes.size() < 16) return bytes;
-  const auto sum = [&bytes](std::size_t first, std::size_t n) {
-    return checksum(std::string_view(bytes).substr(first, n));
-  };
-  set(bytes, 12, static_cast<std::uint32_t>(sum(0, 12)));
-  for (std::size_t at = 16; bytes.size() - at >= 32;) {
-    const auto said = wfpg::detail::number_at<std::uint64_t>(&bytes[at + 8]);
-    const std::size_t size = static_cast<std::size_t>(std::min<std::uint64_t>(said, bytes.size() - at - 32));
-    set(bytes, at + 16, sum(at, 16));
-    set(bytes, at + 24 + size, sum(at + 24, size));
-    at += size + 32;
-  }
-  return bytes;
 }
 
 }  // namespace

@@ -1,14 +1,14 @@
 // What fuzzers of guiding share: a few samples with a guider of any kind, and what has to hold of them.
 #pragma once
 
+#include "require.hpp"
+
 #include <wfpg/exec/seq.hpp>
 #include <wfpg/path_guider.hpp>
 #include <wfpg/ray_caster.hpp>
 
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <vector>
 
 namespace wfpg_fuzz {
@@ -52,12 +52,6 @@ struct random_numbers {
     return wfpg::detail::unit_vec2(wfpg::detail::hash(ray, dimension));
   }
 };
-
-inline void require(bool holds, const char* what) {
-  if (holds) return;
-  std::fprintf(stderr, "%s\n", what);
-  std::abort();
-}
 
 inline void ask_lights(const wfpg::light_guide_view& lights, const wfpg::surface<lambert>& surface,
                        std::uint32_t ray) {

@@ -6,6 +6,7 @@
 #include <wfpg/error.hpp>
 
 #include <cstddef>
+#include <cstdio>
 #include <new>
 
 namespace wfpg_test {
@@ -74,6 +75,11 @@ std::size_t fail_at_each(failing_resource& resource, const F& f) {
     CHECK(failed == resource.failed());
     if (!failed) return resource.asked();
   }
+}
+
+/// Prints how many allocations failed in a test, which .ci/run adds up.
+inline void tell_failed(std::size_t allocations) {
+  std::printf("allocations failed: %zu\n", allocations);
 }
 
 }  // namespace wfpg_test

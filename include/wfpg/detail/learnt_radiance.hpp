@@ -12,6 +12,7 @@
 #include <wfpg/guide_view.hpp>
 
 namespace wfpg {
+
 /// Where kernels tell kept fields what their directions found. Trivially copyable; an empty one learns
 /// nothing.
 class learnt_radiance_view {

@@ -2,9 +2,9 @@
 // a checksum, so that what is truncated, altered or foreign is told apart. Reading takes no more memory than
 // twice the bytes that are there, whatever lengths say.
 //
-//   file     magic (8 bytes), version (4), checksum of these 12 (4: the lower half), sections, one named
-//   "end" section  name (8, padded with zeros), length (8), checksum of these 16 (8), payload, its checksum
-//   (8)
+//   file     magic (8 bytes), version (4), checksum of these 12 (4: the lower half), sections, of which the
+//            last is named "end"
+//   section  name (8, padded with zeros), length (8), checksum of these 16 (8), payload, its checksum (8)
 #pragma once
 
 #include <wfpg/error.hpp>

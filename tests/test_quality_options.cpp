@@ -1,0 +1,123 @@
+// The command line of wfpg-quality: presets, scenes, methods, and what is refused.
+#include "progress.hpp"
+#include "settings.hpp"
+#include "support/catch.hpp"
+#include "support/measurements.hpp"
+#include "support/renderer_io.hpp"
+
+#include <sstream>
+#include <string>
+
+namespace {
+
+using namespace render_test;
+
+/// The message of arguments that cannot be right.
+std::string refused(const strings& arguments) {
+  try {
+    parsed(arguments);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+}  // namespace
+
+TEST_CASE("options: presets hold where nothing is given", "[quality]") {
+  const quality::settings quick = parsed({"--preset", "quick"});
+  CHECK(quick.scenes.size() == 6);
+  CHECK(quick.methods.size() == 3);
+  CHECK(quick.scenes[0].options.width == 104);
+  CHECK_FALSE(quick.scenes[0].options.nee);
+  CHECK(quick.scenes[1].options.nee);
+  const quality::settings own =
+      parsed({"--preset", "quick", "--size", "32x16", "--spp", "1,4", "--seconds", "0.5", "--scenes", "ajar",
+              "ajar --nee off --max-depth 3", "--seeds", "7"});
+  CHECK(own.seeds == 7);
+  CHECK(own.scenes[1].options.height == 16);
+  CHECK(own.scenes[1].options.max_depth == 3);
+  CHECK(own.scenes[1].title == "ajar --nee off --max-depth 3");
+  REQUIRE(own.budgets.size() == 3);
+  CHECK(quality::title_of(own.budgets[0]) == "1 sample");
+  CHECK(quality::title_of(own.budgets[2]) == "0.5 s");
+  const quality::settings paper = parsed({"--preset", "paper"});
+  const render::render_options options = quality::options_of(paper.scenes[0], paper.methods[1]);
+  CHECK(options.min_bin_level == 5);
+  CHECK(options.rays_per_bin == 512);
+  CHECK(options.octree_resolution == 128);
+  CHECK(options.field_resolution == 128);
+  CHECK(options.lifetime == render::fields::transient);
+  CHECK(options.combine == wfpg::sample_combination::pt_first);
+  CHECK(options.nee);
+}
+
+TEST_CASE("options: methods are known, one's own, or wfpg-render's", "[quality]") {
+  const quality::settings given = parsed({"--methods", "pt,small,wfpg-transient-plain", "--method",
+                                          "small=--method wfpg --slot-resolution 16 --nee off --device seq",
+                                          "--method", "more=--recast 4"});
+  REQUIRE(given.methods.size() == 4);
+  CHECK(given.methods[1].name == "small");
+  CHECK(given.methods[3].name == "more");
+  const render::render_options small = quality::options_of(given.scenes[1], given.methods[1]);
+  CHECK(small.slot_resolution == 16);
+  CHECK_FALSE(small.nee);
+  CHECK(small.where == render::device::seq);
+  CHECK(quality::options_of(given.scenes[0], given.methods[2]).mode == render::guiding::plain);
+  // Beside path tracing where no others are named.
+  const quality::settings own = parsed({"--method", "more=--recast 4"});
+  REQUIRE(own.methods.size() == 2);
+  CHECK(own.methods[0].name == "pt");
+}
+
+TEST_CASE("options: what cannot be right is said", "[quality]") {
+  CHECK(contains(refused({"--preset", "best"}), "best"));
+  CHECK(contains(refused({"--spp", "0"}), "0"));
+  CHECK(contains(refused({"--seconds", "-1"}), "seconds"));
+  CHECK(contains(refused({"--seeds", "0"}), "seeds"));
+  CHECK(contains(refused({"--reference-spp", "1"}), "reference-spp"));
+  CHECK(contains(refused({"--per-sample", "1"}), "per-sample"));
+  CHECK(contains(refused({"--device", "abacus"}), "abacus"));
+  CHECK(contains(refused({"--size", "12"}), "WIDTHxHEIGHT"));
+  CHECK(contains(refused({"--crop", "1,2,3"}), "--crop"));
+  CHECK(contains(refused({"--crop", "1,2,3x0"}), "--crop"));
+  CHECK(contains(refused({"--exposure", "0"}), "exposure"));
+  CHECK(contains(refused({"--methods", "best"}), "best"));
+  CHECK(contains(refused({"--method", "without-equals"}), "NAME=OPTIONS"));
+  CHECK(contains(refused({"--method", "=--method pt"}), "NAME=OPTIONS"));
+  CHECK(contains(refused({"--method", "a b=--method pt"}), "NAME=OPTIONS"));
+  CHECK(contains(refused({"--method", "a=--method best"}), "method a"));
+  CHECK(contains(refused({"--method", "a=--spp 3"}), "--spp"));
+  CHECK(contains(refused({"--method", "a=--product-resolution 8"}), "wfpg-product"));
+  CHECK(contains(refused({"--methods", "pt", "pt"}), "two methods"));
+  CHECK(contains(refused({"--scenes", "ajar --spp 3"}), "--spp"));
+  CHECK(contains(refused({"--scenes", "ajar", "ajar"}), "two scenes"));
+  CHECK(contains(refused({"--scene", "ajar"}), "--scene"));
+  std::ostringstream out;
+  CHECK_FALSE(quality::parse_settings({"--help"}, out).has_value());
+  for (const char* const option :
+       {"--preset", "--scenes", "--methods", "--method", "--spp", "--seconds", "--seeds", "--size",
+        "--reference-spp", "--nee", "--device", "--per-sample", "--cache"})
+    CHECK(contains(out.str(), option));
+}
+
+TEST_CASE("options: scenes in files", "[quality]") {
+  temporary_folder folder;
+  const std::string spaced = folder.write("a room --nee off.glb", "");
+  const quality::settings given = parsed({"--scenes", "a/b/room.glb --nee off", "c/hall.gltf", spaced});
+  CHECK(given.scenes[0].source == "a/b/room.glb");
+  CHECK(given.scenes[0].title == "room.glb --nee off");
+  CHECK_FALSE(given.scenes[0].options.nee);
+  CHECK(given.scenes[1].title == "hall.gltf");
+  CHECK(given.scenes[2].source == spaced);
+  CHECK(given.scenes[2].title == "a room --nee off.glb");
+  CHECK(given.scenes[2].options.nee);
+}
+
+TEST_CASE("options: names of files", "[quality]") {
+  CHECK(quality::file_name_of("ajar --nee off") == "ajar-nee-off");
+  CHECK(quality::file_name_of("a/b: c*") == "a-b-c-");
+  CHECK(quality::title_of_seconds(3.2) == "4 s");
+  CHECK(quality::title_of_seconds(600.0) == "10 min");
+  CHECK(quality::title_of_seconds(9000.0) == "2.5 h");
+}

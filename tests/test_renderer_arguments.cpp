@@ -1,0 +1,53 @@
+// What command lines share: a scene with its environment, and what is warned of.
+#include "image_io.hpp"
+#include "render_arguments.hpp"
+#include "support/catch.hpp"
+#include "support/renderer_io.hpp"
+#include "support/tiny_gltf.hpp"
+
+#include <sstream>
+#include <string>
+
+namespace {
+
+using namespace render_test;
+
+/// What loading a scene logs.
+std::string warnings_of(const render::scene_arguments& given, bool nee = true) {
+  render::render_options options;
+  options.nee = nee;
+  std::ostringstream log;
+  render::load_scene(given, options, "it", log);
+  return log.str();
+}
+
+}  // namespace
+
+TEST_CASE("a scene without light, or whose lights are lost, is warned of", "[renderer][arguments]") {
+  CHECK(warnings_of({"ajar", ""}) == "");
+  CHECK(warnings_of({"ajar", ""}, false) == "");
+
+  const temporary_folder folder;
+  tiny_gltf tiny;
+  const std::string dark = warnings_of({folder.write("dark.gltf", tiny.json()), ""});
+  CHECK(contains(dark, "it: warning: the file has no perspective camera"));
+  CHECK(contains(dark, "it: warning: the scene has no light: the picture is black\n"));
+
+  tiny.with("extensions", R"({"KHR_lights_punctual": {"lights": [{"type": "point"}]}})");
+  tiny.with("nodes", R"([{"mesh": 0, "extensions": {"KHR_lights_punctual": {"light": 0}}}])");
+  const std::string lit = folder.write("lit.gltf", tiny.json());
+  CHECK_FALSE(contains(warnings_of({lit, ""}), "light"));
+  CHECK(contains(warnings_of({lit, ""}, false),
+                 "it: warning: point, spot and directional lights are lost with --nee off\n"));
+}
+
+TEST_CASE("an environment that is named takes the place of the scene's", "[renderer][arguments]") {
+  const temporary_folder folder;
+  render::image sky = render::make_image(4, 2);
+  for (vec3& texel : sky.pixels) texel = vec3(2.0f);
+  render::write_exr(folder.file("sky.exr"), sky);
+  const render::scene_arguments given{folder.write("dark.gltf", tiny_gltf().json()), folder.file("sky.exr")};
+  std::ostringstream log;
+  CHECK(render::load_scene(given, {}, "it", log).sky.width == 4);
+  CHECK_FALSE(contains(log.str(), "no light"));
+}

@@ -1,0 +1,185 @@
+// render(): what it refuses, reports and keeps on the way, and guided pictures against path tracing's.
+#include "builtin_scenes.hpp"
+#include "device_scene.hpp"
+#include "render.hpp"
+#include "support/catch.hpp"
+#include "support/pictures.hpp"
+
+#include <wfpg/exec/omp.hpp>
+#include <wfpg/exec/seq.hpp>
+
+#include <tbb/global_control.h>
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace {
+
+using namespace render;
+using namespace render_test;
+
+/// What render() says of options that it refuses.
+std::string refusal(const render_options& options) {
+  try {
+    render::render(square_of({}), options, {});
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "nothing";
+}
+
+}  // namespace
+
+TEST_CASE("scenes and options that cannot be right are refused by name", "[renderer]") {
+  const wfpg::exec::seq exec;
+  scene broken = square_of({});
+  broken.triangles[1].y = 4;
+  CHECK_THROWS_AS(device_scene<wfpg::exec::seq>(exec, broken), std::invalid_argument);
+  broken = square_of({});
+  broken.triangle_materials[0] = 1;
+  CHECK_THROWS_AS(device_scene<wfpg::exec::seq>(exec, broken), std::invalid_argument);
+
+  render_options options;
+  options.method = sampling_method::pt;
+  options.spp = 0;
+  CHECK(refusal(options).find("spp is 0") != std::string::npos);
+  options.spp = 1;
+  options.combine = wfpg::sample_combination::discard_first;
+  CHECK(refusal(options).find("spp is 1") != std::string::npos);
+}
+
+TEST_CASE("a rendering reports itself and takes samples or seconds", "[renderer]") {
+  render_options options;
+  options.method = sampling_method::pt;
+  options.width = 16;
+  options.height = 8;
+  options.spp = 3;
+  int calls = 0;
+  const auto counted = [&calls](const render_progress& p) { calls += p.fraction <= 1.0; };
+  const scene box = make_builtin_scene("cornell-box");
+  for (const device where : {device::cpu, device::omp, device::seq}) {
+    options.where = where;
+    const render_result result = render::render(box, options, counted);
+    CHECK(result.report.spp == 3);
+    CHECK((result.picture.width == 16 && result.picture.height == 8 && result.picture.pixels.size() == 128));
+  }
+  CHECK(calls == 9);
+  options.seconds = 0.05;
+  const render_result timed = render::render(box, options, {});
+  CHECK(timed.report.spp >= 1);
+  CHECK(timed.report.total_seconds >= 0.05);
+}
+
+TEST_CASE("checkpoints are the pictures on the way", "[renderer]") {
+  render_options options;
+  options.width = options.height = 16;
+  options.octree_resolution = 32;
+  options.spp = 4;
+  const scene box = make_builtin_scene("cornell-box");
+  CHECK(render::render(box, options, {}).checkpoints.empty());
+  options.checkpoints = checkpoint_times::powers_of_two;
+  const render_result result = render::render(box, options, {});
+  REQUIRE(result.checkpoints.size() == 3);
+  CHECK(result.checkpoints[0].seconds <= result.checkpoints[2].seconds);
+  CHECK(result.checkpoints[2].samples == 4);
+  CHECK(result.checkpoints[2].picture.pixels == result.picture.pixels);
+  options.spp = 2;
+  CHECK(render::render(box, options, {}).picture.pixels == result.checkpoints[1].picture.pixels);
+  options.spp = 3;
+  const render_result odd = render::render(box, options, {});
+  REQUIRE(odd.checkpoints.size() == 3);
+  CHECK(odd.checkpoints[2].samples == 3);
+  CHECK(odd.checkpoints[2].picture.pixels == odd.picture.pixels);
+  options.spp = 6;
+  options.checkpoints = checkpoint_times::all;
+  const render_result all = render::render(box, options, {});
+  REQUIRE(all.checkpoints.size() == 6);
+  for (int i = 0; i < 6; ++i) CHECK(all.checkpoints[static_cast<std::size_t>(i)].samples == i + 1);
+  CHECK(all.checkpoints[2].picture.pixels == odd.picture.pixels);
+}
+
+TEST_CASE("later samples count more only where they are better", "[renderer]") {
+  render_options options;
+  CHECK(combination_of(options) == wfpg::sample_combination::pt_linear);
+  options.method = sampling_method::pt;
+  CHECK(combination_of(options) == wfpg::sample_combination::constant);
+  options.combine = wfpg::sample_combination::quadratic;
+  CHECK(combination_of(options) == wfpg::sample_combination::quadratic);
+}
+
+TEST_CASE("a guided rendering finds the furnace's radiance", "[renderer][guided]") {
+  const scene furnace = make_builtin_scene("furnace");
+  render_options options;
+  options.width = options.height = 40;
+  options.max_depth = 4;
+  options.spp = 20;
+  options.octree_resolution = 32;
+  options.field_resolution = 16;
+  options.slot_resolution = 16;
+  for (const fields lifetime : {fields::kept, fields::transient})
+    for (const bool nee : {false, true})
+      for (const guiding mode : {guiding::oriented, guiding::plain}) {
+        INFO("nee " << nee << ", mode " << static_cast<int>(mode) << ", fields "
+                    << static_cast<int>(lifetime));
+        options.lifetime = lifetime;
+        options.nee = nee;
+        options.mode = mode;
+        const render_result result = render::render(furnace, options, {});
+        CHECK(mean_of(result.picture.pixels) == Approx(furnace_radiance(4)).epsilon(0.005));
+      }
+}
+
+TEST_CASE("a guided rendering is one picture on any device and number of threads", "[renderer][guided]") {
+  const scene scene = make_builtin_scene("cornell-enclosed");
+  render_options options;
+  options.width = options.height = 24;
+  options.spp = 3;
+  options.octree_resolution = 32;
+  for (const fields lifetime : {fields::kept, fields::transient}) {
+    options.lifetime = lifetime;
+    options.where = device::seq;
+    const std::vector<vec3> serial = render::render(scene, options, {}).picture.pixels;
+    CHECK(same_bits(serial, render::render(scene, options, {}).picture.pixels));
+    for (const int threads : {1, 3}) {
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                      static_cast<std::size_t>(threads));
+      options.where = device::cpu;
+      CHECK(same_bits(serial, render::render(scene, options, {}).picture.pixels));
+      const int before = omp_get_max_threads();
+      omp_set_num_threads(threads);
+      options.where = device::omp;
+      CHECK(same_bits(serial, render::render(scene, options, {}).picture.pixels));
+      omp_set_num_threads(before);
+    }
+  }
+}
+
+TEST_CASE("the first sample of a guided rendering is path tracing's, later ones are not",
+          "[renderer][guided]") {
+  const scene scene = make_builtin_scene("thin-wall");
+  render_options options;
+  options.width = options.height = 16;
+  options.octree_resolution = 32;
+  const auto render_with = [&](sampling_method method, int spp) {
+    options.method = method;
+    options.spp = spp;
+    return render::render(scene, options, {});
+  };
+  const std::vector<vec3> unguided = render_with(sampling_method::pt, 3).picture.pixels;
+  const std::vector<vec3> first = render_with(sampling_method::pt, 1).picture.pixels;
+  for (const fields lifetime : {fields::transient, fields::kept}) {
+    options.lifetime = lifetime;
+    CHECK(same_bits(render_with(sampling_method::wfpg, 1).picture.pixels, first));
+    CHECK_FALSE(same_bits(render_with(sampling_method::wfpg, 3).picture.pixels, unguided));
+  }
+  const render_result guided = render_with(sampling_method::wfpg, 3);
+  CHECK(guided.report.octree.resolution == 32);
+  CHECK(guided.report.octree.nodes > guided.report.octree.leaves);
+  CHECK(guided.report.bins.at(0).count >= 1.0);
+  CHECK(guided.report.cones_per_segment > 0.0);
+  CHECK(guided.report.persistent_bytes > 0);
+  CHECK(guided.report.slots.capacity > guided.report.slots.live);
+  CHECK(guided.report.slots.live > 0);
+  CHECK(guided.report.slots.refreshed > 0.0);
+}
