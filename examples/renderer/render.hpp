@@ -94,8 +94,8 @@ struct render_report {
   double total_seconds = 0.0;  ///< from building to the last sample
   named_seconds seconds;       ///< by stage; "guide ..." are parts of "directions" and of "update"
   std::vector<std::pair<std::string, std::size_t>> memory;  ///< the guider's bytes, by part
-  std::size_t persistent_bytes = 0;  ///< allocated
-  std::size_t used_bytes = 0;        ///< of them, without slots that hold no field
+  std::size_t persistent_bytes = 0;                         ///< allocated
+  std::size_t used_bytes = 0;                               ///< of them, without slots that hold no field
   std::size_t transient_bytes = 0;
   octree_report octree;
   std::vector<bin_report> bins;  ///< by depth
