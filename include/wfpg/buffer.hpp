@@ -104,6 +104,8 @@ class retaining_resource : public memory_resource {
 
   /// Bytes held from upstream, in use and kept.
   std::size_t bytes() const { return bytes_; }
+  /// Bytes of them that are in use, as they were asked for.
+  std::size_t used_bytes() const { return used_bytes_; }
 
   /// Gives kept blocks back upstream.
   void release() {
@@ -127,23 +129,27 @@ class retaining_resource : public memory_resource {
   void* do_allocate(std::size_t bytes, std::size_t) override {
     const std::size_t size = rounded(bytes);
     const auto found = kept_.find(size);
+    void* block;
     if (found != kept_.end()) {
-      void* block = found->second;
+      block = found->second;
       kept_.erase(found);
-      return block;
+    } else {
+      block = upstream_->allocate(size, alignment);
+      bytes_ += size;
     }
-    void* block = upstream_->allocate(size, alignment);
-    bytes_ += size;
+    used_bytes_ += bytes;
     return block;
   }
   void do_deallocate(void* block, std::size_t bytes, std::size_t) override {
     kept_.emplace(rounded(bytes), block);
+    used_bytes_ -= bytes;
   }
   bool do_is_equal(const memory_resource& other) const noexcept override { return this == &other; }
 
   memory_resource* upstream_;
   std::multimap<std::size_t, void*> kept_;
   std::size_t bytes_ = 0;
+  std::size_t used_bytes_ = 0;
 };
 
 }  // namespace wfpg
