@@ -10,12 +10,14 @@
 #include <wfpg/exitance_cache.hpp>
 #include <wfpg/field_sampler.hpp>
 #include <wfpg/field_store.hpp>
+#include <wfpg/guide.hpp>
 #include <wfpg/guide_file.hpp>
 #include <wfpg/guide_view.hpp>
 #include <wfpg/light_guide.hpp>
 #include <wfpg/mis.hpp>
 #include <wfpg/morton.hpp>
 #include <wfpg/octahedral_map.hpp>
+#include <wfpg/octree_guide.hpp>
 #include <wfpg/partitioner.hpp>
 #include <wfpg/path_guider.hpp>
 #include <wfpg/path_recorder.hpp>

@@ -242,9 +242,9 @@ struct follow_path {
 };
 
 /// Traces `samples` samples of paths of two bounces from points on the walls; what each path gathered.
-template <class Exec, class Caster>
-std::vector<float> trace_paths(const Exec& exec, wfpg::path_guider<Exec>& guider, std::uint32_t samples,
-                               std::size_t paths, const Caster& caster) {
+template <class Exec, class Guide, class Caster>
+std::vector<float> trace_paths(const Exec& exec, wfpg::path_guider<Exec, Guide>& guider,
+                               std::uint32_t samples, std::size_t paths, const Caster& caster) {
   std::vector<float> picture;
   for (std::uint32_t sample = 0; sample < samples; ++sample) {
     const auto first = wall_surfaces(paths, sample);
