@@ -67,11 +67,11 @@ class path_recorder_view {
     lengths_[place] = depth + 1;
   }
 
-  /// How the path goes on from vertex `depth`, its last so far, so that the kept field that the direction was
-  /// drawn beside learns what it finds. Not needed, and does nothing, where fields do not learn.
+  /// How the path goes on from vertex `depth`, its last so far, so that the guide learns what the direction
+  /// finds. Not needed, and does nothing, where fields do not learn.
   WFPG_HD void scatter(std::size_t path, std::uint32_t depth, const sampled_direction& drawn) const {
     std::uint32_t place;
-    if (!learns() || drawn.field == no_field || !find(path, place)) return;
+    if (!learns() || drawn.technique == sampling_technique::none || !find(path, place)) return;
     if (depth >= max_depth_ || depth + 1 != lengths_[place] || !leads_somewhere(drawn.direction))
       return drop();
     directions_[depth * recorded_ + place] = {drawn.field, pack_direction(drawn.direction)};
@@ -177,7 +177,17 @@ class recorded_path {
   /// The number that the guide gave to the direction of scatter(), or no_field. Precondition: directions are
   /// recorded.
   WFPG_HD std::uint32_t field(std::uint32_t depth) const { return paths_.directions_[slot(depth)].field; }
-  /// The unit direction of scatter(). Precondition: field() is not no_field.
+  /// Where the path went on from a surface, a unit direction: toward the next surface, or where scatter()
+  /// told. False where nothing tells. Precondition: directions are recorded.
+  WFPG_HD bool leads(std::uint32_t depth, vec3& direction) const {
+    if (depth + 1 < surfaces_) {
+      direction = -outgoing(depth + 1);
+      return true;
+    }
+    direction = this->direction(depth);
+    return paths_.directions_[slot(depth)].direction != 0;
+  }
+  /// The unit direction of scatter(). Precondition: it was told.
   WFPG_HD vec3 direction(std::uint32_t depth) const {
     return unpack_direction(paths_.directions_[slot(depth)].direction);
   }

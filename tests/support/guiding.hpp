@@ -201,6 +201,19 @@ struct path_step {
   float radiance = 0.0f;
 };
 
+/// The normal of the wall that a point of it is nearest to.
+WFPG_HD inline vec3 inward_normal(vec3 p) {
+  std::uint32_t nearest = 0;
+  float least = 2.0f;
+  for (std::uint32_t face = 0; face < 6; ++face) {
+    const float away = std::abs(p[int(face / 2)] - (face % 2 ? 1.0f : 0.0f));
+    if (away >= least) continue;
+    least = away;
+    nearest = face;
+  }
+  return face_normal(nearest);
+}
+
 /// Follows a sampled direction to the wall that it meets, and records what is there.
 struct follow_path {
   wfpg::array_view<path_step> paths;
@@ -227,17 +240,6 @@ struct follow_path {
     recorder.vertex(path, depth + 1, p, -d.direction, vec3(step.throughput));
     recorder.emission(path, depth + 1, vec3(step.throughput * emitted(p)));
     step.radiance += step.throughput * emitted(p);
-  }
-
- private:
-  WFPG_HD static vec3 inward_normal(vec3 p) {
-    std::uint32_t nearest = 0;
-    for (std::uint32_t face = 1; face < 6; ++face)
-      if (away(p, face) < away(p, nearest)) nearest = face;
-    return face_normal(nearest);
-  }
-  WFPG_HD static float away(vec3 p, std::uint32_t face) {
-    return std::abs(p[int(face / 2)] - (face % 2 ? 1.0f : 0.0f));
   }
 };
 
