@@ -170,8 +170,11 @@ WFPG_TEST_CASE("a retaining resource allocates once for work that repeats", "[bu
     CHECK(arena.bytes() == upstream.live);
     CHECK(upstream.live >= 2 * 5000 * sizeof(int));
 
+    CHECK(arena.used_bytes() == 0);
     const wfpg::buffer<int, Exec> in_use(exec, 5000);
+    CHECK(arena.used_bytes() == in_use.bytes());
     arena.release();
+    CHECK(arena.used_bytes() == in_use.bytes());
     CHECK(arena.bytes() == upstream.live);
     CHECK(upstream.live >= in_use.bytes());
     CHECK(upstream.live < 2 * in_use.bytes());

@@ -6,6 +6,7 @@
 #include <wfpg/path_guider.hpp>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <set>
 #include <string>
@@ -259,6 +260,35 @@ WFPG_TEST_CASE("path guider: a build report tells what of the mesh was left out"
   CHECK(build.non_finite == 1);
   CHECK(build.out_of_range == 1);
   CHECK(build.degenerate == 1);
+}
+
+/// Until the clock has gone on by so much.
+void wait(double seconds) {
+  const auto begin = std::chrono::steady_clock::now();
+  while (std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() < seconds) {
+  }
+}
+
+TEST_CASE("a stage inside another one has its time to itself", "[path_guider]") {
+  using wfpg::detail::stage;
+  wfpg::detail::stage_clock clock;
+  const auto begin = std::chrono::steady_clock::now();
+  {
+    const auto outer = clock.time(stage::fields);
+    wait(0.01);
+    {
+      const auto inner = clock.time(stage::bin);
+      wait(0.02);
+    }
+    wait(0.01);
+  }
+  const std::chrono::duration<double> all = std::chrono::steady_clock::now() - begin;
+  wait(0.01);
+  const auto times = clock.report();
+  CHECK(times[0].seconds >= 0.02);
+  CHECK(times[1].seconds >= 0.02);
+  CHECK(times[0].seconds + times[1].seconds <= all.count());
+  CHECK(times[2].seconds == 0.0);
 }
 
 }  // namespace

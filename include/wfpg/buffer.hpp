@@ -105,6 +105,8 @@ class retaining_resource : public memory_resource {
 
   /// Bytes held from upstream, in use and kept.
   std::size_t bytes() const { return bytes_; }
+  /// Bytes of them that are in use, as they were asked for.
+  std::size_t used_bytes() const { return used_bytes_; }
 
   /// Gives kept blocks back upstream.
   void release() {
@@ -129,8 +131,9 @@ class retaining_resource : public memory_resource {
     const std::size_t size = rounded(bytes);
     const auto found = kept_.find(size);
     if (found != kept_.end()) {
-      void* block = found->second;
+      void* const block = found->second;
       in_use_.insert(kept_.extract(found));
+      used_bytes_ += bytes;
       return block;
     }
     // Its entry is made before it is, and moves: giving a block back asks for no memory.
@@ -142,12 +145,14 @@ class retaining_resource : public memory_resource {
       throw;
     }
     bytes_ += size;
+    used_bytes_ += bytes;
     return entry->second;
   }
   void do_deallocate(void* block, std::size_t bytes, std::size_t) noexcept override {
     auto entry = in_use_.extract(in_use_.find(rounded(bytes)));  // of any block of this size
     entry.mapped() = block;
     kept_.insert(std::move(entry));
+    used_bytes_ -= bytes;
   }
   bool do_is_equal(const memory_resource& other) const noexcept override { return this == &other; }
 
@@ -157,6 +162,7 @@ class retaining_resource : public memory_resource {
   blocks kept_;
   blocks in_use_;  // as many of each size as there are; which is which is not known
   std::size_t bytes_ = 0;
+  std::size_t used_bytes_ = 0;
 };
 
 }  // namespace wfpg

@@ -67,11 +67,11 @@ class path_recorder_view {
     lengths_[place] = depth + 1;
   }
 
-  /// How the path goes on from vertex `depth`, its last so far, so that the kept field that the direction was
-  /// drawn beside learns what it finds. Not needed, and does nothing, where fields do not learn.
+  /// How the path goes on from vertex `depth`, its last so far, so that the guide learns what the direction
+  /// finds. Not needed, and does nothing, where fields do not learn.
   WFPG_HD void scatter(std::size_t path, std::uint32_t depth, const sampled_direction& drawn) const {
     std::uint32_t place;
-    if (!learns() || drawn.field == no_field || !find(path, place)) return;
+    if (!learns() || drawn.technique == sampling_technique::none || !find(path, place)) return;
     if (depth >= max_depth_ || depth + 1 != lengths_[place] || !leads_somewhere(drawn.direction))
       return drop();
     directions_[depth * recorded_ + place] = {drawn.field, pack_direction(drawn.direction)};
@@ -112,7 +112,7 @@ class path_recorder_view {
  private:
   template <class Exec>
   friend class path_recorder;
-  friend struct deposit_paths;
+  friend class recorded_path;
 
   static constexpr std::uint32_t escaped = 0x80000000u;  // of a length: its last vertex is the environment
 
@@ -145,6 +145,73 @@ class path_recorder_view {
   std::uint32_t* dropped_ = nullptr;
 };
 
+/// One path as it was recorded: the surfaces that it met in order, and behind the last of them the
+/// environment where it told of that with escape(). Valid until the recorder forgets it.
+class recorded_path {
+ public:
+  /// `place`: of the path among the recorded ones.
+  WFPG_HD recorded_path(const path_recorder_view& paths, std::size_t place)
+      : paths_(paths),
+        place_(place),
+        surfaces_(paths.lengths_[place] & ~path_recorder_view::escaped),
+        vertices_(surfaces_) {
+    if (paths.lengths_[place] & path_recorder_view::escaped) --surfaces_;
+  }
+
+  /// Vertices, the environment among them.
+  WFPG_HD std::uint32_t vertices() const { return vertices_; }
+  /// Vertices that are surfaces: [0, surfaces()).
+  WFPG_HD std::uint32_t surfaces() const { return surfaces_; }
+
+  /// Where a surface is, world space.
+  WFPG_HD vec3 position(std::uint32_t depth) const { return paths_.places_[slot(depth)].position; }
+  /// The unit direction from a surface toward the vertex before it.
+  WFPG_HD vec3 outgoing(std::uint32_t depth) const {
+    return unpack_direction(paths_.places_[slot(depth)].outgoing);
+  }
+  /// The path's throughput before a vertex scatters, linear RGB.
+  WFPG_HD vec3 throughput(std::uint32_t depth) const { return paths_.light_[slot(depth)].throughput; }
+  /// What a vertex itself brought to the path's origin: what it emits, and what it scatters of light that was
+  /// sampled there; linear RGB.
+  WFPG_HD vec3 contribution(std::uint32_t depth) const { return paths_.light_[slot(depth)].contribution; }
+  /// The number that the guide gave to the direction of scatter(), or no_field. Precondition: directions are
+  /// recorded.
+  WFPG_HD std::uint32_t field(std::uint32_t depth) const { return paths_.directions_[slot(depth)].field; }
+  /// Where the path went on from a surface, a unit direction: toward the next surface, or where scatter()
+  /// told. False where nothing tells. Precondition: directions are recorded.
+  WFPG_HD bool leads(std::uint32_t depth, vec3& direction) const {
+    if (depth + 1 < surfaces_) {
+      direction = -outgoing(depth + 1);
+      return true;
+    }
+    direction = this->direction(depth);
+    return paths_.directions_[slot(depth)].direction != 0;
+  }
+  /// The unit direction of scatter(). Precondition: it was told.
+  WFPG_HD vec3 direction(std::uint32_t depth) const {
+    return unpack_direction(paths_.directions_[slot(depth)].direction);
+  }
+
+ private:
+  WFPG_HD std::size_t slot(std::uint32_t depth) const { return depth * paths_.recorded_ + place_; }
+
+  path_recorder_view paths_;
+  std::size_t place_;
+  std::uint32_t surfaces_, vertices_;
+};
+
+/// Luminance that left a vertex and arrived as `arriving` along a path of throughput `throughput`, linear
+/// RGB. Nothing leaves where nothing can arrive from; a throughput that is not finite stays so, for who drops
+/// it.
+WFPG_HD inline float leaving_luminance(vec3 arriving, vec3 throughput) {
+  const auto divided = [](float a, float t) {
+    if (t > 0.0f) return a / t;
+    return detail::is_finite(t) ? 0.0f : t;
+  };
+  return luminance({divided(arriving.x, throughput.x), divided(arriving.y, throughput.y),
+                    divided(arriving.z, throughput.z)});
+}
+
 /// Deposits one path's vertices: L(k) = (sum of contributions at k and after) / throughput(k), Eq. 5. It is
 /// what leaves a vertex, for the cache, and what arrives along the direction before it, for kept fields.
 struct deposit_paths {
@@ -152,42 +219,24 @@ struct deposit_paths {
   exitance_cache_view cache;    ///< where it goes
   learnt_radiance_view learnt;  ///< where it goes too, unless empty
 
-  /// Path `path` of those recorded.
-  WFPG_HD void operator()(std::size_t path) const {
-    const bool escapes = (paths.lengths_[path] & path_recorder_view::escaped) != 0;
-    const std::uint32_t vertices = paths.lengths_[path] & ~path_recorder_view::escaped;
-    const std::uint32_t surfaces = vertices - (escapes ? 1u : 0u);
+  /// Path `place` of those recorded.
+  WFPG_HD void operator()(std::size_t place) const {
+    const recorded_path path(paths, place);
+    const std::uint32_t vertices = path.vertices(), surfaces = path.surfaces();
     if (surfaces == 0) return;
     const std::uint32_t first = cache.reserve(surfaces);
     const std::uint32_t found = learnt.empty() || vertices < 2 ? 0 : vertices - 1;
     const std::uint32_t first_found = found > 0 ? learnt.reserve(found) : 0;
     vec3 arriving(0.0f);
     for (std::uint32_t depth = vertices; depth-- > 0;) {
-      const std::size_t slot = depth * paths.recorded_ + path;
-      const detail::recorded_light light = paths.light_[slot];
-      arriving += light.contribution;
-      const vec3 t = light.throughput;
-      const float leaving =
-          luminance({divided(arriving.x, t.x), divided(arriving.y, t.y), divided(arriving.z, t.z)});
-      if (depth < surfaces) {
-        const detail::recorded_place place = paths.places_[slot];
-        cache.write(first + depth, place.position, unpack_direction(place.outgoing), leaving);
-      }
-      if (found > 0 && depth > 0) {
-        const detail::recorded_direction before = paths.directions_[slot - paths.recorded_];
-        learnt.write(first_found + depth - 1, before.field, unpack_direction(before.direction), leaving);
-      }
+      arriving += path.contribution(depth);
+      const float leaving = leaving_luminance(arriving, path.throughput(depth));
+      if (depth < surfaces) cache.write(first + depth, path.position(depth), path.outgoing(depth), leaving);
+      if (found > 0 && depth > 0)
+        learnt.write(first_found + depth - 1, path.field(depth - 1), path.direction(depth - 1), leaving);
     }
     for (std::uint32_t depth = 0; depth < surfaces; ++depth) cache.count(first + depth);
     for (std::uint32_t i = 0; i < found; ++i) learnt.count(first_found + i);
-  }
-
- private:
-  /// Nothing leaves where nothing can arrive from; a throughput that is not finite stays so, and the cache
-  /// drops it.
-  WFPG_HD static float divided(float arriving, float throughput) {
-    if (throughput > 0.0f) return arriving / throughput;
-    return detail::is_finite(throughput) ? 0.0f : throughput;
   }
 };
 

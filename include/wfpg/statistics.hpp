@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace wfpg {
@@ -63,17 +64,17 @@ enum class stage : std::uint32_t { bin, fields, serve, record, cache, count };
 /// Accumulates the host's time by stage.
 class stage_clock {
  public:
-  /// Adds the time until it goes out of scope to a stage.
+  /// Adds the time until it goes out of scope to a stage, and what a scope inside it takes to that one's
+  /// alone.
   class scope {
    public:
-    scope(stage_clock& clock, stage s) : clock_(clock), stage_(s), begin_(now()) {}
+    scope(stage_clock& clock, stage s) : clock_(clock), outer_(clock.go_on_with(s)) {}
     scope(const scope&) = delete;
-    ~scope() { clock_.seconds_[static_cast<int>(stage_)] += now() - begin_; }
+    ~scope() { clock_.go_on_with(outer_); }
 
    private:
     stage_clock& clock_;
-    stage stage_;
-    double begin_;
+    stage outer_;
   };
 
   scope time(stage s) { return scope(*this, s); }
@@ -90,7 +91,17 @@ class stage_clock {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
   }
 
-  double seconds_[static_cast<int>(stage::count)] = {};
+  /// Ends the stage that is timed, and begins another; which one that was.
+  stage go_on_with(stage next) {
+    const double time = now();
+    seconds_[static_cast<int>(current_)] += time - since_;
+    since_ = time;
+    return std::exchange(current_, next);
+  }
+
+  double seconds_[static_cast<int>(stage::count) + 1] = {};  // the last: between stages
+  stage current_ = stage::count;
+  double since_ = now();
 };
 
 }  // namespace detail

@@ -288,6 +288,13 @@ inline void require_fragment_count(std::uint64_t n) {
           "less than 2^32 - 1: lower the octree resolution");
 }
 
+template <class Exec>
+bounds3 bounds_of(const Exec& exec, triangle_mesh_view mesh) {
+  const ::thrust::counting_iterator<std::size_t> first(0);
+  return ::thrust::transform_reduce(exec.thrust(), first, first + mesh.triangles.size(),
+                                    triangle_bounds{triangle_reader{mesh, {}}}, bounds3{}, bounds_union());
+}
+
 }  // namespace detail
 
 /// Voxelizes triangles at `resolution`³ over the cube around them, conservatively: no voxel that a triangle
@@ -300,10 +307,7 @@ voxel_fragments<Exec> voxelize(const Exec& exec, triangle_mesh_view mesh, std::u
   const std::size_t n = mesh.triangles.size();
   detail::require(n < 0xffffffffull, "number of triangles", n, "less than 2^32 - 1");
   detail::triangle_reader reader{mesh, {}};
-  const ::thrust::counting_iterator<std::size_t> first(0);
-  const bounds3 box = ::thrust::transform_reduce(
-      exec.thrust(), first, first + n, detail::triangle_bounds{reader}, bounds3{}, detail::bounds_union());
-  reader.grid = detail::grid_around(box, resolution);
+  reader.grid = detail::grid_around(detail::bounds_of(exec, mesh), resolution);
 
   const buffer<std::uint32_t, Exec> counters(exec, std::vector<std::uint32_t>(detail::counters, 0));
   buffer<std::uint64_t, Exec> items(exec, n);

@@ -10,12 +10,14 @@
 #include <wfpg/exitance_cache.hpp>
 #include <wfpg/field_sampler.hpp>
 #include <wfpg/field_store.hpp>
+#include <wfpg/guide.hpp>
 #include <wfpg/guide_file.hpp>
 #include <wfpg/guide_view.hpp>
 #include <wfpg/light_guide.hpp>
 #include <wfpg/mis.hpp>
 #include <wfpg/morton.hpp>
 #include <wfpg/octahedral_map.hpp>
+#include <wfpg/octree_guide.hpp>
 #include <wfpg/partitioner.hpp>
 #include <wfpg/path_guider.hpp>
 #include <wfpg/path_recorder.hpp>
@@ -23,6 +25,7 @@
 #include <wfpg/radiance_field.hpp>
 #include <wfpg/ray_caster.hpp>
 #include <wfpg/sample_combiner.hpp>
+#include <wfpg/sarsa_grid.hpp>
 #include <wfpg/sparse_voxel_octree.hpp>
 #include <wfpg/spatial_binner.hpp>
 #include <wfpg/statistics.hpp>

@@ -53,6 +53,13 @@ __global__ void use_bins(wfpg::bins_view bins, float* out) {
   out[threadIdx.x] = float(bins.size(threadIdx.x) + bins.node(threadIdx.x) + bins.orientation(threadIdx.x));
 }
 
+__global__ void use_sarsa(wfpg::sarsa_grid_view guide, wfpg::sampled_direction* out, float* density) {
+  const wfpg::surface<grey> s;
+  out[threadIdx.x] = guide.sample(threadIdx.x, s, 0.5f, wfpg::vec2(0.25f));
+  density[threadIdx.x] = guide.pdf(threadIdx.x, s, out[threadIdx.x].direction) +
+                         guide.radiance(s.position, wfpg::vec3(0, 0, 1));
+}
+
 __global__ void use_guide(wfpg::guide_view guide, wfpg::sampled_direction* out, float* density) {
   const wfpg::surface<grey> s;
   out[threadIdx.x] = guide.sample(threadIdx.x, s, 0.5f, wfpg::vec2(0.25f));

@@ -1,13 +1,13 @@
 # cmake -Droot=DIR -P options.cmake: every option of the library is in docs/tuning.md.
 file(READ "${root}/docs/tuning.md" page)
 set(missing "")
-foreach(place IN ITEMS path_guider.hpp:guider_options field_store.hpp:kept_field_options radiance_field.hpp:field_options
-    light_guide.hpp:light_guide_options)
+foreach(place IN ITEMS guide.hpp:sampling_options octree_guide.hpp:guider_options field_store.hpp:kept_field_options radiance_field.hpp:field_options
+    light_guide.hpp:light_guide_options sarsa_grid.hpp:sarsa_grid_options)
   string(REPLACE ":" ";" place "${place}")
   list(GET place 0 header)
   list(GET place 1 name)
   file(READ "${root}/include/wfpg/${header}" text)
-  string(FIND "${text}" "struct ${name} {" begin)
+  string(FIND "${text}" "struct ${name} " begin)
   string(SUBSTRING "${text}" ${begin} -1 text)
   string(FIND "${text}" "\n};" end)
   string(SUBSTRING "${text}" 0 ${end} text)

@@ -201,6 +201,19 @@ struct path_step {
   float radiance = 0.0f;
 };
 
+/// The normal of the wall that a point of it is nearest to.
+WFPG_HD inline vec3 inward_normal(vec3 p) {
+  std::uint32_t nearest = 0;
+  float least = 2.0f;
+  for (std::uint32_t face = 0; face < 6; ++face) {
+    const float away = std::abs(p[int(face / 2)] - (face % 2 ? 1.0f : 0.0f));
+    if (away >= least) continue;
+    least = away;
+    nearest = face;
+  }
+  return face_normal(nearest);
+}
+
 /// Follows a sampled direction to the wall that it meets, and records what is there.
 struct follow_path {
   wfpg::array_view<path_step> paths;
@@ -228,23 +241,12 @@ struct follow_path {
     recorder.emission(path, depth + 1, vec3(step.throughput * emitted(p)));
     step.radiance += step.throughput * emitted(p);
   }
-
- private:
-  WFPG_HD static vec3 inward_normal(vec3 p) {
-    std::uint32_t nearest = 0;
-    for (std::uint32_t face = 1; face < 6; ++face)
-      if (away(p, face) < away(p, nearest)) nearest = face;
-    return face_normal(nearest);
-  }
-  WFPG_HD static float away(vec3 p, std::uint32_t face) {
-    return std::abs(p[int(face / 2)] - (face % 2 ? 1.0f : 0.0f));
-  }
 };
 
 /// Traces `samples` samples of paths of two bounces from points on the walls; what each path gathered.
-template <class Exec, class Caster>
-std::vector<float> trace_paths(const Exec& exec, wfpg::path_guider<Exec>& guider, std::uint32_t samples,
-                               std::size_t paths, const Caster& caster) {
+template <class Exec, class Guide, class Caster>
+std::vector<float> trace_paths(const Exec& exec, wfpg::path_guider<Exec, Guide>& guider,
+                               std::uint32_t samples, std::size_t paths, const Caster& caster) {
   std::vector<float> picture;
   for (std::uint32_t sample = 0; sample < samples; ++sample) {
     const auto first = wall_surfaces(paths, sample);

@@ -156,11 +156,12 @@ struct state_access {
   static section_writer counts_to_bytes(const path_guider<Exec>& guider) {
     section_writer bytes;
     bytes.put(guider.samples_);
-    bytes.put(guider.build_.non_finite);
-    bytes.put(guider.build_.out_of_range);
-    bytes.put(guider.build_.degenerate);
+    const octree_guide<Exec>& guide = guider.guide_;
+    bytes.put(guide.build_.non_finite);
+    bytes.put(guide.build_.out_of_range);
+    bytes.put(guide.build_.degenerate);
     bytes.put(guider.recorder_.dropped(guider.exec_));
-    for (const depth_statistics& depth : guider.counts_.to_host(guider.exec_)) {
+    for (const depth_statistics& depth : guide.counts_.to_host(guider.exec_)) {
       bytes.put(depth.bins);
       bytes.put(depth.rays);
       bytes.put(depth.unbinned);
@@ -172,34 +173,36 @@ struct state_access {
   /// Depths that the guider does not have are left out.
   template <class Exec>
   static void restore_counts(section_reader bytes, path_guider<Exec>& guider) {
+    octree_guide<Exec>& guide = guider.guide_;
     guider.samples_ = bytes.get<std::uint32_t>();
     bytes.require(guider.samples_ < 0x80000000u, "has samples without end");
-    guider.build_.non_finite = bytes.get<std::uint32_t>();
-    guider.build_.out_of_range = bytes.get<std::uint32_t>();
-    guider.build_.degenerate = bytes.get<std::uint32_t>();
+    guide.build_.non_finite = bytes.get<std::uint32_t>();
+    guide.build_.out_of_range = bytes.get<std::uint32_t>();
+    guide.build_.degenerate = bytes.get<std::uint32_t>();
     const auto dropped = bytes.get<std::uint32_t>();
     const auto counts = bytes.get_all<std::uint64_t>(bytes.left() / sizeof(std::uint64_t));
     bytes.end();
     bytes.require(counts.size() % 4 == 0, "has a part of a depth");
-    std::vector<depth_statistics> depths(guider.counts_.size());
+    std::vector<depth_statistics> depths(guide.counts_.size());
     for (std::size_t i = 0; i < depths.size() && 4 * i < counts.size(); ++i)
       depths[i] = {counts[4 * i], counts[4 * i + 1], counts[4 * i + 2], counts[4 * i + 3]};
     guider.exec_.copy_from_host(guider.recorder_.dropped_.data(), &dropped, sizeof dropped);
-    guider.exec_.copy_from_host(guider.counts_.data(), depths.data(), guider.counts_.bytes());
+    guider.exec_.copy_from_host(guide.counts_.data(), depths.data(), guide.counts_.bytes());
   }
 
   template <class Exec>
   static void save(const path_guider<Exec>& guider, file_writer& file) {
     const Exec& exec = guider.exec_;
+    const octree_guide<Exec>& guide = guider.guide_;
     file.section("options", options_to_bytes(guider.options_));
-    file.section("octree", octree_to_bytes(exec, guider.octree_));
-    file.section("cache", to_bytes(exec, guider.cache_));
+    file.section("octree", octree_to_bytes(exec, guide.octree_));
+    file.section("cache", to_bytes(exec, guide.cache_));
     file.section("counts", counts_to_bytes(guider));
-    if (guider.keeps_fields()) {
-      file.section("levels", store_state::levels_to_bytes(exec, guider.store_));
-      file.section("fields", store_state::fields_to_bytes(exec, guider.store_));
+    if (guide.keeps_fields()) {
+      file.section("levels", store_state::levels_to_bytes(exec, guide.store_));
+      file.section("fields", store_state::fields_to_bytes(exec, guide.store_));
     }
-    if (!guider.lights_.view().empty()) file.section("lights", light_state::to_bytes(exec, guider.lights_));
+    if (!guide.lights_.view().empty()) file.section("lights", light_state::to_bytes(exec, guide.lights_));
     file.end();
   }
 
@@ -208,14 +211,15 @@ struct state_access {
     check_options(file, options);
     path_guider<Exec> guider(
         exec, fragments_from_bytes(exec, file.section("octree"), options.octree_resolution), options);
-    restore(guider.exec_, file.section("cache"), guider.cache_);
+    octree_guide<Exec>& guide = guider.guide_;
+    restore(guider.exec_, file.section("cache"), guide.cache_);
     restore_counts(file.section("counts"), guider);
-    if (guider.keeps_fields()) {
-      store_state::restore_levels(guider.exec_, file.section("levels"), guider.samples_, guider.store_);
-      store_state::restore_fields(guider.exec_, file.section("fields"), guider.store_);
+    if (guide.keeps_fields()) {
+      store_state::restore_levels(guider.exec_, file.section("levels"), guider.samples_, guide.store_);
+      store_state::restore_fields(guider.exec_, file.section("fields"), guide.store_);
     }
-    if (!guider.lights_.view().empty())
-      light_state::restore(guider.exec_, file.section("lights"), guider.lights_);
+    if (!guide.lights_.view().empty())
+      light_state::restore(guider.exec_, file.section("lights"), guide.lights_);
     file.end();
     return guider;
   }

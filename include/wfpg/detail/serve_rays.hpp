@@ -73,6 +73,32 @@ struct serve_products {
   }
 };
 
+/// What one ray draws from of a guide's view.
+template <class View>
+struct view_of_ray {
+  View view;
+  std::uint32_t ray;
+  template <class Bsdf>
+  WFPG_HD sampled_direction sample(const surface<Bsdf>& s, float u_technique, vec2 u) const {
+    return view.sample(ray, s, u_technique, u);
+  }
+  template <class Bsdf>
+  WFPG_HD float pdf(const surface<Bsdf>& s, vec3 direction) const {
+    return view.pdf(ray, s, direction);
+  }
+};
+
+/// Rays of any guide.
+template <class Serve, class View>
+struct serve_guide_view {
+  Serve serve;
+  View view;
+  WFPG_HD void operator()(std::size_t i) const {
+    const auto ray = static_cast<std::uint32_t>(i);
+    serve(ray, [&](const auto&) { return view_of_ray<View>{view, ray}; });
+  }
+};
+
 /// Rays without a bin: their BSDF alone.
 template <class Serve>
 struct serve_unbinned {

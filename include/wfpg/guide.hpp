@@ -1,0 +1,220 @@
+// What path_guider needs of a guide: where directions come from, and what learns from the paths that they
+// make. octree_guide.hpp is the paper's; docs/guides.md walks through one of one's own.
+//
+// A guide is a class `Guide` for a policy `Exec` that derives from guide_base and has
+//
+//   1. options:     using options_type;  sampling_options, or what derives from it
+//   2. a scene:     Guide(const Exec& exec, const Exec& working, triangle_mesh_view mesh,
+//                         const options_type& options);
+//                   `exec` is for what a guide keeps; `working` keeps memory that is given back to it, for
+//                   what every sample needs again. Other scenes than a mesh are constructors beside this one.
+//   3. a view:      view_type prepare(const guide_sample<Exec>& at, const wave<Surfaces, Random>& w,
+//                                     const Caster& caster);
+//                   what a wave's rays draw from, with `sample` and `pdf`: is_guide_view_v says how. It holds
+//                   until the next call.
+//   4. what learns: void learn(const guide_sample<Exec>& at, path_recorder<Exec>& paths);
+//                   the paths of the sample (recorded_path), which it clears
+//                   void update(const guide_sample<Exec>& at);
+//                   after that, and also where nothing is recorded
+//   5. memory:      std::vector<memory_part> memory() const;
+//
+// The last two have what they need of a guide that learns nothing from guide_base, and so have the members
+// that are there for the octree's sake. Samples, the recorder and its memory, clocks and checks are the
+// facade's, mixtures with the BSDF mis.hpp's. No call is virtual.
+#pragma once
+
+#include <wfpg/bsdf.hpp>
+#include <wfpg/error.hpp>
+#include <wfpg/exec/policy.hpp>
+#include <wfpg/light_guide.hpp>
+#include <wfpg/mis.hpp>
+#include <wfpg/path_recorder.hpp>
+#include <wfpg/ray_caster.hpp>
+#include <wfpg/statistics.hpp>
+#include <wfpg/types.hpp>
+#include <wfpg/voxelizer.hpp>
+#include <wfpg/wave.hpp>
+
+#include <cstdint>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace wfpg {
+
+/// What guiding can be told, whatever the guide. Every field has a default; ranges are checked when a guider
+/// is made.
+struct sampling_options {
+  /// Share of guided samples, in [0, 1]; 0: the guide's own.
+  float guide_fraction = 0.0f;
+  /// Guide toward emitters themselves. Beside next-event estimation they count with their MIS weight, and
+  /// false leaves them to it: better where fields do not learn.
+  bool include_emission = true;
+  std::uint32_t unguided_samples =
+      1;  ///< samples at the beginning that only record ("PT first", section 3.7)
+  /// Of all that the guider draws by itself.
+  std::uint64_t seed = 0;
+  std::size_t max_paths = 0;  ///< paths of a sample; 0: the renderer deposits by itself
+  std::uint32_t max_depth =
+      8;                     ///< vertices of a path that the recorder holds, and depths that statistics tell
+  std::size_t max_rays = 0;  ///< of a wave; 0: max_paths
+};
+
+/// The sample that a guide is called in. Valid during the call.
+template <class Exec>
+struct guide_sample {
+  const Exec& exec;            ///< runs its loops; its memory keeps what is given back
+  std::uint32_t number;        ///< of the sample, from 1; 0 before the first
+  std::uint64_t seed;          ///< of the sample
+  bool guided;                 ///< false: directions are to be their BSDFs', and paths are only recorded
+  detail::stage_clock& clock;  ///< for stages of the guide's own; prepare, learn and update are timed
+};
+
+/// What a guide wants recorded of paths.
+struct recording_needs {
+  std::uint32_t share_shift = 0;  ///< of 2^share_shift paths one
+  bool directions = false;        ///< what scatter() and escape() tell, too
+};
+
+/// What guides have that do not say otherwise: a guide derives from it, and hides what it does by itself.
+struct guide_base {
+  using options_type = sampling_options;  ///< no options of its own
+
+  /// Whether it never guides.
+  bool empty() const { return false; }
+  /// All vertices of all paths.
+  recording_needs recording() const { return {}; }
+  /// Which lights next-event estimation is to ask: it is not told.
+  light_guide_view lights() const { return {}; }
+  /// Before the waves of a sample.
+  template <class Exec>
+  void begin_sample(const guide_sample<Exec>&) {}
+  /// Learns nothing.
+  template <class Exec>
+  void learn(const guide_sample<Exec>&, path_recorder<Exec>&) {}
+  /// After the waves of a sample, and what was learnt from it.
+  template <class Exec>
+  void update(const guide_sample<Exec>&) {}
+  /// Adds nothing to what a guider tells.
+  template <class Exec>
+  void report(const Exec&, guider_statistics&) const {}
+  /// Nothing.
+  std::vector<memory_part> memory() const { return {}; }
+
+  /// Whether it draws the directions of a whole wave by itself:
+  ///   void serve(const guide_sample<Exec>&, const wave<Surfaces, Random>&, const Caster&, const Serve&);
+  /// as the octree's does, whose fields are gone when their rays are served.
+  static constexpr bool serves_waves = false;
+};
+
+namespace detail {
+
+struct trait_bsdf {
+  WFPG_HD float eval(vec3, vec3) const { return 0.0f; }
+  WFPG_HD float pdf(vec3, vec3) const { return 0.0f; }
+  WFPG_HD bsdf_sample sample(vec3, vec2) const { return {}; }
+  WFPG_HD bool is_delta() const { return false; }
+  WFPG_HD bool transmits() const { return false; }
+};
+struct trait_surfaces {
+  WFPG_HD surface<trait_bsdf> operator()(std::uint32_t) const { return {}; }
+};
+struct trait_random {
+  WFPG_HD vec2 operator()(std::uint32_t, std::uint32_t) const { return vec2(0.0f); }
+};
+struct trait_caster {
+  WFPG_HD ray_hit operator()(const ray&) const { return {}; }
+};
+using trait_wave = wave<trait_surfaces, trait_random>;
+
+template <class View, class = void>
+struct is_guide_view : std::false_type {};
+template <class View>
+struct is_guide_view<
+    View, std::void_t<decltype(sampled_direction(std::declval<const View&>().sample(
+                          std::uint32_t(0), std::declval<const surface<trait_bsdf>&>(), 0.0f, vec2()))),
+                      decltype(float(std::declval<const View&>().pdf(
+                          std::uint32_t(0), std::declval<const surface<trait_bsdf>&>(), vec3())))>>
+    : std::is_trivially_copyable<View> {};
+
+template <class Guide, class Exec, class = void>
+struct has_guide_options : std::false_type {};
+template <class Guide, class Exec>
+struct has_guide_options<Guide, Exec, std::void_t<typename Guide::options_type>>
+    : std::is_base_of<sampling_options, typename Guide::options_type> {};
+
+template <class Guide, class Exec, class = void>
+struct knows_mesh : std::false_type {};
+template <class Guide, class Exec>
+struct knows_mesh<Guide, Exec, std::void_t<typename Guide::options_type>>
+    : std::is_constructible<Guide, const Exec&, const Exec&, triangle_mesh_view,
+                            const typename Guide::options_type&> {};
+
+template <class Guide, class Exec, class = void>
+struct prepares_view : std::false_type {};
+template <class Guide, class Exec>
+struct prepares_view<
+    Guide, Exec,
+    std::void_t<typename Guide::view_type, decltype(typename Guide::view_type(std::declval<Guide&>().prepare(
+                                               std::declval<const guide_sample<Exec>&>(),
+                                               std::declval<const trait_wave&>(), trait_caster())))>>
+    : is_guide_view<typename Guide::view_type> {};
+
+template <class Guide, class Exec, class = void>
+struct learns_paths : std::false_type {};
+template <class Guide, class Exec>
+struct learns_paths<
+    Guide, Exec,
+    std::void_t<decltype(std::declval<Guide&>().learn(std::declval<const guide_sample<Exec>&>(),
+                                                      std::declval<path_recorder<Exec>&>())),
+                decltype(std::declval<Guide&>().update(std::declval<const guide_sample<Exec>&>())),
+                decltype(std::vector<memory_part>(std::declval<const Guide&>().memory()))>>
+    : std::is_base_of<guide_base, Guide> {};
+
+/// A guide as path_guider asks for it; what is missing is the error.
+template <class Guide, class Exec>
+constexpr bool require_guide() {
+  static_assert(has_guide_options<Guide, Exec>::value,
+                "Guide: needs `using options_type`, which derives from wfpg::sampling_options");
+  static_assert(knows_mesh<Guide, Exec>::value,
+                "Guide: needs a constructor of (const Exec&, const Exec& working, triangle_mesh_view, const "
+                "options_type&)");
+  static_assert(prepares_view<Guide, Exec>::value,
+                "Guide: needs `using view_type`, which is_guide_view_v asks for, and view_type "
+                "prepare(const guide_sample<Exec>&, const wave<Surfaces, Random>&, const Caster&)");
+  static_assert(learns_paths<Guide, Exec>::value,
+                "Guide: needs learn(const guide_sample<Exec>&, path_recorder<Exec>&), "
+                "update(const guide_sample<Exec>&) and memory(), which wfpg::guide_base has");
+  return true;
+}
+
+/// Refuses options that are out of range.
+inline void require_valid(const sampling_options& o) {
+  require(o.guide_fraction >= 0.0f && o.guide_fraction <= 1.0f, "guide_fraction", o.guide_fraction,
+          "in [0, 1]");
+  require(o.max_depth >= 1 && o.max_depth <= 1024, "max_depth", o.max_depth, "in [1, 1024]");
+  require(o.max_paths < 0xffffffffull, "max_paths", o.max_paths, "less than 2^32 - 1");
+  require(o.max_rays < 0xffffffffull, "max_rays", o.max_rays, "less than 2^32 - 1");
+  require(o.max_paths * o.max_depth < 0xffffffffull, "max_paths times max_depth, the vertices of a sample,",
+          o.max_paths * o.max_depth, "less than 2^32 - 1");
+}
+
+}  // namespace detail
+
+// clang-format off
+/// True where View, trivially copyable, draws directions for the rays of a wave; kernels take it by value:
+///   sampled_direction sample(std::uint32_t ray, const surface<Bsdf>& s, float u_technique, vec2 u) const;
+///   float pdf(std::uint32_t ray, const surface<Bsdf>& s, vec3 direction) const;
+/// `pdf` is the density of `sample`, per steradian, all that it mixes included: basic_guide_mixture
+/// (mis.hpp) mixes a distribution of directions and the surface's BSDF so.
+template <class View>
+inline constexpr bool is_guide_view_v = detail::is_guide_view<View>::value;
+// clang-format on
+
+/// True where path_guider<Exec, Guide> can be.
+template <class Guide, class Exec>
+inline constexpr bool is_guide_v =
+    detail::has_guide_options<Guide, Exec>::value&& detail::knows_mesh<Guide, Exec>::value&&
+        detail::prepares_view<Guide, Exec>::value&& detail::learns_paths<Guide, Exec>::value;
+
+}  // namespace wfpg

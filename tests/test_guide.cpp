@@ -1,0 +1,193 @@
+// What path_guider asks of guides, with the one of docs/guides.md.
+#include "pages/uniform_guide.hpp"
+#include "support/guiding.hpp"
+#include "support/policies.hpp"
+#include "support/scenes.hpp"
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+namespace {
+
+using namespace wfpg_test;
+using wfpg::sampled_direction;
+using wfpg::sampling_technique;
+
+// Guides that lack one thing each.
+template <class Exec>
+struct without_options : uniform_guide<Exec> {
+  using uniform_guide<Exec>::uniform_guide;
+  using options_type = int;
+};
+template <class Exec>
+struct without_mesh : uniform_guide<Exec> {
+  explicit without_mesh(const Exec& exec) : uniform_guide<Exec>(exec, exec, {}, {}) {}
+};
+struct without_pdf {
+  template <class Bsdf>
+  WFPG_HD sampled_direction sample(std::uint32_t, const wfpg::surface<Bsdf>&, float, vec2) const {
+    return {};
+  }
+};
+template <class Exec>
+struct without_view : uniform_guide<Exec> {
+  using uniform_guide<Exec>::uniform_guide;
+  using view_type = without_pdf;
+};
+template <class Exec>
+struct without_memory : uniform_guide<Exec> {
+  using uniform_guide<Exec>::uniform_guide;
+  void memory() const {}
+};
+
+WFPG_TEST_CASE("a guide is what has options, a mesh, a view, and learns", "[guide]") {
+  using guide = uniform_guide<Exec>;
+  CHECK(wfpg::is_guide_v<guide, Exec>);
+  CHECK(wfpg::is_guide_v<wfpg::octree_guide<Exec>, Exec>);
+  CHECK(wfpg::is_guide_view_v<wfpg::guide_view>);
+  CHECK(wfpg::is_guide_view_v<uniform_view>);
+  CHECK(!wfpg::is_guide_v<without_options<Exec>, Exec>);
+  CHECK(!wfpg::is_guide_v<without_mesh<Exec>, Exec>);
+  CHECK(!wfpg::is_guide_view_v<without_pdf>);
+  CHECK(!wfpg::is_guide_v<without_view<Exec>, Exec>);
+  CHECK(!wfpg::is_guide_v<without_memory<Exec>, Exec>);
+}
+
+/// A guider that has begun its n-th sample.
+template <class Exec>
+uniform_guider<Exec> guider_in_sample(const Exec& exec, const box_mesh<Exec>& mesh, std::uint32_t n) {
+  uniform_guider<Exec> guider = make_guider(exec, mesh.view(), 4096);
+  for (std::uint32_t sample = 0; sample < n; ++sample) {
+    guider.begin_sample();
+    if (sample + 1 < n) guider.end_sample();
+  }
+  return guider;
+}
+
+template <class Exec>
+std::vector<sampled_direction> draw(const Exec& exec, uniform_guider<Exec>& guider,
+                                    const std::vector<test_surface>& surfaces) {
+  const wave_of_surfaces<Exec> wave(exec, surfaces);
+  const wfpg::buffer<sampled_direction, Exec> directions(exec, surfaces.size());
+  guider.sample_directions(wave.get(), box_caster(), directions.view());
+  return directions.to_host(exec);
+}
+
+template <class Exec>
+struct density_of_view {
+  uniform_view view;
+  wfpg::array_view<const test_surface> surfaces;
+  wfpg::array_view<const sampled_direction> drawn;
+  WFPG_HD float operator()(std::size_t i) const {
+    const auto ray = static_cast<std::uint32_t>(i);
+    return surfaces[i].active ? view.pdf(ray, surfaces[i], drawn[i].direction) : 0.0f;
+  }
+};
+
+struct direction_of {
+  wfpg::array_view<const sampled_direction> drawn;
+  WFPG_HD vec3 operator()(std::uint32_t ray) const { return drawn[ray].direction; }
+};
+
+WFPG_TEST_CASE("a guide's share of directions is guide_fraction, after the samples that only record",
+               "[guide]") {
+  const Exec exec;
+  const box_mesh<Exec> mesh(exec);
+  const auto surfaces = wall_surfaces(4096, 3);
+  uniform_guider<Exec> first = guider_in_sample(exec, mesh, 1), second = guider_in_sample(exec, mesh, 2);
+  CHECK(!first.guided());
+  CHECK(second.guided());
+  for (const sampled_direction& d : draw(exec, first, surfaces))
+    CHECK(d.technique == sampling_technique::bsdf);
+  double guided = 0.0, below = 0.0;
+  const auto drawn = draw(exec, second, surfaces);
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    if (drawn[i].technique != sampling_technique::guide) continue;
+    guided += 1.0;
+    below += glm::dot(drawn[i].direction, surfaces[i].normal) < 0.0f ? 1.0 : 0.0;
+  }
+  CHECK(std::abs(guided / 4096.0 - 0.3) < 4.0 * std::sqrt(0.3 * 0.7 / 4096.0));
+  CHECK(std::abs(below / guided - 0.5) < 4.0 * 0.5 / std::sqrt(guided));
+}
+
+WFPG_TEST_CASE("a guide's view has the densities of its directions, and answers queries with them",
+               "[guide]") {
+  const Exec exec;
+  const box_mesh<Exec> mesh(exec);
+  const auto surfaces = mixed_surfaces(1000, 5);
+  uniform_guider<Exec> guider = guider_in_sample(exec, mesh, 2);
+  const wfpg::buffer<sampled_direction, Exec> drawn(exec, draw(exec, guider, surfaces));
+  const wfpg::buffer<test_surface, Exec> stored(exec, surfaces);
+  const wave_of_surfaces<Exec> wave(exec, surfaces);
+  const uniform_view view = guider.prepare(wave.get(), box_caster());
+  const auto asked = evaluate(
+      exec, surfaces.size(),
+      density_of_view<Exec>{view, const_view<test_surface>(stored), const_view<sampled_direction>(drawn)});
+  const wfpg::buffer<float, Exec> answers(exec, surfaces.size());
+  const wfpg::buffer<sampled_direction, Exec> again(exec, surfaces.size());
+  guider.sample_directions(
+      wave.get(), box_caster(), again.view(),
+      wfpg::density_queries{direction_of{const_view<sampled_direction>(drawn)}, answers.view()});
+  const auto expected = drawn.to_host(exec);
+  const auto answered = answers.to_host(exec);
+  CHECK(same_draws(again.to_host(exec), expected));
+  int wrong = 0;
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const bool none = expected[i].technique == sampling_technique::none ||
+                      expected[i].technique == sampling_technique::delta;
+    const float density = none ? 0.0f : expected[i].pdf;
+    wrong += std::abs(answered[i] - density) > 1.0e-5f * density;
+    wrong += !none && std::abs(asked[i] - density) > 1.0e-5f * density;
+  }
+  CHECK(wrong == 0);
+}
+
+/// Mean of what paths of two bounces gather, and its variance.
+struct estimate {
+  double mean = 0.0, variance = 0.0;
+};
+template <class Guider, class Exec>
+estimate estimate_radiance(const Exec& exec, Guider&& guider, std::uint32_t samples, std::size_t paths) {
+  double sum = 0.0, squares = 0.0;
+  const auto gathered = trace_paths(exec, guider, samples, paths, box_caster());
+  for (const float value : gathered) {
+    sum += double(value);
+    squares += double(value) * double(value);
+  }
+  const auto n = double(gathered.size());
+  return {sum / n, (squares / n - sum * sum / (n * n)) / n};
+}
+
+WFPG_TEST_CASE("what paths gather is the same, whichever guide they have", "[guide]") {
+  const Exec exec;
+  const box_mesh<Exec> mesh(exec);
+  constexpr std::size_t paths = 2048;
+  constexpr std::uint32_t samples = 24;
+  wfpg::guider_options unguided = tracing_options(paths);
+  unguided.unguided_samples = samples;
+  const estimate expected =
+      estimate_radiance(exec, wfpg::path_guider<Exec>(exec, mesh.view(), unguided), samples, paths);
+  const estimate found = estimate_radiance(exec, make_guider(exec, mesh.view(), paths), samples, paths);
+  CHECK(std::abs(found.mean - expected.mean) < 4.0 * std::sqrt(found.variance + expected.variance));
+  CHECK(std::sqrt(found.variance) < 0.05 * found.mean);
+}
+
+WFPG_TEST_CASE("what all guiders tell and check, they do with any guide", "[guide]") {
+  const Exec exec;
+  const box_mesh<Exec> mesh(exec);
+  uniform_guider<Exec> guider = guider_in_sample(exec, mesh, 3);
+  draw(exec, guider, wall_surfaces(100, 1));
+  CHECK(guider.statistics().samples == 3);
+  CHECK(guider.statistics().guided_samples == 2);
+  CHECK(guider.options().max_rays == 4096);
+  CHECK(guider.lights().empty());
+  const wfpg::memory_report memory = guider.memory();
+  CHECK(memory.persistent() == 0);
+  CHECK(memory.transient() > 4096 * 8 * 40);
+  CHECK(refusal([&] { make_guider(exec, mesh.view(), std::size_t(1) << 40); }).find("max_paths") !=
+        std::string::npos);
+  CHECK(refusal([&] { draw(exec, guider, wall_surfaces(5000, 1)); }).find("ray_count") != std::string::npos);
+}
+
+}  // namespace

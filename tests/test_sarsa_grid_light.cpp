@@ -1,0 +1,99 @@
+// What a SARSA grid knows of a furnace, whose radiance is known, and the means of paths that it guides.
+#include "support/catch.hpp"
+#include "support/sarsa.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace {
+
+using namespace wfpg_test;
+using wfpg::sarsa_grid_options;
+using wfpg::sarsa_sampler;
+using wfpg::sarsa_update;
+
+template <class Exec>
+sarsa_guider<Exec> furnace_guider(const Exec& exec, sarsa_update update, float learning_rate) {
+  sarsa_grid_options options = sarsa_options(2048);
+  options.update = update;
+  options.learning_rate = learning_rate;
+  options.resolution = 2;
+  options.direction_resolution = 4;
+  options.max_depth = 48;  // one path of 45000 gets there
+  const box_mesh<Exec> mesh(exec);
+  return {exec, mesh.view(), options};
+}
+
+WFPG_TEST_CASE("sarsa grid: Monte Carlo converges to a furnace's radiance", "[sarsa][furnace]") {
+  const Exec exec;
+  sarsa_guider<Exec> guider = furnace_guider(exec, sarsa_update::monte_carlo, 0.0f);
+  trace_in_furnace(exec, guider, 24);
+  CHECK(mean_radiance(exec, guider) == Approx(furnace_radiance).epsilon(0.02));
+}
+
+WFPG_TEST_CASE("sarsa grid: SARSA comes to a furnace's radiance from below, step by step",
+               "[sarsa][furnace]") {
+  const Exec exec;
+  for (const sarsa_update update : {sarsa_update::sarsa, sarsa_update::expected_sarsa}) {
+    INFO(name_of(update));
+    sarsa_guider<Exec> guider = furnace_guider(exec, update, 0.1f);
+    // As many bounces as there were steps: with all values new, 1 + 0.8 + 0.8² + ...
+    trace_in_furnace(exec, guider, 1);
+    CHECK(mean_radiance(exec, guider) == Approx(1.0f).epsilon(0.001));
+    trace_in_furnace(exec, guider, 1);
+    const double after_two = mean_radiance(exec, guider);
+    CHECK(after_two > 1.3);
+    CHECK(after_two < 1.85);
+    trace_in_furnace(exec, guider, 30);
+    CHECK(mean_radiance(exec, guider) == Approx(furnace_radiance).epsilon(0.05));
+  }
+}
+
+/// Mean of what paths gather, and its variance.
+struct estimate {
+  double mean = 0.0, variance = 0.0;
+};
+estimate estimate_of(const std::vector<float>& gathered) {
+  double sum = 0.0, squares = 0.0;
+  for (const float value : gathered) {
+    sum += double(value);
+    squares += double(value) * double(value);
+  }
+  const auto n = double(gathered.size());
+  return {sum / n, (squares / n - sum * sum / (n * n)) / n};
+}
+
+/// Of paths whose guide has learnt from others before: numbers are not used twice.
+template <class Exec>
+estimate guided_estimate(const Exec& exec, const sarsa_grid_options& options) {
+  constexpr std::uint32_t before = 8, samples = 16;
+  const box_mesh<Exec> mesh(exec);
+  sarsa_guider<Exec> guider(exec, mesh.view(), options);
+  const auto gathered = trace_paths(exec, guider, before + samples, options.max_paths, box_caster());
+  return estimate_of({gathered.begin() + std::ptrdiff_t(before * options.max_paths), gathered.end()});
+}
+
+WFPG_TEST_CASE("sarsa grid: what paths gather keeps its mean, and variance is less", "[sarsa]") {
+  const Exec exec;
+  sarsa_grid_options options = sarsa_options(2048);
+  options.unguided_samples = 1000;
+  const estimate unguided = guided_estimate(exec, options);
+  options.unguided_samples = 0;
+  for (const sarsa_update update : sarsa_updates)
+    for (const sarsa_sampler sampler : sarsa_samplers)
+      for (const float fraction : {0.0f, 1.0f}) {
+        if (fraction > 0.0f && update != sarsa_update::sarsa) continue;
+        INFO(name_of(update) << ", " << name_of(sampler) << ", fraction " << fraction);
+        options.update = update;
+        options.sampler = sampler;
+        options.guide_fraction = fraction;
+        options.floor = fraction > 0.0f ? 1.0f : 0.01f;  // weights are bounded, as a test of means needs
+        const estimate found = guided_estimate(exec, options);
+        CHECK(std::abs(found.mean - unguided.mean) < 4.0 * std::sqrt(found.variance + unguided.variance));
+        if (sampler == sarsa_sampler::mixed_rejection && !(fraction > 0.0f))
+          CHECK(found.variance < 0.7 * unguided.variance);
+      }
+}
+
+}  // namespace
