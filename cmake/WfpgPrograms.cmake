@@ -16,4 +16,5 @@ add_library(wfpg_warnings INTERFACE)
 set(wfpg_warning_options -Wall -Wextra $<$<BOOL:${WFPG_WARNINGS_AS_ERRORS}>:-Werror>)
 target_compile_options(
   wfpg_warnings INTERFACE "$<$<COMPILE_LANGUAGE:CXX>:${wfpg_warning_options}>"
-                          "$<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=-Wall,-Wextra>")
+                          "$<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=-Wall,-Wextra>"
+                          "$<$<AND:$<COMPILE_LANGUAGE:CUDA>,$<BOOL:${WFPG_WARNINGS_AS_ERRORS}>>:-Werror=all-warnings>")

@@ -1,10 +1,10 @@
 // The execution policies that tests run on, and a test case for each of them: WFPG_TEST_CASE defines one test
-// per policy and warp width, named "NAME - tbb16" and tagged [tbb][w16]. A CUDA compiler makes of the same
+// per policy and warp width, named "NAME - tbb32" and tagged [tbb][w32]. A CUDA compiler makes of the same
 // sources the CUDA policy's tests, "NAME - cuda" and tagged [cuda].
 //
+// A warp's text is the same on every policy: all widths run on seq, and 32, which users have, on the others.
 // WFPG_TEST_ONE_WIDTH compiles one width of each, another each, which is quick and runs nearly as many lines;
-// WFPG_TEST_ONLY_TBB leaves the other policies out, for the thread sanitizer; WFPG_TEST_SEVERAL_POLICIES says
-// that seq, omp and tbb are there side by side.
+// WFPG_TEST_SEVERAL_POLICIES says that seq, omp and tbb are there side by side.
 #pragma once
 
 #include "support/catch.hpp"
@@ -13,11 +13,9 @@
 #include <wfpg/exec/cuda.hpp>
 #include <wfpg/exec/seq.hpp>
 #else
-#if !defined(WFPG_TEST_ONLY_TBB)
 #define WFPG_TEST_SEVERAL_POLICIES
 #include <wfpg/exec/omp.hpp>
 #include <wfpg/exec/seq.hpp>
-#endif
 #include <wfpg/exec/tbb.hpp>
 #endif
 #include <wfpg/buffer.hpp>
@@ -36,11 +34,6 @@
   TEST_CASE(name " - " #policy #width, tags "[" #policy "][w" #width "]") { \
     function<wfpg::exec::basic_##policy<width>>();                          \
   }
-#define WFPG_TEST_WIDTHS(function, name, tags, policy) \
-  WFPG_TEST_ONE(function, name, tags, policy, 8)       \
-  WFPG_TEST_ONE(function, name, tags, policy, 16)      \
-  WFPG_TEST_ONE(function, name, tags, policy, 32)
-
 #if defined(__CUDACC__)
 #define WFPG_TEST_POLICIES(function, name, tags) \
   TEST_CASE(name " - cuda", tags "[cuda]") {     \
@@ -51,13 +44,13 @@
   WFPG_TEST_ONE(function, name, tags, seq, 8)    \
   WFPG_TEST_ONE(function, name, tags, omp, 16)   \
   WFPG_TEST_ONE(function, name, tags, tbb, 32)
-#elif defined(WFPG_TEST_ONLY_TBB)
-#define WFPG_TEST_POLICIES(function, name, tags) WFPG_TEST_WIDTHS(function, name, tags, tbb)
 #else
 #define WFPG_TEST_POLICIES(function, name, tags) \
-  WFPG_TEST_WIDTHS(function, name, tags, seq)    \
-  WFPG_TEST_WIDTHS(function, name, tags, omp)    \
-  WFPG_TEST_WIDTHS(function, name, tags, tbb)
+  WFPG_TEST_ONE(function, name, tags, seq, 8)    \
+  WFPG_TEST_ONE(function, name, tags, seq, 16)   \
+  WFPG_TEST_ONE(function, name, tags, seq, 32)   \
+  WFPG_TEST_ONE(function, name, tags, omp, 32)   \
+  WFPG_TEST_ONE(function, name, tags, tbb, 32)
 #endif
 
 #define WFPG_TEST_CASE_(function, name, tags) \
@@ -67,7 +60,7 @@
   template <class Exec>                       \
   void function()
 
-/// A test case on every policy and width; its body knows the policy as `Exec`. Use in an anonymous namespace.
+/// A test case on every policy; its body knows the policy as `Exec`. Use in an anonymous namespace.
 #define WFPG_TEST_CASE(name, tags) WFPG_TEST_CASE_(WFPG_TEST_JOIN(policy_test_, __LINE__), name, tags)
 
 namespace wfpg_test {
