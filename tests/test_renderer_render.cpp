@@ -178,7 +178,10 @@ TEST_CASE("the first sample of a guided rendering is path tracing's, later ones 
   CHECK(guided.report.octree.nodes > guided.report.octree.leaves);
   CHECK(guided.report.bins.at(0).count >= 1.0);
   CHECK(guided.report.cones_per_segment > 0.0);
-  CHECK(guided.report.persistent_bytes > 0);
+  CHECK(guided.report.used_bytes > 0);
+  CHECK(guided.report.persistent_bytes ==
+        guided.report.used_bytes + (guided.report.slots.capacity - guided.report.slots.live) *
+                                       (guided.report.slots.live_bytes / guided.report.slots.live));
   CHECK(guided.report.slots.capacity > guided.report.slots.live);
   CHECK(guided.report.slots.live > 0);
   CHECK(guided.report.slots.refreshed > 0.0);
