@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -171,6 +172,26 @@ WFPG_TEST_CASE("what paths gather is the same, whichever guide they have", "[gui
   const estimate found = estimate_radiance(exec, make_guider(exec, mesh.view(), paths), samples, paths);
   CHECK(std::abs(found.mean - expected.mean) < 4.0 * std::sqrt(found.variance + expected.variance));
   CHECK(std::sqrt(found.variance) < 0.05 * found.mean);
+}
+
+WFPG_TEST_CASE("a guider that takes another's place gives its own memory back", "[guide]") {
+  counting_resource resource;
+  const Exec exec = Exec().with_resource(&resource);
+  const box_mesh<Exec> mesh(exec);
+  const std::size_t before = resource.bytes_in_use;
+  {
+    const wfpg::guider_options options = tracing_options(256);
+    wfpg::path_guider<Exec> first(exec, mesh.view(), options), second(exec, mesh.view(), options);
+    trace_paths(exec, first, 2, 256, box_caster());
+    const std::size_t both = resource.bytes_in_use;
+    first = std::move(second);
+    CHECK(resource.bytes_in_use < both);
+    CHECK(first.statistics().samples == 0);
+    const auto picture = trace_paths(exec, first, 3, 256, box_caster());
+    second = wfpg::path_guider<Exec>(exec, mesh.view(), options);
+    CHECK(trace_paths(exec, second, 3, 256, box_caster()) == picture);
+  }
+  CHECK(resource.bytes_in_use == before);
 }
 
 WFPG_TEST_CASE("what all guiders tell and check, they do with any guide", "[guide]") {

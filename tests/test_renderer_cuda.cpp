@@ -58,6 +58,17 @@ TEST_CASE("pictures of a GPU guided by products have the means of the CPU's", "[
   check_all_scenes(sampling_method::wfpg_product);
 }
 
+TEST_CASE("pictures of a GPU guided by a SARSA grid have the means of the CPU's", "[renderer][cuda]") {
+  check_all_scenes(sampling_method::sarsa);
+  rendering what{"cornell-enclosed", true, sampling_method::sarsa};
+  for (const auto& update : render::sarsa_update_names())
+    for (const auto& sampler : render::sarsa_sampler_names()) {
+      what.update = update.second;
+      what.sampler = sampler.second;
+      check_as_on_cpu(what);
+    }
+}
+
 TEST_CASE("pictures of a GPU guided by transient fields have the means of the CPU's", "[renderer][cuda]") {
   for (const sampling_method method : {sampling_method::wfpg, sampling_method::wfpg_product})
     for (const char* scene : {"cornell-enclosed", "ajar", "thin-wall", "glossy-room"}) {
@@ -69,7 +80,7 @@ TEST_CASE("pictures of a GPU guided by transient fields have the means of the CP
 TEST_CASE("one seed gives one picture on a GPU", "[renderer][cuda]") {
   const render::scene world = render::make_builtin_scene("cornell-enclosed");
   for (const sampling_method method :
-       {sampling_method::pt, sampling_method::wfpg, sampling_method::wfpg_product})
+       {sampling_method::pt, sampling_method::wfpg, sampling_method::wfpg_product, sampling_method::sarsa})
     for (const fields lifetime : {fields::kept, fields::transient}) {
       render::render_options options;
       options.method = method;

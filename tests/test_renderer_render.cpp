@@ -136,7 +136,12 @@ TEST_CASE("a guided rendering is one picture on any device and number of threads
   options.width = options.height = 24;
   options.spp = 3;
   options.octree_resolution = 32;
-  for (const fields lifetime : {fields::kept, fields::transient}) {
+  options.sarsa.step = 1;
+  const std::pair<sampling_method, fields> kinds[] = {{sampling_method::wfpg, fields::kept},
+                                                      {sampling_method::wfpg, fields::transient},
+                                                      {sampling_method::sarsa, fields::kept}};
+  for (const auto& [method, lifetime] : kinds) {
+    options.method = method;
     options.lifetime = lifetime;
     options.where = device::seq;
     const std::vector<vec3> serial = render::render(scene, options, {}).picture.pixels;

@@ -30,8 +30,9 @@ void check_unbiased(const rendering& what) {
 
 using render::fields;
 using render::guiding;
-constexpr auto wfpg_method = render::sampling_method::wfpg;
-constexpr auto product_method = render::sampling_method::wfpg_product;
+using render::sampling_method;
+constexpr auto wfpg_method = sampling_method::wfpg;
+constexpr auto product_method = sampling_method::wfpg_product;
 
 }  // namespace
 
@@ -58,6 +59,18 @@ TEST_CASE("pictures guided by products have the mean of unguided ones", "[render
     check_unbiased({"cornell-enclosed", nee, product_method, fields::transient, guiding::oriented});
     check_unbiased({"thin-wall", nee, product_method, fields::transient, guiding::plain});
   }
+}
+
+TEST_CASE("pictures guided by a SARSA grid have the mean of unguided ones", "[renderer][unbiased]") {
+  for (const char* scene : {"cornell-box", "cornell-enclosed", "ajar", "thin-wall", "glossy-room"})
+    for (const bool nee : {false, true}) check_unbiased({scene, nee, sampling_method::sarsa});
+  rendering what{"cornell-enclosed", true, sampling_method::sarsa};
+  for (const auto& update : render::sarsa_update_names())
+    for (const auto& sampler : render::sarsa_sampler_names()) {
+      what.update = update.second;
+      what.sampler = sampler.second;
+      check_unbiased(what);
+    }
 }
 
 TEST_CASE("a furnace guided by products has its radiance within 0.5%", "[renderer][unbiased]") {

@@ -10,13 +10,22 @@
 
 namespace render {
 
-/// `segments`: rays that paths were extended by in all samples.
-template <class Exec>
-void report_guider(const wfpg::path_guider<Exec>& guider, std::uint64_t segments, render_report& report) {
+/// What a guider says whatever its guide: memory, and time by stage.
+template <class Exec, class Guide>
+void report_any_guider(const wfpg::path_guider<Exec, Guide>& guider, render_report& report) {
   const wfpg::memory_report memory = guider.memory();
   report.persistent_bytes = memory.persistent();
   report.transient_bytes = memory.transient();
   for (const wfpg::memory_part& part : memory.parts) report.memory.emplace_back(part.name, part.bytes);
+  for (const auto& [stage, seconds] : guider.statistics().seconds)
+    report.seconds.emplace_back("guide " + std::string(stage), seconds);
+}
+
+/// The octree's. `segments`: rays that paths were extended by in all samples.
+template <class Exec>
+void report_guider(const wfpg::path_guider<Exec>& guider, std::uint64_t segments, render_report& report) {
+  report_any_guider(guider, report);
+  const wfpg::memory_report memory = guider.memory();
 
   const wfpg::sparse_voxel_octree<Exec>& octree = guider.octree();
   report.octree.resolution = octree.resolution();
@@ -46,8 +55,6 @@ void report_guider(const wfpg::path_guider<Exec>& guider, std::uint64_t segments
   report.slots.freed = static_cast<double>(kept.freed) / samples;
   report.slots.refreshed = static_cast<double>(kept.refreshed) / samples;
   if (segments > 0) report.cones_per_segment = cones / static_cast<double>(segments);
-  for (const auto& [stage, seconds] : statistics.seconds)
-    report.seconds.emplace_back("guide " + std::string(stage), seconds);
 }
 
 }  // namespace render

@@ -5,6 +5,7 @@
 #include "stage_clock.hpp"
 
 #include <wfpg/sample_combiner.hpp>
+#include <wfpg/sarsa_options.hpp>
 
 #include <cstdint>
 #include <functional>
@@ -15,9 +16,9 @@
 
 namespace render {
 
-/// Path tracing; guided by wfpg's fields, or by their products with BSDFs; by Open PGL's mixtures of von
-/// Mises-Fisher lobes, which know of parallax, or by its quadtrees of directions.
-enum class sampling_method { pt, wfpg, wfpg_product, openpgl_vmm, openpgl_dqt };
+/// Path tracing; guided by wfpg's fields, or by their products with BSDFs; by its SARSA grid; by Open PGL's
+/// mixtures of von Mises-Fisher lobes, which know of parallax, or by its quadtrees of directions.
+enum class sampling_method { pt, wfpg, wfpg_product, sarsa, openpgl_vmm, openpgl_dqt };
 enum class guiding { oriented, plain };
 enum class fields { kept, transient };
 enum class checkpoint_times {
@@ -53,6 +54,7 @@ struct render_options {
   float guide_fraction = 0.0f;                        ///< in [0, 1]; 0: the mode's own, 0.5 of Open PGL's
   std::uint32_t light_groups = 32;         ///< that guided paths learn to choose lights from, in [1, 255]
   std::uint32_t samples_per_leaf = 32000;  ///< after which Open PGL's field splits a leaf, 8 to 2^30
+  wfpg::sarsa_grid_options sarsa;          ///< its own; what every guide is told follows from the others
   checkpoint_times checkpoints = checkpoint_times::none;  ///< when to keep the picture so far
   /// Unset: pt_linear, and all alike for path tracing and with a guide that was loaded.
   std::optional<wfpg::sample_combination> combine;
@@ -168,6 +170,11 @@ bool has_openpgl();
 
 inline bool is_wfpg(sampling_method method) {
   return method == sampling_method::wfpg || method == sampling_method::wfpg_product;
+}
+
+/// What a rendering needs to go on later can be saved.
+inline bool can_be_saved(sampling_method method) {
+  return method == sampling_method::pt || is_wfpg(method);
 }
 
 inline bool is_openpgl(sampling_method method) {

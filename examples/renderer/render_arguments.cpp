@@ -35,6 +35,25 @@ void parse_size(const std::string& text, render_options& options) {
     throw CLI::ValidationError("--size is " + text + ", expected WIDTHxHEIGHT, such as 640x360");
 }
 
+constexpr const char* sarsa_option_names[] = {"--sarsa-update",     "--sarsa-sampler",
+                                              "--sarsa-resolution", "--sarsa-directions",
+                                              "--sarsa-step",       "--sarsa-learning-rate"};
+
+void add_sarsa_options(CLI::App& app, wfpg::sarsa_grid_options& options) {
+  add_choice<wfpg::sarsa_update>(app, "--sarsa-update", options.update, sarsa_update_names(),
+                                 "what directions are taught: SARSA's targets (default), those of all "
+                                 "directions, or what paths gather");
+  add_choice<wfpg::sarsa_sampler>(app, "--sarsa-sampler", options.sampler, sarsa_sampler_names(),
+                                  "inversion over the sphere or hemisphere, rejection, or that mixed with "
+                                  "uniform directions (default)");
+  app.add_option("--sarsa-resolution", options.resolution, "cells along each side of the scene (default: 8)");
+  app.add_option("--sarsa-directions", options.direction_resolution,
+                 "directions along the side of a cell's square, even (default: 16)");
+  app.add_option("--sarsa-step", options.step, "samples after which what was learnt is used (default: 8)");
+  app.add_option("--sarsa-learning-rate", options.learning_rate,
+                 "what a new value counts for; 0: as each before (default: 0.05)");
+}
+
 }  // namespace
 
 void add_scene_options(CLI::App& app, scene_arguments& given) {
@@ -47,7 +66,7 @@ void add_scene_options(CLI::App& app, scene_arguments& given) {
 void add_method_options(CLI::App& app, render_options& options) {
   add_choice<sampling_method>(app, "--method", options.method, method_names(),
                               "path tracing; guided by fields (default), or by their products with BSDFs; by "
-                              "Open PGL's mixtures of lobes or quadtrees");
+                              "a grid that learns by SARSA; by Open PGL's mixtures of lobes or quadtrees");
   add_choice<guiding>(app, "--guiding", options.mode,
                       {{"oriented", guiding::oriented}, {"plain", guiding::plain}},
                       "bins by position and normal (default), or by position alone");
@@ -116,6 +135,7 @@ void add_guider_options(CLI::App& app, render_options& options) {
   app.add_option("--samples-per-leaf", options.samples_per_leaf,
                  "after which Open PGL splits a leaf of its field (default: 32000)")
       ->check(CLI::Range(8, 1 << 30));
+  add_sarsa_options(app, options.sarsa);
 }
 
 void check_render_options(const CLI::App& app, const render_options& options) {
@@ -125,6 +145,9 @@ void check_render_options(const CLI::App& app, const render_options& options) {
     throw CLI::RequiresError("--samples-per-leaf", "--method openpgl-vmm or openpgl-dqt");
   if (app.count("--caster-buffer") > 0 && options.where != device::optix)
     throw CLI::RequiresError("--caster-buffer", "--device optix");
+  for (const char* const name : sarsa_option_names)
+    if (app.count(name) > 0 && options.method != sampling_method::sarsa)
+      throw CLI::RequiresError(name, "--method sarsa");
 }
 
 std::string listed_builtin_scenes() {

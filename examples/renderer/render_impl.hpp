@@ -9,6 +9,7 @@
 #include "wavefront.hpp"
 
 #include <wfpg/path_guider.hpp>
+#include <wfpg/sarsa_grid.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -89,10 +90,28 @@ void take_samples(path_tracer<Exec, Caster>& tracer, Guider& guider, const pinho
   result.report.spp = budget.samples();
 }
 
+/// What every guide is told.
+inline wfpg::sampling_options sampling_options_of(const render_options& options) {
+  wfpg::sampling_options guided;
+  guided.guide_fraction = options.guide_fraction;
+  guided.unguided_samples = wfpg::unguided_samples(combination_of(options));
+  guided.seed = options.seed;
+  guided.max_paths = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  guided.max_depth = static_cast<std::uint32_t>(options.max_depth);
+  return guided;
+}
+
+inline wfpg::sarsa_grid_options sarsa_options_of(const render_options& options) {
+  wfpg::sarsa_grid_options guided = options.sarsa;
+  static_cast<wfpg::sampling_options&>(guided) = sampling_options_of(options);
+  return guided;
+}
+
 /// `shares`: of the groups of lights that there are to choose from.
 inline wfpg::guider_options guider_options_of(const render_options& options,
                                               const std::vector<float>& shares) {
   wfpg::guider_options guided;
+  static_cast<wfpg::sampling_options&>(guided) = sampling_options_of(options);
   guided.octree_resolution = options.octree_resolution;
   guided.fields =
       options.lifetime == fields::kept ? wfpg::field_lifetime::kept : wfpg::field_lifetime::transient;
@@ -107,14 +126,9 @@ inline wfpg::guider_options guider_options_of(const render_options& options,
   guided.min_bin_level = options.min_bin_level;
   guided.deposits_per_leaf = options.deposits_per_leaf;
   guided.mode = options.mode == guiding::plain ? wfpg::guiding_mode::plain : wfpg::guiding_mode::oriented;
-  guided.guide_fraction = options.guide_fraction;
   guided.kept.learn = options.learn;
   // With next-event estimation emission is worth its MIS weight, which fields that learn find out.
   guided.include_emission = !options.nee || (options.lifetime == fields::kept && options.learn);
-  guided.unguided_samples = wfpg::unguided_samples(combination_of(options));
-  guided.seed = options.seed;
-  guided.max_paths = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
-  guided.max_depth = static_cast<std::uint32_t>(options.max_depth);
   return guided;
 }
 
@@ -174,11 +188,15 @@ render_result render_on(const Exec& exec, const scene& scene, const render_optio
       exec, scene, options,
       [&](auto& tracer, const scene_view& geometry, const auto& lights, const pinhole& camera,
           stage_clock& building, render_result& result) {
+        const wfpg::triangle_mesh_view mesh{geometry.positions, geometry.triangles};
         if (options.method == sampling_method::pt) {
           unguided<Exec> guider(exec);
           take_samples(tracer, guider, camera, options, progress, result);
+        } else if (options.method == sampling_method::sarsa) {
+          wfpg::path_guider<Exec, wfpg::sarsa_grid<Exec>> guider(exec, mesh, sarsa_options_of(options));
+          take_samples(tracer, guider, camera, options, progress, result);
+          report_any_guider(guider, result.report);
         } else {
-          const wfpg::triangle_mesh_view mesh{geometry.positions, geometry.triangles};
           const stopwatch build;
           wfpg::path_guider<Exec> guider =
               begin_guider(exec, mesh, guider_options_of(options, lights.shares()), options, result.guide);

@@ -53,6 +53,11 @@ class path_guider {
   path_guider(const Exec& exec, Scene&& scene, const options_type& options = {})
       : path_guider(in_scene{}, exec, std::forward<Scene>(scene), options) {}
 
+  /// Takes all of another, which is not used again but to be assigned to.
+  path_guider(path_guider&& other) = default;
+  /// The same; what it had goes first.
+  path_guider& operator=(path_guider&& other);
+
   /// Begins a sample: one wave of paths, or several. Forgets recorded paths that were not deposited.
   void begin_sample();
 
@@ -143,6 +148,21 @@ class path_guider {
   path_recorder<Exec> recorder_;
   std::uint32_t samples_ = 0;
 };
+
+/// What memory lies in is to outlive it: the old guider is gone as a whole, at the end.
+template <class Exec, class Guide>
+path_guider<Exec, Guide>& path_guider<Exec, Guide>::operator=(path_guider&& other) {
+  if (this == &other) return *this;
+  const path_guider old(std::move(*this));
+  options_ = std::move(other.options_);
+  clock_ = other.clock_;
+  working_memory_ = std::move(other.working_memory_);
+  exec_ = other.exec_;
+  guide_ = std::move(other.guide_);
+  recorder_ = std::move(other.recorder_);
+  samples_ = other.samples_;
+  return *this;
+}
 
 template <class Exec, class Guide>
 void path_guider<Exec, Guide>::begin_sample() {

@@ -25,7 +25,9 @@
 #include <wfpg/radiance_field.hpp>
 #include <wfpg/ray_caster.hpp>
 #include <wfpg/sample_combiner.hpp>
+#include <wfpg/sampling_options.hpp>
 #include <wfpg/sarsa_grid.hpp>
+#include <wfpg/sarsa_options.hpp>
 #include <wfpg/sparse_voxel_octree.hpp>
 #include <wfpg/spatial_binner.hpp>
 #include <wfpg/statistics.hpp>

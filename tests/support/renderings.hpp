@@ -2,6 +2,7 @@
 #pragma once
 
 #include "builtin_scenes.hpp"
+#include "option_names.hpp"
 #include "render.hpp"
 #include "support/statistics.hpp"
 
@@ -25,6 +26,8 @@ struct rendering {
   render::fields lifetime = render::fields::kept;
   render::guiding mode = render::guiding::oriented;
   render::device where = render::device::cpu;
+  wfpg::sarsa_update update = wfpg::sarsa_update::sarsa;
+  wfpg::sarsa_sampler sampler = wfpg::sarsa_sampler::mixed_rejection;
 
   render::render_options options() const {
     render::render_options options;
@@ -44,13 +47,22 @@ struct rendering {
     options.rays_per_bin = 128;
     options.min_bin_level = 2;
     options.samples_per_leaf = 500;
+    options.sarsa.update = update;
+    options.sarsa.sampler = sampler;
+    options.sarsa.resolution = 4;
+    options.sarsa.direction_resolution = 8;
+    options.sarsa.step = 2;
     // What quadtrees have learnt of so little leaves tails of noise that a t-test does not expect.
     if (method == render::sampling_method::openpgl_dqt) options.guide_fraction = 0.3f;
     return options;
   }
   std::string name() const {
-    return scene + (where == render::device::cuda ? " on cuda" : "") + ", next-event estimation " +
-           (nee ? "on" : "off") + ", " + (mode == render::guiding::plain ? "plain" : "oriented") + ", " +
+    const std::string view = scene + (where == render::device::cuda ? " on cuda" : "") +
+                             ", next-event estimation " + (nee ? "on" : "off") + ", ";
+    if (method == render::sampling_method::sarsa)
+      return view + "SARSA grid, update " + render::name_of(render::sarsa_update_names(), update) +
+             ", sampler " + render::name_of(render::sarsa_sampler_names(), sampler);
+    return view + (mode == render::guiding::plain ? "plain" : "oriented") + ", " +
            (lifetime == render::fields::kept ? "kept" : "transient") + " fields" +
            (method == render::sampling_method::wfpg_product ? ", products" : "") +
            (method == render::sampling_method::openpgl_vmm ? ", Open PGL's mixtures" : "") +

@@ -14,17 +14,10 @@
 #include <wfpg/detail/math.hpp>
 #include <wfpg/field_sampler.hpp>
 #include <wfpg/octahedral_map.hpp>
+#include <wfpg/sarsa_options.hpp>
 #include <wfpg/types.hpp>
 
 namespace wfpg {
-
-/// How a sarsa_grid draws directions (section 3).
-enum class sarsa_sampler : std::uint8_t {
-  sphere_inversion,      ///< the radiance alone, by inversion: O(log B), and half of it below the surface
-  hemisphere_inversion,  ///< radiance times cosine above the surface, by inversion: O(B²)
-  rejection,       ///< the same by rejection from the uniform hemisphere: O(1/c), c being its acceptance
-  mixed_rejection  ///< that mixed with the uniform hemisphere by the optimal share (Eqs. 8, 9)
-};
 
 namespace detail {
 

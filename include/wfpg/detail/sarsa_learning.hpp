@@ -9,13 +9,6 @@
 
 namespace wfpg {
 
-/// What a direction's radiance is learnt from (section 2).
-enum class sarsa_update : std::uint8_t {
-  sarsa,           ///< the next vertex: what it emits, and the path's next direction as it is known (Eq. 6)
-  expected_sarsa,  ///< what it emits, and all directions there as they are known (Eq. 5): B² BSDFs a ray
-  monte_carlo      ///< all that the path gathers from there
-};
-
 namespace detail {
 
 /// Cells over a box: positions beyond it are the next cell's.
