@@ -9,6 +9,14 @@
 #include <utility>
 #include <vector>
 
+/// A view that lacks its density. Out of the namespace below, where nvcc warns that nobody draws from it.
+struct without_pdf {
+  template <class Bsdf>
+  WFPG_HD wfpg::sampled_direction sample(std::uint32_t, const wfpg::surface<Bsdf>&, float, wfpg::vec2) const {
+    return {};
+  }
+};
+
 namespace {
 
 using namespace wfpg_test;
@@ -24,12 +32,6 @@ struct without_options : uniform_guide<Exec> {
 template <class Exec>
 struct without_mesh : uniform_guide<Exec> {
   explicit without_mesh(const Exec& exec) : uniform_guide<Exec>(exec, exec, {}, {}) {}
-};
-struct without_pdf {
-  template <class Bsdf>
-  WFPG_HD sampled_direction sample(std::uint32_t, const wfpg::surface<Bsdf>&, float, vec2) const {
-    return {};
-  }
 };
 template <class Exec>
 struct without_view : uniform_guide<Exec> {
