@@ -307,7 +307,7 @@ WFPG_TEST_CASE("sarsa grid: options out of range are named", "[sarsa]") {
   }
 }
 
-WFPG_TEST_CASE("sarsa grid: memory is told, and scenes of no extent guide", "[sarsa]") {
+WFPG_TEST_CASE("sarsa grid: memory is told; without paths or extent it guides on", "[sarsa]") {
   counting_resource resource;
   const Exec exec = Exec().with_resource(&resource);
   const box_mesh<Exec> mesh(exec);
@@ -321,6 +321,11 @@ WFPG_TEST_CASE("sarsa grid: memory is told, and scenes of no extent guide", "[sa
     trace_paths(exec, guider, 1, 500, box_caster());
     CHECK(resource.allocations - allocations < 8);  // the test's own
   }
+  sarsa_grid_options without_paths = sarsa_options(0);
+  without_paths.max_rays = 500;
+  sarsa_guider<Exec> untaught(exec, mesh.view(), without_paths);
+  for (const float value : trace_paths(exec, untaught, 2, 500, box_caster())) CHECK(value >= 0.0f);
+  CHECK(known(exec, untaught) == std::pair<float, float>(0.0f, 0.0f));
   for (const wfpg::bounds3& bounds : {wfpg::bounds3{}, wfpg::bounds3{vec3(0.5f), vec3(0.5f)}}) {
     sarsa_guider<Exec> guider(exec, bounds, sarsa_options(500));
     CHECK(trace_paths(exec, guider, 2, 500, box_caster()).size() == 1000);

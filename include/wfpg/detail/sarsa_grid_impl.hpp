@@ -110,6 +110,7 @@ sarsa_grid_view sarsa_grid<Exec>::prepare(const guide_sample<Exec>& at, const wa
 
 template <class Exec>
 void sarsa_grid<Exec>::learn(const guide_sample<Exec>& at, path_recorder<Exec>& paths) {
+  if (queue_.capacity() == 0) return;
   at.exec.for_each(paths.recorded(),
                    detail::learn_path{
                        paths.view(), table(), queue_.view(), options_.update, {expected_.data(), numbered_}});
