@@ -293,6 +293,7 @@ struct record_nowhere {
     recorder.vertex(path, 0, floor, {0.0f, 1.0f, 0.0f}, one);
     sampled_direction nowhere;
     nowhere.direction = vec3(bad[path]);
+    nowhere.technique = sampling_technique::guide;
     nowhere.field = 0;
     recorder.scatter(path, 0, nowhere);
   }
