@@ -283,10 +283,13 @@ TEST_CASE("state on disk is of methods that have one", "[renderer][state]") {
       sampling_method::pt, [](render_options& o) { o.keep_guide = true; }, "method is pt, expected wfpg or");
   refused(
       sampling_method::openpgl_dqt, [](render_options& o) { o.keep_state = true; },
-      "method is openpgl-dqt, expected none");
+      "method is openpgl-dqt, expected pt, wfpg or");
   refused(
       sampling_method::openpgl_vmm, [](render_options& o) { o.resume = "a"; },
-      "method is openpgl-vmm, expected none");
+      "method is openpgl-vmm, expected pt, wfpg or");
+  refused(
+      sampling_method::sarsa, [](render_options& o) { o.keep_state = true; },
+      "method is sarsa, expected pt, wfpg or");
   refused(
       sampling_method::wfpg, [](render_options& o) { o.load_guide = o.resume = "a"; },
       "load_guide is a, expected none");
