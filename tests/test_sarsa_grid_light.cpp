@@ -1,5 +1,6 @@
 // What a SARSA grid knows of a furnace, whose radiance is known, and the means of paths that it guides.
 #include "support/catch.hpp"
+#include "support/estimates.hpp"
 #include "support/sarsa.hpp"
 
 #include <cmath>
@@ -48,20 +49,6 @@ WFPG_TEST_CASE("sarsa grid: SARSA comes to a furnace's radiance from below, step
     trace_in_furnace(exec, guider, 30);
     CHECK(mean_radiance(exec, guider) == Approx(furnace_radiance).epsilon(0.05));
   }
-}
-
-/// Mean of what paths gather, and its variance.
-struct estimate {
-  double mean = 0.0, variance = 0.0;
-};
-estimate estimate_of(const std::vector<float>& gathered) {
-  double sum = 0.0, squares = 0.0;
-  for (const float value : gathered) {
-    sum += double(value);
-    squares += double(value) * double(value);
-  }
-  const auto n = double(gathered.size());
-  return {sum / n, (squares / n - sum * sum / (n * n)) / n};
 }
 
 /// Of paths whose guide has learnt from others before: numbers are not used twice.

@@ -9,6 +9,7 @@
 // ignored outside (t_min, t_max).
 #pragma once
 
+#include <wfpg/detail/octree_walk.hpp>
 #include <wfpg/sparse_voxel_octree.hpp>
 #include <wfpg/types.hpp>
 
@@ -65,60 +66,23 @@ class svo_ray_caster {
     const float per_unit = static_cast<float>(tree_.grid().resolution) / tree_.grid().side;
     const auto extent = static_cast<float>(tree_.grid().resolution);
     const float start = detail::max(r.t_min * per_unit, clearance_);
-    float t = detail::max(start, distance_to_exit(origin, r.direction, extent, true));
-    const float exit = distance_to_exit(origin, r.direction, extent, false);
-    const float end = leads_somewhere(r, exit) ? detail::min(exit, r.t_max * per_unit) : 0.0f;
-    for (t = past_face(t); t < end && !tree_.empty(); t = past_face(t)) {
+    float t = detail::max(start, detail::distance_to_exit(origin, r.direction, extent, true));
+    const float exit = detail::distance_to_exit(origin, r.direction, extent, false);
+    const bool leads = detail::leads_somewhere(r.origin, r.direction, exit);
+    const float end = leads ? detail::min(exit, r.t_max * per_unit) : 0.0f;
+    for (t = detail::past_face(t); t < end && !tree_.empty(); t = detail::past_face(t)) {
       const vec3 p = origin + t * r.direction;
       const vec3 cell = glm::clamp(p, vec3(0.0f), vec3(extent - 0.5f));
       vec3 lower;
       float size;
-      if (deepest_cell(uvec3(cell), lower, size)) return {t / per_unit, 0.0f};
-      t = detail::max(distance_to_exit(origin - lower, r.direction, size, false), t);
+      if (detail::node_or_gap(tree_, uvec3(cell), tree_.depth(), lower, size) != invalid_node)
+        return {t / per_unit, 0.0f};
+      t = detail::max(detail::distance_to_exit(origin - lower, r.direction, size, false), t);
     }
     return {-1.0f, environment_};
   }
 
  private:
-  WFPG_HD static bool leads_somewhere(const ray& r, float exit) {
-    return exit < 3.0e38f && detail::is_finite(r.origin) && detail::is_finite(r.direction);
-  }
-
-  /// A little further along a ray, in voxels: past a face whatever the rounding, however far its origin is.
-  WFPG_HD static float past_face(float t) { return t + detail::max(1.0e-3f, t * 0x1p-22f); }
-
-  /// Where a ray leaves the cube [0, size]³, or enters it; in units of the cube.
-  WFPG_HD static float distance_to_exit(vec3 origin, vec3 direction, float size, bool enter) {
-    float result = enter ? 0.0f : 3.0e38f;
-    for (int axis = 0; axis < 3; ++axis) {
-      if (fabsf(direction[axis]) < 1.0e-12f) {
-        const bool beside = origin[axis] < 0.0f || origin[axis] > size;
-        if (beside) return enter ? 3.0e38f : 0.0f;
-        continue;
-      }
-      const bool positive = direction[axis] > 0.0f;
-      const float face = positive != enter ? size : 0.0f;
-      const float t = (face - origin[axis]) / direction[axis];
-      result = enter ? detail::max(result, t) : detail::min(result, t);
-    }
-    return result;
-  }
-
-  /// The leaf, or else the largest empty node, that holds a voxel: its lower corner and size in voxels.
-  WFPG_HD bool deepest_cell(uvec3 voxel, vec3& lower, float& size) const {
-    node_id node = 0;
-    std::uint32_t level = tree_.depth();
-    while (level > 0 && node != invalid_node) {
-      --level;
-      const std::uint32_t octant =
-          (voxel.x >> level & 1u) | (voxel.y >> level & 1u) << 1 | (voxel.z >> level & 1u) << 2;
-      node = tree_.child(node, octant);
-    }
-    size = static_cast<float>(1u << level);
-    lower = vec3((voxel >> level) << level);
-    return node != invalid_node;
-  }
-
   sparse_voxel_octree_view tree_;
   float environment_;
   float clearance_;

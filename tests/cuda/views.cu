@@ -56,8 +56,16 @@ __global__ void use_bins(wfpg::bins_view bins, float* out) {
 __global__ void use_sarsa(wfpg::sarsa_grid_view guide, wfpg::sampled_direction* out, float* density) {
   const wfpg::surface<grey> s;
   out[threadIdx.x] = guide.sample(threadIdx.x, s, 0.5f, wfpg::vec2(0.25f));
+  density[threadIdx.x] =
+      guide.pdf(threadIdx.x, s, out[threadIdx.x].direction) + guide.radiance(s.position, wfpg::vec3(0, 0, 1));
+}
+
+__global__ void use_records(wfpg::irradiance_records_view guide, wfpg::sampled_direction* out,
+                            float* density) {
+  const wfpg::surface<grey> s;
+  out[threadIdx.x] = guide.sample(threadIdx.x, s, 0.5f, wfpg::vec2(0.25f));
   density[threadIdx.x] = guide.pdf(threadIdx.x, s, out[threadIdx.x].direction) +
-                         guide.radiance(s.position, wfpg::vec3(0, 0, 1));
+                         (guide.tag(s.position) == wfpg::voxel_tag::light ? 1.0f : 0.0f);
 }
 
 __global__ void use_guide(wfpg::guide_view guide, wfpg::sampled_direction* out, float* density) {

@@ -1,6 +1,8 @@
-// The header that docs/guides.md makes of its first two blocks, and its SARSA grid.
+// The header that docs/guides.md makes of its first two blocks, its SARSA grid, and its irradiance records.
 #pragma once
 
 #include "guides-1.inc"
 #include "guides-2.inc"
 #include "guides-3.inc"
+#include "guides-4.inc"
+#include "guides-5.inc"
