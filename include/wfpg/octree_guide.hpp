@@ -4,6 +4,7 @@
 #pragma once
 
 #include <wfpg/buffer.hpp>
+#include <wfpg/detail/recorded_share.hpp>
 #include <wfpg/detail/serve_rays.hpp>
 #include <wfpg/exitance_cache.hpp>
 #include <wfpg/field_store.hpp>
@@ -74,7 +75,7 @@ class octree_guide : public guide_base {
   /// Whether there is no octree.
   bool empty() const { return octree_.view().empty(); }
   /// Of many paths a part; directions where fields learn.
-  recording_needs recording() const { return {share_shift(), keeps_fields() && options_.kept.learn}; }
+  recording_needs recording() const { return {recorded().shift(), keeps_fields() && options_.kept.learn}; }
 
   /// Before the waves of a sample.
   void begin_sample(const guide_sample<Exec>& at);
@@ -128,7 +129,9 @@ class octree_guide : public guide_base {
   friend struct detail::state_access;
 
   static const guider_options& checked(const guider_options& options);
-  std::uint32_t share_shift() const;
+  detail::recorded_share recorded() const {
+    return {options_, std::uint64_t(options_.deposits_per_leaf) * octree_.leaf_count()};
+  }
   std::size_t deposits_of_sample() const;
   static std::uint32_t resolution_at(const guider_options& options, std::uint32_t depth);
 

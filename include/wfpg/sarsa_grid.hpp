@@ -16,6 +16,7 @@
 #pragma once
 
 #include <wfpg/buffer.hpp>
+#include <wfpg/detail/recorded_share.hpp>
 #include <wfpg/detail/sarsa_learning.hpp>
 #include <wfpg/detail/serve_rays.hpp>
 #include <wfpg/guide.hpp>
@@ -113,7 +114,7 @@ class sarsa_grid : public guide_base {
   sarsa_grid(const Exec& exec, const Exec& working, const bounds3& bounds, const sarsa_grid_options& options);
 
   /// Directions, and of many paths a part.
-  recording_needs recording() const { return {share_shift(), true}; }
+  recording_needs recording() const { return {recorded().shift(), true}; }
 
   /// Before the waves of a sample.
   void begin_sample(const guide_sample<Exec>&) { numbered_ = 0; }
@@ -136,11 +137,12 @@ class sarsa_grid : public guide_base {
 
  private:
   static const sarsa_grid_options& checked(const sarsa_grid_options& options);
-  std::uint32_t share_shift() const;
   std::size_t directions() const {
     return std::size_t(view_.cells_.size()) * options_.direction_resolution * options_.direction_resolution;
   }
-  std::size_t values_of_sample() const;
+  detail::recorded_share recorded() const {
+    return {options_, std::uint64_t(options_.values_per_direction) * directions()};
+  }
   bool expects() const { return options_.update == sarsa_update::expected_sarsa; }
   detail::sarsa_table table() const { return {view_.cells_, radiance_.data(), view_.resolution_}; }
   void publish(const Exec& exec);

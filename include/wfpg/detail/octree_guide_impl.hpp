@@ -49,25 +49,10 @@ const guider_options& octree_guide<Exec>::checked(const guider_options& o) {
   return o;
 }
 
-/// Of so many paths, a power of two, one is recorded: the power.
-template <class Exec>
-std::uint32_t octree_guide<Exec>::share_shift() const {
-  if (options_.deposits_per_leaf == 0) return 0;
-  const std::uint64_t wanted = std::uint64_t(options_.deposits_per_leaf) * octree_.leaf_count();
-  const std::uint64_t all = std::uint64_t(options_.max_paths) * options_.max_depth;
-  std::uint32_t shift = 0;
-  while (wanted > 0 && all >> (shift + 1) >= wanted) ++shift;
-  return shift;
-}
-
 template <class Exec>
 std::size_t octree_guide<Exec>::deposits_of_sample() const {
   if (options_.deposit_capacity > 0) return options_.deposit_capacity;
-  const std::size_t recorded = detail::recorded_runs{share_shift()}.size(options_.max_paths);
-  detail::require(recorded * options_.max_depth <= detail::most_queued,
-                  "max_paths times max_depth, the vertices that are recorded,", recorded * options_.max_depth,
-                  "at most 2^31: set deposits_per_leaf, or deposit_capacity");
-  return recorded * options_.max_depth;
+  return recorded().vertices("deposits_per_leaf, or deposit_capacity");
 }
 
 template <class Exec>

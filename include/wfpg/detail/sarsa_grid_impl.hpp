@@ -37,25 +37,6 @@ const sarsa_grid_options& sarsa_grid<Exec>::checked(const sarsa_grid_options& o)
   return o;
 }
 
-/// Of so many paths, a power of two, one is recorded: the power.
-template <class Exec>
-std::uint32_t sarsa_grid<Exec>::share_shift() const {
-  const std::uint64_t wanted = std::uint64_t(options_.values_per_direction) * directions();
-  const std::uint64_t all = std::uint64_t(options_.max_paths) * options_.max_depth;
-  std::uint32_t shift = 0;
-  while (wanted > 0 && all >> (shift + 1) >= wanted) ++shift;
-  return shift;
-}
-
-template <class Exec>
-std::size_t sarsa_grid<Exec>::values_of_sample() const {
-  const std::size_t recorded = detail::recorded_runs{share_shift()}.size(options_.max_paths);
-  detail::require(recorded * options_.max_depth <= detail::most_queued,
-                  "max_paths times max_depth, the vertices that are recorded,", recorded * options_.max_depth,
-                  "at most 2^31: set values_per_direction");
-  return recorded * options_.max_depth;
-}
-
 template <class Exec>
 sarsa_grid<Exec>::sarsa_grid(const Exec& exec, const Exec& working, const bounds3& bounds,
                              const sarsa_grid_options& options)
@@ -73,7 +54,7 @@ sarsa_grid<Exec>::sarsa_grid(const Exec& exec, const Exec& working, const bounds
   opposites_ = buffer<std::uint32_t, Exec>(exec, n);
   if (options_.sampler != sarsa_sampler::sphere_inversion)
     normalisers_ = buffer<detail::sarsa_normaliser, Exec>(exec, std::size_t(view_.cells_.size()) * normals);
-  queue_ = detail::value_queue<Exec>(working, values_of_sample(), directions());
+  queue_ = detail::value_queue<Exec>(working, recorded().vertices("values_per_direction"), directions());
   if (expects()) expected_ = buffer<float, Exec>(working, options_.max_paths * options_.max_depth);
   view_.radiance_ = radiance_.data();
   view_.weights_ = weights_.data();

@@ -1,0 +1,39 @@
+// Of how many paths a guide has the vertices recorded.
+#pragma once
+
+#include <wfpg/detail/recorded_runs.hpp>
+#include <wfpg/detail/value_queue.hpp>
+#include <wfpg/sampling_options.hpp>
+
+#include <string>
+
+namespace wfpg::detail {
+
+/// As few paths as have so many vertices wanted in a sample, or up to twice as many: of 2^shift one. All are
+/// recorded where none are wanted in particular.
+class recorded_share {
+ public:
+  recorded_share(const sampling_options& o, std::uint64_t wanted) : paths_(o.max_paths), depth_(o.max_depth) {
+    const std::uint64_t all = std::uint64_t(paths_) * depth_;
+    while (wanted > 0 && all >> (shift_ + 1) >= wanted) ++shift_;
+  }
+
+  std::uint32_t shift() const { return shift_; }
+
+  /// Of a sample, at most. Throws std::invalid_argument, which says to set `options`, where a queue holds
+  /// fewer.
+  std::size_t vertices(const char* options) const {
+    const std::size_t count = recorded_runs{shift_}.size(paths_) * depth_;
+    const std::string remedy = std::string("at most 2^31: set ") + options;
+    require(count <= most_queued, "max_paths times max_depth, the vertices that are recorded,", count,
+            remedy.c_str());
+    return count;
+  }
+
+ private:
+  std::size_t paths_;
+  std::uint32_t depth_;
+  std::uint32_t shift_ = 0;
+};
+
+}  // namespace wfpg::detail
