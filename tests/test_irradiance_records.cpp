@@ -51,6 +51,33 @@ TEST_CASE("irradiance records: cells that reach above a surface have cosines, an
   }
 }
 
+TEST_CASE("irradiance records: products of cosines and counters are summed four at a time", "[records]") {
+  random_numbers random(5);
+  for (int i = 0; i < 200; ++i) {
+    const wfpg::detail::record_cosines cosines(random.direction());
+    const wfpg::detail::cell_cosines table(cosines);
+    std::uint32_t sum = 0;
+    for (std::uint32_t row = 0; row < irradiance_record::rows; ++row) {
+      irradiance_record record{};
+      for (std::uint32_t column = 0; column < irradiance_record::columns; ++column)
+        record.words[row] |= std::uint64_t(i == 0 ? irradiance_record::most : random.below(16)) << 4 * column;
+      for (std::uint32_t group = 0; group < wfpg::detail::cell_cosines::groups; ++group) {
+        std::uint32_t products = 0, alone = 0;
+        for (std::uint32_t column = group; column < irradiance_record::columns; column += 4) {
+          const std::uint32_t cell = row * irradiance_record::columns + column;
+          REQUIRE(table(cell) == cosines(cell));
+          products += record.counter(cell) * cosines(cell);
+          alone += cosines(cell);
+        }
+        REQUIRE(table.dot(record.words[row], row, group) == products);
+        REQUIRE(table.sum(row, group) == alone);
+        sum += alone;
+      }
+    }
+    REQUIRE(table.sum() == sum);
+  }
+}
+
 struct draw_directions {
   wfpg::irradiance_records_view view;
   vec3 place, normal;

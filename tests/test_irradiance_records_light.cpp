@@ -24,7 +24,7 @@ struct glow {
   WFPG_HD void operator()(std::size_t leaf) const {
     const vec3 centre = tree.centre(tree.first_leaf() + static_cast<node_id>(leaf));
     const auto arrived = static_cast<std::uint64_t>(65536.0f * radiance(centre));
-    light[leaf] = {{0, 0}, {arrived, arrived}};
+    light[leaf] = {{0, 0}, {arrived, arrived}, 0};
   }
 };
 
@@ -263,6 +263,25 @@ WFPG_TEST_CASE("irradiance records: voxels behind a window are lit where light c
   CHECK(lit > 100);
   CHECK(dark > 10);
   CHECK(wrong == 0);
+}
+
+/// What a place at the far wall knows of the direction that the lamp of the window is in.
+template <class Exec, class Smooth>
+std::uint32_t seen_of_lamp(const Exec& exec, const Smooth& smooth) {
+  const lit_mesh<Exec> mesh(exec, ceiling_lamp(0.1f, 0.4f, 0.3f, 0.7f, 3.0f), true);
+  irradiance_records_options options = records_options();
+  options.emitter_rays = 1u << 18;
+  records_guider<Exec, Smooth> guider(exec, mesh.scene(smooth), options);
+  begin_with_wave(exec, guider, walled_box_caster());
+  const vec3 place(1.0f, 0.4f, 0.5f), lamp(0.25f, 1.0f, 0.5f);
+  const irradiance_record record = record_of(exec, guider.guide().view(), place);
+  return record.counter(irradiance_record::cell_of(glm::normalize(lamp - place)));
+}
+
+WFPG_TEST_CASE("irradiance records: a lamp is seen through what its light goes through", "[records]") {
+  const Exec exec;
+  CHECK(seen_of_lamp(exec, window()) >= 8);  // the lamp is in other cells, too
+  CHECK(seen_of_lamp(exec, wfpg::no_smooth_surfaces()) <= 1);  // no light there at all
 }
 
 WFPG_TEST_CASE("irradiance records: light between mirrors ends", "[records]") {

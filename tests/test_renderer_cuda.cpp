@@ -69,6 +69,10 @@ TEST_CASE("pictures of a GPU guided by a SARSA grid have the means of the CPU's"
     }
 }
 
+TEST_CASE("pictures of a GPU guided by irradiance records have the means of the CPU's", "[renderer][cuda]") {
+  check_all_scenes(sampling_method::records);
+}
+
 TEST_CASE("pictures of a GPU guided by transient fields have the means of the CPU's", "[renderer][cuda]") {
   for (const sampling_method method : {sampling_method::wfpg, sampling_method::wfpg_product})
     for (const char* scene : {"cornell-enclosed", "ajar", "thin-wall", "glossy-room"}) {
@@ -80,7 +84,8 @@ TEST_CASE("pictures of a GPU guided by transient fields have the means of the CP
 TEST_CASE("one seed gives one picture on a GPU", "[renderer][cuda]") {
   const render::scene world = render::make_builtin_scene("cornell-enclosed");
   for (const sampling_method method :
-       {sampling_method::pt, sampling_method::wfpg, sampling_method::wfpg_product, sampling_method::sarsa})
+       {sampling_method::pt, sampling_method::wfpg, sampling_method::wfpg_product, sampling_method::sarsa,
+        sampling_method::records})
     for (const fields lifetime : {fields::kept, fields::transient}) {
       render::render_options options;
       options.method = method;

@@ -138,9 +138,12 @@ TEST_CASE("a guided rendering is one picture on any device and number of threads
   options.spp = 3;
   options.octree_resolution = 32;
   options.sarsa.step = 1;
+  options.records.octree_resolution = 32;
+  options.records.emitter_rays = 1 << 12;
   const std::pair<sampling_method, fields> kinds[] = {{sampling_method::wfpg, fields::kept},
                                                       {sampling_method::wfpg, fields::transient},
-                                                      {sampling_method::sarsa, fields::kept}};
+                                                      {sampling_method::sarsa, fields::kept},
+                                                      {sampling_method::records, fields::kept}};
   for (const auto& [method, lifetime] : kinds) {
     options.method = method;
     options.lifetime = lifetime;

@@ -77,6 +77,11 @@ TEST_CASE("pictures guided by a SARSA grid have the mean of unguided ones", "[re
   }
 }
 
+TEST_CASE("pictures guided by irradiance records have the mean of unguided ones", "[renderer][unbiased]") {
+  for (const char* scene : {"cornell-enclosed", "glossy-room"})
+    for (const bool nee : {false, true}) check_unbiased({scene, nee, sampling_method::records});
+}
+
 TEST_CASE("a furnace guided by products has its radiance within 0.5%", "[renderer][unbiased]") {
   for (const bool nee : {false, true}) {
     rendering furnace{"furnace", nee, product_method};

@@ -3,6 +3,7 @@
 
 #include "render.hpp"
 
+#include <wfpg/irradiance_records.hpp>
 #include <wfpg/path_guider.hpp>
 
 #include <algorithm>
@@ -14,11 +15,23 @@ namespace render {
 template <class Exec, class Guide>
 void report_any_guider(const wfpg::path_guider<Exec, Guide>& guider, render_report& report) {
   const wfpg::memory_report memory = guider.memory();
-  report.persistent_bytes = memory.persistent();
+  report.persistent_bytes = report.used_bytes = memory.persistent();
   report.transient_bytes = memory.transient();
   for (const wfpg::memory_part& part : memory.parts) report.memory.emplace_back(part.name, part.bytes);
   for (const auto& [stage, seconds] : guider.statistics().seconds)
     report.seconds.emplace_back("guide " + std::string(stage), seconds);
+}
+
+/// Of records: the last build's.
+template <class Exec, class Smooth>
+void report_records(const wfpg::path_guider<Exec, wfpg::irradiance_records<Exec, Smooth>>& guider,
+                    std::uint64_t segments, render_report& report) {
+  report_any_guider(guider, report);
+  const wfpg::irradiance_records_statistics& found = guider.guide().statistics();
+  report.records = {found.builds,  found.seconds, found.rays,   found.cones,
+                    found.records, found.objects, found.lights, found.directly_lit};
+  if (segments > 0)
+    report.cones_per_segment = static_cast<double>(found.cones) / static_cast<double>(segments);
 }
 
 /// The octree's. `segments`: rays that paths were extended by in all samples.

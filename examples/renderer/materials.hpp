@@ -24,10 +24,7 @@ struct bsdf {
   unorm8x3 transmitted_colour{};  ///< this and the next: of the two kinds with all lobes
   lobe_factors factors{};
 
-  WFPG_HD bool is_delta() const {
-    return kind == material_kind::mirror || kind == material_kind::dielectric ||
-           kind == material_kind::thin_dielectric;
-  }
+  WFPG_HD bool is_delta() const { return is_smooth(kind); }
   WFPG_HD bool transmits() const {
     switch (kind) {
       case material_kind::dielectric:

@@ -8,6 +8,7 @@ const std::map<std::string, sampling_method>& method_names() {
       {"wfpg", sampling_method::wfpg},
       {"wfpg-product", sampling_method::wfpg_product},
       {"sarsa", sampling_method::sarsa},
+      {"records", sampling_method::records},
       {"openpgl-vmm", sampling_method::openpgl_vmm},
       {"openpgl-dqt", sampling_method::openpgl_dqt}};
   return names;

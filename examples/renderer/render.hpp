@@ -4,6 +4,7 @@
 #include "image_io.hpp"
 #include "stage_clock.hpp"
 
+#include <wfpg/irradiance_records_options.hpp>
 #include <wfpg/sample_combiner.hpp>
 #include <wfpg/sarsa_options.hpp>
 
@@ -16,9 +17,10 @@
 
 namespace render {
 
-/// Path tracing; guided by wfpg's fields, or by their products with BSDFs; by its SARSA grid; by Open PGL's
-/// mixtures of von Mises-Fisher lobes, which know of parallax, or by its quadtrees of directions.
-enum class sampling_method { pt, wfpg, wfpg_product, sarsa, openpgl_vmm, openpgl_dqt };
+/// Path tracing; guided by wfpg's fields, or by their products with BSDFs; by its SARSA grid; by its
+/// irradiance records; by Open PGL's mixtures of von Mises-Fisher lobes, which know of parallax, or by its
+/// quadtrees of directions.
+enum class sampling_method { pt, wfpg, wfpg_product, sarsa, records, openpgl_vmm, openpgl_dqt };
 enum class guiding { oriented, plain };
 enum class fields { kept, transient };
 enum class checkpoint_times {
@@ -52,11 +54,12 @@ struct render_options {
   std::uint32_t min_bin_level = 3;                    ///< l_min, from the root
   std::uint32_t deposits_per_leaf = 16;               ///< that are recorded in a sample; 0: all
   float guide_fraction = 0.0f;                        ///< in [0, 1]; 0: the mode's own, 0.5 of Open PGL's
-  std::uint32_t light_groups = 32;         ///< that guided paths learn to choose lights from, in [1, 255]
-  std::uint32_t samples_per_leaf = 32000;  ///< after which Open PGL's field splits a leaf, 8 to 2^30
-  wfpg::sarsa_grid_options sarsa;          ///< its own; what every guide is told follows from the others
+  std::uint32_t light_groups = 32;           ///< that guided paths learn to choose lights from, in [1, 255]
+  std::uint32_t samples_per_leaf = 32000;    ///< after which Open PGL's field splits a leaf, 8 to 2^30
+  wfpg::sarsa_grid_options sarsa;            ///< its own; what every guide is told follows from the others
+  wfpg::irradiance_records_options records;  ///< likewise
   checkpoint_times checkpoints = checkpoint_times::none;  ///< when to keep the picture so far
-  /// Unset: pt_linear, and all alike for path tracing and with a guide that was loaded.
+  /// Unset: pt_linear, and all alike for path tracing, records, and with a guide that was loaded.
   std::optional<wfpg::sample_combination> combine;
   std::string load_guide;            ///< guide file, of the same scene, to begin with; empty: none
   std::string resume;                ///< state file of the rendering to go on with; empty: none
@@ -89,6 +92,16 @@ struct octree_report {
   double build_seconds = 0.0;
 };
 
+/// Irradiance records, as of their last build.
+struct records_report {
+  std::uint32_t builds = 0;  ///< 0: there are none
+  double build_seconds = 0.0;
+  std::uint64_t rays = 0;
+  std::uint64_t cones = 0;
+  std::uint32_t records = 0;
+  std::uint32_t objects = 0, lights = 0, directly_lit = 0;  ///< voxels by their tag
+};
+
 struct render_report {
   std::string scene, method, device;
   int spp = 0;                 ///< rendered, before a rendering went on too; times are since then
@@ -102,6 +115,7 @@ struct render_report {
   octree_report octree;
   std::vector<bin_report> bins;  ///< by depth
   slot_report slots;
+  records_report records;
   std::size_t regions = 0;  ///< of Open PGL's field
   double cones_per_segment = 0.0;
 };
@@ -109,7 +123,8 @@ struct render_report {
 /// How the samples of these options are combined.
 inline wfpg::sample_combination combination_of(const render_options& options) {
   using wfpg::sample_combination;
-  const bool settled = options.method == sampling_method::pt || !options.load_guide.empty();
+  const bool learns = options.method != sampling_method::pt && options.method != sampling_method::records;
+  const bool settled = !learns || !options.load_guide.empty();
   return options.combine.value_or(settled ? sample_combination::constant : sample_combination::pt_linear);
 }
 

@@ -54,6 +54,19 @@ void add_sarsa_options(CLI::App& app, wfpg::sarsa_grid_options& options) {
                  "what a new value counts for; 0: as each before (default: 0.05)");
 }
 
+constexpr const char* records_option_names[] = {"--records-octree", "--records-level", "--records-rays",
+                                                "--records-cones", "--records-albedo"};
+
+void add_records_options(CLI::App& app, wfpg::irradiance_records_options& options) {
+  app.add_option("--records-octree", options.octree_resolution,
+                 "voxels a side that records look at, a power of two (default: 64)");
+  app.add_option("--records-level", options.record_level, "octree level of records (default: 4, 16 a side)");
+  app.add_option("--records-rays", options.emitter_rays,
+                 "rays from emitters, which find what is lit directly (default: 262144)");
+  app.add_option("--records-cones", options.cones_per_direction, "of each direction (default: 4)");
+  app.add_option("--records-albedo", options.albedo, "of what emitters light, in [0, 1] (default: 0.5)");
+}
+
 }  // namespace
 
 void add_scene_options(CLI::App& app, scene_arguments& given) {
@@ -66,7 +79,8 @@ void add_scene_options(CLI::App& app, scene_arguments& given) {
 void add_method_options(CLI::App& app, render_options& options) {
   add_choice<sampling_method>(app, "--method", options.method, method_names(),
                               "path tracing; guided by fields (default), or by their products with BSDFs; by "
-                              "a grid that learns by SARSA; by Open PGL's mixtures of lobes or quadtrees");
+                              "a grid that learns by SARSA; by irradiance records that are made before the "
+                              "first path; by Open PGL's mixtures of lobes or quadtrees");
   add_choice<guiding>(app, "--guiding", options.mode,
                       {{"oriented", guiding::oriented}, {"plain", guiding::plain}},
                       "bins by position and normal (default), or by position alone");
@@ -136,6 +150,7 @@ void add_guider_options(CLI::App& app, render_options& options) {
                  "after which Open PGL splits a leaf of its field (default: 32000)")
       ->check(CLI::Range(8, 1 << 30));
   add_sarsa_options(app, options.sarsa);
+  add_records_options(app, options.records);
 }
 
 void check_render_options(const CLI::App& app, const render_options& options) {
@@ -148,6 +163,9 @@ void check_render_options(const CLI::App& app, const render_options& options) {
   for (const char* const name : sarsa_option_names)
     if (app.count(name) > 0 && options.method != sampling_method::sarsa)
       throw CLI::RequiresError(name, "--method sarsa");
+  for (const char* const name : records_option_names)
+    if (app.count(name) > 0 && options.method != sampling_method::records)
+      throw CLI::RequiresError(name, "--method records");
 }
 
 std::string listed_builtin_scenes() {

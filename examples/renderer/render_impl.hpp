@@ -2,12 +2,14 @@
 #pragma once
 
 #include "guider_report.hpp"
+#include "records_scene.hpp"
 #include "render.hpp"
 #include "render_state.hpp"
 #include "saved_guider.hpp"
 #include "unguided.hpp"
 #include "wavefront.hpp"
 
+#include <wfpg/irradiance_records.hpp>
 #include <wfpg/path_guider.hpp>
 #include <wfpg/sarsa_grid.hpp>
 
@@ -107,6 +109,14 @@ inline wfpg::sarsa_grid_options sarsa_options_of(const render_options& options) 
   return guided;
 }
 
+inline wfpg::irradiance_records_options records_options_of(const scene& host, const render_options& options) {
+  wfpg::irradiance_records_options guided = options.records;
+  static_cast<wfpg::sampling_options&>(guided) = sampling_options_of(options);
+  // Next-event estimation finds emitters, if not behind smooth surfaces.
+  guided.include_emission = !options.nee || has_smooth_surfaces(host);
+  return guided;
+}
+
 /// `shares`: of the groups of lights that there are to choose from.
 inline wfpg::guider_options guider_options_of(const render_options& options,
                                               const std::vector<float>& shares) {
@@ -181,6 +191,23 @@ render_result render_by(const Exec& exec, const scene& scene, const render_optio
   return result;
 }
 
+/// Samples guided by irradiance records, which ask the tracer's caster what is smooth.
+template <class Exec, class Caster, class Take>
+void guide_by_records(const Exec& exec, const path_tracer<Exec, Caster>& tracer, const scene& host,
+                      const scene_view& geometry, const render_options& options, const Take& take) {
+  if constexpr (wfpg::is_inline_caster_v<Caster>) {
+    using smooth = smooth_surfaces<Caster>;
+    const wfpg::buffer<wfpg::emitting_triangle, Exec> emitters(exec, emitters_of(host));
+    const wfpg::lit_scene<smooth> lit{
+        {geometry.positions, geometry.triangles}, emitters.view(), {tracer.caster(), geometry}};
+    wfpg::path_guider<Exec, wfpg::irradiance_records<Exec, smooth>> guider(exec, lit,
+                                                                           records_options_of(host, options));
+    take(guider);
+  } else {
+    throw std::runtime_error("--device optix does not support --method records; --device cuda does");
+  }
+}
+
 template <class Accelerated, class Exec>
 render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
                         const progress_callback& progress) {
@@ -196,6 +223,11 @@ render_result render_on(const Exec& exec, const scene& scene, const render_optio
           wfpg::path_guider<Exec, wfpg::sarsa_grid<Exec>> guider(exec, mesh, sarsa_options_of(options));
           take_samples(tracer, guider, camera, options, progress, result);
           report_any_guider(guider, result.report);
+        } else if (options.method == sampling_method::records) {
+          guide_by_records(exec, tracer, scene, geometry, options, [&](auto& guider) {
+            take_samples(tracer, guider, camera, options, progress, result);
+            report_records(guider, tracer.segments(), result.report);
+          });
         } else {
           const stopwatch build;
           wfpg::path_guider<Exec> guider =

@@ -50,6 +50,11 @@ enum class material_kind : std::uint8_t {
   metallic_roughness,       ///< all lobes of metallic_roughness.hpp, around a solid
   thin_metallic_roughness,  ///< the same of a sheet
 };
+/// It scatters light in directions of which each has a probability, not a density.
+WFPG_HD constexpr bool is_smooth(material_kind kind) {
+  return kind == material_kind::mirror || kind == material_kind::dielectric ||
+         kind == material_kind::thin_dielectric;
+}
 /// Kinds from this one on read all numbers of a material.
 inline constexpr material_kind first_kind_of_all_lobes = material_kind::metallic_roughness;
 /// Bits of a key that is a material's kind: all are below 2^bits - 1.

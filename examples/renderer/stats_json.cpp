@@ -40,6 +40,13 @@ json slots_of(const slot_report& slots) {
           {"freed_per_sample", slots.freed}, {"refreshed_per_sample", slots.refreshed}};
 }
 
+json records_of(const records_report& records) {
+  return {{"builds", records.builds},   {"build_seconds", records.build_seconds},
+          {"rays", records.rays},       {"cones", records.cones},
+          {"records", records.records}, {"objects", records.objects},
+          {"lights", records.lights},   {"directly_lit", records.directly_lit}};
+}
+
 }  // namespace
 
 json to_json(const image_error& error) {
@@ -65,6 +72,7 @@ void write_stats(const std::string& path, const render_report& report,
   for (const bin_report& depth : report.bins)
     stats["bins"].push_back({{"count", depth.count}, {"mean_rays", depth.mean_rays}});
   if (report.slots.capacity > 0) stats["slots"] = slots_of(report.slots);
+  if (report.records.builds > 0) stats["records"] = records_of(report.records);
   if (report.regions > 0) stats["regions"] = report.regions;
   stats["cones_per_segment"] = report.cones_per_segment;
   if (error) stats["error"] = to_json(*error);

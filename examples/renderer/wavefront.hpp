@@ -112,6 +112,9 @@ class path_tracer {
 
   const named_seconds& seconds() const { return clock_.seconds(); }
 
+  /// What casts the paths' rays.
+  const Caster& caster() const { return caster_; }
+
  private:
   static constexpr bool is_inline = wfpg::is_inline_caster_v<Caster>;
 

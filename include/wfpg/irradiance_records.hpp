@@ -14,10 +14,11 @@
 // is that which voxels are known to send, so what is lit indirectly is dark. Where light leaves the octree,
 // rays from beyond the scene ask the caster for the environment.
 //
-// Memory: 64 bytes a record; of the octree and its tags 11 a leaf, 12 an inner node. While it builds 32 a
-// leaf, 24 a node, 44 a ray in flight (2^16 of them), 512 a record (4096 of them). Time: `emitter_rays` rays,
-// with smooth surfaces one for each bounce more, 2048 for the environment, and 128 `cones_per_direction`
-// cones a record. Directions: O(128) integer operations each, and so densities.
+// Memory: 64 bytes a record, 75 KiB for cosines; of the octree and its tags 11 a leaf, 12 an inner node.
+// While it builds 40 a leaf, 24 a node, 44 a ray in flight (2^16 of them), 512 a record (4096 of them). Time:
+// `emitter_rays` rays, with smooth surfaces one for each bounce more, 2048 for the environment, and 128
+// `cones_per_direction` cones a record. Directions: some 300 integer operations each; a density beside one, a
+// few.
 #pragma once
 
 #include <wfpg/buffer.hpp>
@@ -26,6 +27,7 @@
 #include <wfpg/detail/serve_rays.hpp>
 #include <wfpg/detail/voxel_light.hpp>
 #include <wfpg/guide.hpp>
+#include <wfpg/irradiance_records_options.hpp>
 #include <wfpg/sparse_voxel_octree.hpp>
 #include <wfpg/voxelizer.hpp>
 
@@ -33,22 +35,6 @@
 #include <vector>
 
 namespace wfpg {
-
-/// What irradiance_records can be told, beside sampling_options, of which guide_fraction is 0.5 by default,
-/// and unguided_samples 0, since nothing is learnt from them. Ranges are checked when a guider is made.
-struct irradiance_records_options : sampling_options {
-  /// All samples are guided.
-  irradiance_records_options() { unguided_samples = 0; }
-
-  std::uint32_t octree_resolution =
-      64;  ///< voxels along the scene's longest side that have tags and light; a power of two in [1, 4096]
-  std::uint32_t record_level = 4;  ///< records are of this level's nodes, at most the leaves'; 4: 16 a side
-  std::uint32_t emitter_rays = 1u << 18;  ///< that find directly lit voxels, in [1, 2^31]
-  float albedo = 0.5f;                    ///< of what they light, in [0, 1]
-  std::uint32_t cones_per_direction = 4;  ///< of each record, in [1, 256]
-  std::uint32_t smooth_bounces = 8;       ///< that a ray from an emitter follows, at most 64
-  float floor = 0.01f;  ///< that each direction has at least, times the record's mean, in [0, 1]
-};
 
 /// Triangles and the emitters among them, in the policy's memory, and how light goes on at smooth surfaces:
 ///   smooth_bounce operator()(std::uint32_t i, const ray& r, float distance, vec2 u) const;
@@ -88,18 +74,20 @@ class irradiance_records_view {
 
   /// A direction of the mixture with the surface's BSDF, and the mixture's density.
   template <class Bsdf>
-  WFPG_HD sampled_direction sample(std::uint32_t, const surface<Bsdf>& s, float u_technique, vec2 u) const {
-    return mixture(s).sample(s, u_technique, u);
+  WFPG_HD sampled_direction sample(std::uint32_t ray, const surface<Bsdf>& s, float u_technique,
+                                   vec2 u) const {
+    return mixture(ray, s).sample(s, u_technique, u);
   }
   /// The mixture's density of a unit direction, per steradian.
   template <class Bsdf>
-  WFPG_HD float pdf(std::uint32_t, const surface<Bsdf>& s, vec3 direction) const {
-    return mixture(s).pdf(s, direction);
+  WFPG_HD float pdf(std::uint32_t ray, const surface<Bsdf>& s, vec3 direction) const {
+    return mixture(ray, s).pdf(s, direction);
   }
 
-  /// The mixture at a surface; of one that is not guided, the BSDF alone.
+  /// The mixture at a surface, whatever the ray; of one that is not guided, the BSDF alone.
   template <class Bsdf>
-  WFPG_HD basic_guide_mixture<detail::record_distribution> mixture(const surface<Bsdf>& s) const {
+  WFPG_HD basic_guide_mixture<detail::record_distribution> mixture(std::uint32_t,
+                                                                   const surface<Bsdf>& s) const {
     if (!guides(s)) return {};
     return {distribution(s.position, detail::facing_normal(s), s.bsdf.transmits()), fraction_, no_field};
   }
@@ -109,8 +97,7 @@ class irradiance_records_view {
   WFPG_HD detail::record_distribution distribution(vec3 position, vec3 normal, bool transmits) const {
     const irradiance_record* const at = record(position);
     if (at == nullptr) return {};
-    if (transmits) return {at, floor_};
-    return {at, floor_, glm::normalize(normal)};
+    return {at, floor_, cosines_ + (transmits ? normals_.size() : normals_.index(glm::normalize(normal)))};
   }
 
   /// The record of a place, in the policy's memory; null where there is no surface.
@@ -130,7 +117,9 @@ class irradiance_records_view {
   friend class irradiance_records;
 
   sparse_voxel_octree_view tree_;
-  std::uint32_t level_ = 0;  // of records
+  std::uint32_t level_ = 0;             // of records
+  detail::normal_lattice normals_{16};  // of cosines
+  const detail::cell_cosines* cosines_ = nullptr;
   const irradiance_record* records_ = nullptr;
   const voxel_tag* tags_ = nullptr;
   float floor_ = 0.0f;
@@ -178,7 +167,7 @@ class irradiance_records : public guide_base {
   const irradiance_records_statistics& statistics() const { return statistics_; }
   /// Adds what of the geometry was left out.
   void report(const Exec&, guider_statistics& statistics) const { statistics.build = build_; }
-  /// Records; the octree with its tags.
+  /// Records; cosines that they are multiplied by; the octree with its tags.
   std::vector<memory_part> memory() const;
 
  private:
@@ -216,6 +205,7 @@ class irradiance_records : public guide_base {
   buffer<float, Exec> areas_;            // a leaf: in faces
   buffer<voxel_tag, Exec> tags_;         // a leaf
   buffer<irradiance_record, Exec> records_;
+  buffer<detail::cell_cosines, Exec> cosines_;
   irradiance_records_view view_;
   irradiance_records_statistics statistics_;
   bool is_built_ = false;

@@ -14,6 +14,7 @@
 #include <wfpg/guide_file.hpp>
 #include <wfpg/guide_view.hpp>
 #include <wfpg/irradiance_records.hpp>
+#include <wfpg/irradiance_records_options.hpp>
 #include <wfpg/light_guide.hpp>
 #include <wfpg/mis.hpp>
 #include <wfpg/morton.hpp>

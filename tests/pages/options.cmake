@@ -2,7 +2,7 @@
 file(READ "${root}/docs/tuning.md" page)
 set(missing "")
 foreach(place IN ITEMS sampling_options.hpp:sampling_options octree_guide.hpp:guider_options field_store.hpp:kept_field_options radiance_field.hpp:field_options
-    light_guide.hpp:light_guide_options sarsa_options.hpp:sarsa_grid_options irradiance_records.hpp:irradiance_records_options)
+    light_guide.hpp:light_guide_options sarsa_options.hpp:sarsa_grid_options irradiance_records_options.hpp:irradiance_records_options)
   string(REPLACE ":" ";" place "${place}")
   list(GET place 0 header)
   list(GET place 1 name)

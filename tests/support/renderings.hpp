@@ -52,6 +52,9 @@ struct rendering {
     options.sarsa.resolution = 4;
     options.sarsa.direction_resolution = 8;
     options.sarsa.step = 2;
+    options.records.octree_resolution = 32;
+    options.records.record_level = 3;
+    options.records.emitter_rays = 1 << 14;
     // What quadtrees have learnt of so little leaves tails of noise that a t-test does not expect.
     if (method == render::sampling_method::openpgl_dqt) options.guide_fraction = 0.3f;
     return options;
@@ -62,6 +65,7 @@ struct rendering {
     if (method == render::sampling_method::sarsa)
       return view + "SARSA grid, update " + render::name_of(render::sarsa_update_names(), update) +
              ", sampler " + render::name_of(render::sarsa_sampler_names(), sampler);
+    if (method == render::sampling_method::records) return view + "irradiance records";
     return view + (mode == render::guiding::plain ? "plain" : "oriented") + ", " +
            (lifetime == render::fields::kept ? "kept" : "transient") + " fields" +
            (method == render::sampling_method::wfpg_product ? ", products" : "") +

@@ -161,16 +161,22 @@ struct land_rays {
   WFPG_HD std::uint32_t go_on(ray& r, vec3 p, const smooth_bounce& bounce, std::uint32_t power) const {
     const float throughput = bounce.throughput;
     const bool sound = is_finite(throughput) && throughput > 0.0f && is_finite(bounce.direction);
+    const std::uint32_t left =
+        sound ? static_cast<std::uint32_t>(static_cast<float>(power) * min(throughput, 1.0f)) : 0u;
+    const node_id leaf = tree.nearest_leaf(p);
+    if (leaf != invalid_node && left > 0 && side(leaf, r.direction) == side(leaf, bounce.direction))
+      atomic_add(&light[leaf - tree.first_leaf()].crossed, std::uint64_t(left));
     r.origin = p + off_surface * bounce.direction;
     r.direction = bounce.direction;
-    return sound ? static_cast<std::uint32_t>(static_cast<float>(power) * min(throughput, 1.0f)) : 0u;
+    return left;
   }
   WFPG_HD void arrive(vec3 p, vec3 direction, std::uint32_t power) const {
     const node_id leaf = tree.nearest_leaf(p);
     if (leaf == invalid_node) return;
-    const voxel_cones sides{tree, nullptr, normals};
-    atomic_add(&light[leaf - tree.first_leaf()].arrived[sides.side_facing(leaf, -direction)],
-               std::uint64_t(power));
+    atomic_add(&light[leaf - tree.first_leaf()].arrived[side(leaf, -direction)], std::uint64_t(power));
+  }
+  WFPG_HD std::uint32_t side(node_id leaf, vec3 direction) const {
+    return voxel_cones{tree, nullptr, normals}.side_facing(leaf, direction);
   }
 };
 

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <wfpg/detail/math.hpp>
+#include <wfpg/detail/normal_lattice.hpp>
 #include <wfpg/field_sampler.hpp>
 #include <wfpg/octahedral_map.hpp>
 #include <wfpg/types.hpp>
@@ -85,17 +86,74 @@ class record_cosines {
   int x_ = 0, y_ = 0, z_ = 0;
 };
 
+/// Cosines of a record's cells above a normal, where four cells' products with counters are summed in one
+/// multiplication: the topmost 16 of the product's 64 bits. Of columns alike modulo 4 the first is topmost.
+class cell_cosines {
+ public:
+  static constexpr std::uint32_t groups = 4;  ///< of a row: columns alike modulo 4
+
+  cell_cosines() = default;
+  WFPG_HD explicit cell_cosines(const record_cosines& cosine_of) {
+    for (std::uint32_t cell = 0; cell < irradiance_record::cells; ++cell) set(cell, cosine_of(cell));
+  }
+  /// The same for all.
+  WFPG_HD static cell_cosines flat() {
+    cell_cosines result;
+    for (std::uint32_t cell = 0; cell < irradiance_record::cells; ++cell) result.set(cell, 1);
+    return result;
+  }
+
+  WFPG_HD std::uint32_t operator()(std::uint32_t cell) const {
+    return static_cast<std::uint32_t>(lanes_[cell / columns][cell % groups] >> shift(cell)) & 0xffffu;
+  }
+  WFPG_HD std::uint32_t sum() const { return sum_; }
+  WFPG_HD std::uint32_t sum(std::uint32_t row, std::uint32_t group) const {
+    return static_cast<std::uint32_t>(lanes_[row][group] * 0x0001000100010001u >> 48);
+  }
+  /// Times the counters of a record's row.
+  WFPG_HD std::uint32_t dot(std::uint64_t counters, std::uint32_t row, std::uint32_t group) const {
+    const std::uint64_t four = counters >> 4 * group & 0x000f000f000f000fu;
+    return static_cast<std::uint32_t>(four * lanes_[row][group] >> 48);
+  }
+
+ private:
+  static constexpr std::uint32_t columns = irradiance_record::columns;
+
+  WFPG_HD static std::uint32_t shift(std::uint32_t cell) { return 48 - 16 * (cell % columns / groups); }
+  WFPG_HD void set(std::uint32_t cell, std::uint32_t cosine) {
+    lanes_[cell / columns][cell % groups] |= std::uint64_t(cosine) << shift(cell);
+    sum_ += cosine;
+  }
+
+  std::uint64_t lanes_[irradiance_record::rows][groups] = {};
+  std::uint32_t sum_ = 0;
+};
+
+/// Those above each normal of a lattice, and flat ones behind them.
+struct tabulate_cell_cosines {
+  normal_lattice normals;
+  cell_cosines* table;
+  WFPG_HD void operator()(std::size_t i) const {
+    table[i] = i == normals.size()
+                   ? cell_cosines::flat()
+                   : cell_cosines(record_cosines(normals.normal(static_cast<std::uint32_t>(i))));
+  }
+};
+
 /// What a mixture (mis.hpp) draws from. A record without light is empty, and so is one that has none above
 /// the surface where there is no floor.
 class record_distribution {
  public:
   record_distribution() = default;
-  /// Light from everywhere. `floor`: that each direction has at least, times the record's mean; at most 1.
-  WFPG_HD record_distribution(const irradiance_record* record, float floor)
-      : record_(record), base_(base_of(*record, floor)), total_(sum()) {}
-  /// Times the cosine at a unit normal, about.
-  WFPG_HD record_distribution(const irradiance_record* record, float floor, vec3 normal)
-      : record_(record), cosines_(normal), above_(true), base_(base_of(*record, floor)), total_(sum()) {}
+  /// The record times cosines. `floor`: that each direction has at least, times the record's mean; at most 1.
+  WFPG_HD record_distribution(const irradiance_record* record, float floor, const cell_cosines* cosines)
+      : record_(record), cosines_(cosines), base_(base_of(*record, floor)) {
+    std::uint32_t products = 0;
+    for (std::uint32_t row = 0; row < irradiance_record::rows; ++row)
+      for (std::uint32_t group = 0; group < cell_cosines::groups; ++group)
+        products += cosines->dot(record->words[row], row, group);
+    total_ = products * counter_scale + base_ * cosines->sum();
+  }
 
   WFPG_HD bool empty() const { return total_ == 0; }
   /// It knows of no lobe but the diffuse one.
@@ -104,15 +162,17 @@ class record_distribution {
   /// A unit direction from u in [0,1)², and pdf() of it. Precondition: not empty.
   WFPG_HD vec3 sample(vec2 u, float& density) const {
     const auto scaled = static_cast<std::uint64_t>(u.x * 0x1p24f) * total_;
-    const auto target = static_cast<std::uint32_t>(scaled >> 24);
-    std::uint32_t cell = 0, before = 0, width = weight(0);
-    while (before + width <= target) {
-      before += width;
-      width = weight(++cell);
-    }
+    auto target = static_cast<std::uint32_t>(scaled >> 24);
+    const std::uint32_t row = find(target, [&](std::uint32_t r) { return row_weight(r); });
+    const std::uint32_t group = find(target, [&](std::uint32_t g) { return group_weight(row, g); });
+    const std::uint32_t first = row * irradiance_record::columns + group;
+    const std::uint32_t cell = first + cell_cosines::groups * find(target, [&](std::uint32_t k) {
+                                         return weight(first + cell_cosines::groups * k);
+                                       });
+    const std::uint32_t width = weight(cell);
     density = density_of(width);
     const float rest = static_cast<float>(scaled & 0xffffffu) * 0x1p-24f;
-    const float inside = (static_cast<float>(target - before) + rest) / static_cast<float>(width);
+    const float inside = (static_cast<float>(target) + rest) / static_cast<float>(width);
     return irradiance_record::direction(cell, {inside_cell(inside), inside_cell(u.y)});
   }
   /// The density of a unit direction, per steradian. Precondition: not empty.
@@ -123,17 +183,31 @@ class record_distribution {
 
   WFPG_HD static std::uint32_t base_of(const irradiance_record& record, float floor) {
     std::uint32_t counters = 0;
-    for (std::uint32_t cell = 0; cell < irradiance_record::cells; ++cell) counters += record.counter(cell);
+    for (const std::uint64_t word : record.words) {
+      constexpr std::uint64_t every_other = 0x0f0f0f0f0f0f0f0fu;
+      const std::uint64_t pairs = (word & every_other) + (word >> 4 & every_other);
+      counters += static_cast<std::uint32_t>(pairs * 0x0101010101010101u >> 56);
+    }
     constexpr float share = static_cast<float>(counter_scale) / static_cast<float>(irradiance_record::cells);
     return static_cast<std::uint32_t>(ceilf(floor * share * static_cast<float>(counters)));
   }
   WFPG_HD std::uint32_t weight(std::uint32_t cell) const {
-    return (record_->counter(cell) * counter_scale + base_) * (above_ ? cosines_(cell) : 1u);
+    return (record_->counter(cell) * counter_scale + base_) * (*cosines_)(cell);
   }
-  WFPG_HD std::uint32_t sum() const {
-    std::uint32_t total = 0;
-    for (std::uint32_t cell = 0; cell < irradiance_record::cells; ++cell) total += weight(cell);
-    return total;
+  WFPG_HD std::uint32_t group_weight(std::uint32_t row, std::uint32_t group) const {
+    return cosines_->dot(record_->words[row], row, group) * counter_scale + base_ * cosines_->sum(row, group);
+  }
+  WFPG_HD std::uint32_t row_weight(std::uint32_t row) const {
+    std::uint32_t sum = 0;
+    for (std::uint32_t group = 0; group < cell_cosines::groups; ++group) sum += group_weight(row, group);
+    return sum;
+  }
+  /// Which of some weights a target lies in; what is before it is taken off. Precondition: it lies in one.
+  template <class Weight>
+  WFPG_HD static std::uint32_t find(std::uint32_t& target, const Weight& weight_of) {
+    std::uint32_t i = 0;
+    for (std::uint32_t width = weight_of(0); width <= target; width = weight_of(++i)) target -= width;
+    return i;
   }
   WFPG_HD float density_of(std::uint32_t weight) const {
     constexpr float cells_per_steradian = static_cast<float>(irradiance_record::cells) / (4.0f * pi);
@@ -141,8 +215,7 @@ class record_distribution {
   }
 
   const irradiance_record* record_ = nullptr;
-  record_cosines cosines_;
-  bool above_ = false;
+  const cell_cosines* cosines_ = nullptr;
   std::uint32_t base_ = 0, total_ = 0;
 };
 

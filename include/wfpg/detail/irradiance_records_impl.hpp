@@ -141,6 +141,9 @@ irradiance_records<Exec, Smooth>::irradiance_records(const Exec& exec, const Exe
   octree_.release_build_data();
   ::thrust::fill_n(working.thrust(), tags_.data(), tags_.size(), voxel_tag::object);
   exec.fill_bytes(records_.data(), 0, records_.bytes());
+  cosines_ = buffer<detail::cell_cosines, Exec>(exec, view_.normals_.size() + 1);
+  exec.for_each(cosines_.size(), detail::tabulate_cell_cosines{view_.normals_, cosines_.data()});
+  view_.cosines_ = cosines_.data();
   view_.records_ = records_.data();
   view_.tags_ = tags_.data();
   view_.floor_ = options_.floor;
@@ -311,6 +314,7 @@ void irradiance_records<Exec, Smooth>::count_tags(const Exec& exec) {
 template <class Exec, class Smooth>
 std::vector<memory_part> irradiance_records<Exec, Smooth>::memory() const {
   return {{"records", records_.bytes(), true},
+          {"cosines", cosines_.bytes(), true},
           {"octree", octree_.bytes() + normals_.bytes() + swapped_.bytes() + areas_.bytes() + tags_.bytes(),
            true}};
 }

@@ -7,6 +7,9 @@
 #include <wfpg/spatial_binner.hpp>
 #include <wfpg/wave.hpp>
 
+#include <type_traits>
+#include <utility>
+
 namespace wfpg::detail {
 
 /// The share of guided samples of a bin: more where enough rays share it for its field to fit them.
@@ -73,7 +76,7 @@ struct serve_products {
   }
 };
 
-/// What one ray draws from of a guide's view.
+/// What one ray draws from of a guide's view that has no mixture of its own for it.
 template <class View>
 struct view_of_ray {
   View view;
@@ -88,6 +91,14 @@ struct view_of_ray {
   }
 };
 
+template <class View, class Surface, class = void>
+struct has_mixture : std::false_type {};
+template <class View, class Surface>
+struct has_mixture<
+    View, Surface,
+    std::void_t<decltype(std::declval<const View&>().mixture(0u, std::declval<const Surface&>()))>>
+    : std::true_type {};
+
 /// Rays of any guide.
 template <class Serve, class View>
 struct serve_guide_view {
@@ -95,7 +106,12 @@ struct serve_guide_view {
   View view;
   WFPG_HD void operator()(std::size_t i) const {
     const auto ray = static_cast<std::uint32_t>(i);
-    serve(ray, [&](const auto&) { return view_of_ray<View>{view, ray}; });
+    serve(ray, [&](const auto& s) {
+      if constexpr (has_mixture<View, std::decay_t<decltype(s)>>::value)
+        return view.mixture(ray, s);
+      else
+        return view_of_ray<View>{view, ray};
+    });
   }
 };
 

@@ -26,6 +26,10 @@ namespace detail {
 struct leaf_light {
   std::uint64_t emitted[2];
   std::uint64_t arrived[2];
+  std::uint64_t crossed;  ///< went through, from either side to the other
+
+  /// Cones see through it, as straight as they are: what is behind is about where it seems to be.
+  WFPG_HD bool is_clear() const { return crossed > arrived[0] + arrived[1]; }
 };
 
 /// What a cone finds in a node.
@@ -72,7 +76,7 @@ struct light_leaves {
                           static_cast<float>(from.arrived[side]) * arrived_unit;
       to.radiance[side] = power / max(to.area, least_area);
     }
-    for (float& opacity : to.opacity) opacity = min(to.area, 1.0f);
+    for (float& opacity : to.opacity) opacity = from.is_clear() && !emits ? 0.0f : min(to.area, 1.0f);
     nodes[first_leaf + leaf] = to;
     tags[leaf] = emits ? voxel_tag::light : is_lit ? voxel_tag::directly_lit : voxel_tag::object;
   }
