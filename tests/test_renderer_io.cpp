@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -315,6 +316,28 @@ TEST_CASE("The glass around the enclosed lamp is closed and faces outwards", "[r
         CHECK(glm::all(glm::greaterThan(corner(s, t, i), lower)));
         CHECK(glm::all(glm::lessThan(corner(s, t, i), upper)));
       }
+}
+
+TEST_CASE("The water of caustic-pool is smooth, lies on the walls, and has the camera below",
+          "[renderer][builtin]") {
+  const scene s = render::make_builtin_scene("caustic-pool");
+  vec3 lower(1e9f), upper(-1e9f), room(0.0f);
+  float least = 1.0f;
+  for (std::size_t t = 0; t < s.triangles.size(); ++t)
+    for (int i = 0; i < 3; ++i) {
+      const vec3 at = corner(s, t, i);
+      if (s.materials[s.triangle_materials[t]].kind != material_kind::dielectric) {
+        room = glm::max(room, at);
+        continue;
+      }
+      least = std::min(least, glm::dot(s.normals[s.triangles[t][i]], face_normal(s, t)));
+      CHECK(face_normal(s, t).y > 0.8f);
+      lower = glm::min(lower, at);
+      upper = glm::max(upper, at);
+    }
+  CHECK(least > 0.98f);  // waves are several cells long
+  CHECK((upper.x > room.x && upper.z > room.z && lower.x < -room.x && lower.z < -room.z));
+  CHECK((s.view.position.y < lower.y && upper.y < room.y));
 }
 
 TEST_CASE("The conductor box of ajar is closed", "[renderer][builtin]") {

@@ -30,6 +30,21 @@ std::string refusal(const render_options& options) {
   return "nothing";
 }
 
+/// The mean of a part of a path-traced picture of 32 x 32 pixels, by its first and last column and row.
+double mean_of_part(const std::string& name, int max_depth, const int (&columns)[2], const int (&rows)[2]) {
+  render_options options;
+  options.method = sampling_method::pt;
+  options.width = options.height = 32;
+  options.max_depth = max_depth;
+  options.spp = 16;
+  const image picture = render::render(make_builtin_scene(name), options, {}).picture;
+  std::vector<vec3> part;
+  for (int y = rows[0]; y <= rows[1]; ++y)
+    for (int x = columns[0]; x <= columns[1]; ++x)
+      part.push_back(picture.pixels[static_cast<std::size_t>(32 * y + x)]);
+  return mean_of(part);
+}
+
 }  // namespace
 
 TEST_CASE("scenes and options that cannot be right are refused by name", "[renderer]") {
@@ -191,4 +206,15 @@ TEST_CASE("the first sample of a guided rendering is path tracing's, later ones 
   CHECK(guided.report.slots.capacity > guided.report.slots.live);
   CHECK(guided.report.slots.live > 0);
   CHECK(guided.report.slots.refreshed > 0.0);
+}
+
+TEST_CASE("left of the wall of cornell-wall all light is indirect", "[renderer][builtin]") {
+  CHECK(mean_of_part("cornell-wall", 2, {2, 13}, {4, 23}) == 0.0);
+  CHECK(mean_of_part("cornell-wall", 8, {2, 13}, {4, 23}) > 0.0);
+  CHECK(mean_of_part("cornell-wall", 2, {18, 29}, {4, 23}) > 0.1);
+}
+
+TEST_CASE("light gets to the floor of caustic-pool through the water alone", "[renderer][builtin]") {
+  CHECK(mean_of_part("caustic-pool", 2, {0, 31}, {20, 31}) == 0.0);
+  CHECK(mean_of_part("caustic-pool", 3, {0, 31}, {20, 31}) > 0.02);
 }
