@@ -84,7 +84,7 @@ TEST_CASE("a whole run, and one after it that renders nothing", "[quality]") {
   const std::string markdown = content_of(folder.file("out/results.md"));
   CHECK(contains(markdown, "| small | 2 |"));
   CHECK(contains(markdown, "| small | pt-linear |"));
-  CHECK(scene["files"]["plots"].size() == 3);
+  CHECK(scene["files"]["plots"].size() == 4);
   for (const json& row : scene["files"]["plots"])
     for (const json& file : row)
       CHECK(std::filesystem::exists(folder.file("out/" + file.get<std::string>())));

@@ -23,6 +23,7 @@ render::image_error error_from_json(const json& object) {
   error.relmse_robust = number_of(object.at("relmse_robust"));
   error.worst_share = number_of(object.at("worst_share"));
   error.mse_reinhard = number_of(object.at("mse_reinhard"));
+  error.mae = number_of(object.at("mae"));
   error.smape = number_of(object.at("smape"));
   error.non_finite = object.at("non_finite").get<std::size_t>();
   return error;

@@ -49,6 +49,7 @@ json to_json(const image_error& error) {
           {"relmse_robust", error.relmse_robust},
           {"worst_share", error.worst_share},
           {"mse_reinhard", error.mse_reinhard},
+          {"mae", error.mae},
           {"smape", error.smape},
           {"non_finite", error.non_finite}};
 }
