@@ -178,8 +178,8 @@ TEST_CASE("cache: what is stored is found, what is damaged is not", "[quality]")
 }
 
 TEST_CASE("references: halves in chunks, and all that tells them apart", "[quality]") {
-  const quality::settings given =
-      parsed({"--scenes", "ajar", "ajar --nee off", "--size", "16x16", "--max-depth", "4"});
+  const quality::settings given = parsed({"--scenes", "ajar", "ajar --nee off", "ajar --roulette-depth 8",
+                                          "--size", "16x16", "--max-depth", "4"});
   const quality::reference_plan plan = quality::plan_reference(given.scenes[0], "x", 11, 4);
   REQUIRE(plan.halves[0].size() == 2);
   CHECK(plan.halves[0][1].options.spp == 2);
@@ -191,6 +191,7 @@ TEST_CASE("references: halves in chunks, and all that tells them apart", "[quali
   CHECK(plan.hash() != quality::plan_reference(given.scenes[0], "y", 11, 4).hash());
   CHECK(plan.hash() != quality::plan_reference(given.scenes[0], "x", 12, 4).hash());
   CHECK(plan.hash() != quality::plan_reference(given.scenes[1], "x", 11, 4).hash());
+  CHECK(plan.hash() != quality::plan_reference(given.scenes[2], "x", 11, 4).hash());
   // A longer one begins with the same chunks.
   CHECK(plan.halves[0][0].key.hash() ==
         quality::plan_reference(given.scenes[0], "x", 64, 4).halves[0][0].key.hash());

@@ -63,6 +63,8 @@ TEST_CASE("scenes and options that cannot be right are refused by name", "[rende
   options.spp = 1;
   options.combine = wfpg::sample_combination::discard_first;
   CHECK(refusal(options).find("spp is 1") != std::string::npos);
+  options.roulette_depth = 0;
+  CHECK(refusal(options).find("roulette_depth is 0") != std::string::npos);
 }
 
 TEST_CASE("a rendering reports itself and takes samples or seconds", "[renderer]") {

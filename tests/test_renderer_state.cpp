@@ -162,6 +162,7 @@ TEST_CASE("a rendering does not go on as another one", "[renderer][state]") {
   };
   refused("--size 24x16, not 24x17", [](render_options& o) { o.height = 17; });
   refused("--max-depth 6, not 7", [](render_options& o) { o.max_depth = 7; });
+  refused("--roulette-depth 3, not 4", [](render_options& o) { o.roulette_depth = 4; });
   refused("--seed 0, not 1", [](render_options& o) { o.seed = 1; });
   refused("--nee on, not off", [](render_options& o) { o.nee = false; });
   refused("--method wfpg, not pt", [](render_options& o) { o.method = sampling_method::pt; });

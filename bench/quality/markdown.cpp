@@ -132,7 +132,8 @@ std::string describe(const json& scene) {
   const json& reference = scene["reference"];
   std::string text =
       std::to_string(scene["width"].get<int>()) + " x " + std::to_string(scene["height"].get<int>()) +
-      " pixels, depth " + std::to_string(scene["max_depth"].get<int>()) + ", next-event estimation " +
+      " pixels, depth " + std::to_string(scene["max_depth"].get<int>()) + ", roulette from vertex " +
+      std::to_string(scene["roulette_depth"].get<int>()) + ", next-event estimation " +
       (scene["nee"].get<bool>() ? "on" : "off") +
       ". Reference: " + std::to_string(reference["samples"].get<int>()) + " samples; its own noise: ";
   for (const measure& m : measures)

@@ -69,12 +69,16 @@ run_record record_from_json(const json& object) {
 }
 
 json key_of_scene(const scene_choice& scene, const std::string& identity) {
-  return {{"format", format},
-          {"scene", identity},
-          {"width", scene.options.width},
-          {"height", scene.options.height},
-          {"max_depth", scene.options.max_depth},
-          {"nee", scene.options.nee}};
+  json key{{"format", format},
+           {"scene", identity},
+           {"width", scene.options.width},
+           {"height", scene.options.height},
+           {"max_depth", scene.options.max_depth},
+           {"nee", scene.options.nee}};
+  // References are worth finding that were made before there was a choice.
+  if (scene.options.roulette_depth != render::render_options().roulette_depth)
+    key["roulette_depth"] = scene.options.roulette_depth;
+  return key;
 }
 
 void add_program_and_machine(json& key, render::device where) {

@@ -264,6 +264,7 @@ struct shade_paths {
   tiled_view<path_state> paths;
   wfpg::array_view<vec3> radiance;
   wfpg::light_guide_view lights;
+  std::uint32_t roulette_depth;  ///< paths go on from vertices before it
 
   WFPG_HD void operator()(std::size_t slot) const {
     if (!queue.holds(slot)) return;
@@ -278,9 +279,7 @@ struct shade_paths {
   }
 
  private:
-  // The first bounces carry most of the light. Later ones are spared while a tenth of it is left: ending
-  // those added more noise than it saved time.
-  static constexpr std::uint32_t first_roulette_depth = 3;
+  // Bounces are spared while a tenth of the light is left: ending those added more noise than it saved time.
   static constexpr float spared_reflectance = 0.1f;
 
   WFPG_HD void add_light(std::size_t slot, std::uint32_t id) const {
@@ -313,7 +312,7 @@ struct shade_paths {
   // By the throughput that the path would have if its directions were all drawn from BSDFs. Its real one is
   // low where guiding is sure of a direction, and those are the paths worth keeping.
   WFPG_HD bool survive_roulette(path_state& path, float u) const {
-    if (at.depth < first_roulette_depth) return true;
+    if (at.depth < roulette_depth) return true;
     const float probability = glm::min(1.0f, path.reflectance / spared_reflectance);
     if (!(u < probability)) return false;
     path.throughput /= probability;

@@ -162,7 +162,7 @@ render_result render_by(const Exec& exec, const scene& scene, const render_optio
   building.measure(Accelerated::name,
                    [&] { accelerated = std::make_unique<const Accelerated>(exec, scene, geometry.view()); });
   const tracer_settings settings{options.width, options.height, static_cast<std::uint32_t>(options.max_depth),
-                                 options.seed};
+                                 options.seed, static_cast<std::uint32_t>(options.roulette_depth)};
   path_tracer<Exec, decltype(accelerated->caster())> tracer(
       exec, settings, {geometry.view(), lights.view(), options.nee}, accelerated->caster());
   const pinhole camera(scene.view, options.width, options.height);

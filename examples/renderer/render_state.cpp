@@ -54,6 +54,7 @@ void add_guider_values(const render_options& o, named_values& values) {
 named_values values_of(const render_options& o) {
   named_values values = {{"--size", std::to_string(o.width) + "x" + std::to_string(o.height)},
                          {"--max-depth", std::to_string(o.max_depth)},
+                         {"--roulette-depth", std::to_string(o.roulette_depth)},
                          {"--seed", std::to_string(o.seed)},
                          {"--nee", o.nee ? "on" : "off"},
                          {"--method", name_of(method_names(), o.method)},

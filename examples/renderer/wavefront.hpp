@@ -21,6 +21,7 @@ struct tracer_settings {
   int height = 512;             ///< pixels, positive
   std::uint32_t max_depth = 8;  ///< vertices of a path and segments from the camera, at least 1
   std::uint64_t seed = 0;
+  std::uint32_t roulette_depth = 3;  ///< Russian roulette begins at this vertex; the camera's first hit is 0
 };
 
 /// Renders samples of a scene with directions from a guider.
@@ -180,9 +181,10 @@ class path_tracer {
   void shade(Guider& guider, const wave_position& at, const path_queue& queue) {
     clock_.measure("shade", [&] {
       auto recorder = guider.recorder();
-      exec_.for_each(count_, shade_paths<decltype(recorder)>{
-                                 at, recorder, queue, vertices_.view(), queries_.view(), densities_.view(),
-                                 directions_.view(), paths_.view(), radiance_.view(), world_.guide});
+      exec_.for_each(
+          count_, shade_paths<decltype(recorder)>{at, recorder, queue, vertices_.view(), queries_.view(),
+                                                  densities_.view(), directions_.view(), paths_.view(),
+                                                  radiance_.view(), world_.guide, settings_.roulette_depth});
     });
   }
 
