@@ -10,6 +10,7 @@
 
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -219,4 +220,54 @@ TEST_CASE("left of the wall of cornell-wall all light is indirect", "[renderer][
 TEST_CASE("light gets to the floor of caustic-pool through the water alone", "[renderer][builtin]") {
   CHECK(mean_of_part("caustic-pool", 2, {0, 31}, {20, 31}) == 0.0);
   CHECK(mean_of_part("caustic-pool", 3, {0, 31}, {20, 31}) > 0.02);
+}
+
+TEST_CASE("roulette ends no path before its depth, and keeps the mean", "[renderer]") {
+  scene dark = make_builtin_scene("furnace");
+  dark.materials[0].base_color = vec3(0.05f);
+  render_options options;
+  options.method = sampling_method::pt;
+  options.width = options.height = 64;
+  options.spp = 16;
+  for (const bool nee : {false, true})
+    for (const int depth : {1, 2, 5, 8}) {
+      INFO("roulette from vertex " << depth << ", nee " << nee);
+      options.nee = nee;
+      options.roulette_depth = depth;
+      const render_result result = render::render(dark, options, {});
+      CHECK(mean_of(result.picture.pixels) == Approx(1.0 / 0.95).epsilon(0.005));
+      // One in forty goes on from the vertex that roulette begins at.
+      const double segments = static_cast<double>(result.report.segments) / (64.0 * 64.0 * 16.0);
+      CHECK(segments >= std::min(depth + 1, 8));
+      CHECK(segments <= std::min(depth + 1.05, 8.0));
+    }
+}
+
+TEST_CASE("hits of lights are counted, of the side that emits and of skies that do", "[renderer]") {
+  render_options options;
+  options.method = sampling_method::pt;
+  options.width = options.height = 8;
+  options.spp = 2;
+  const auto hits_of = [&options](const scene& seen) {
+    const render_report report = render::render(seen, options, {}).report;
+    return std::make_pair(report.light_hits_per_path, static_cast<double>(report.segments) / (64.0 * 2.0));
+  };
+  const auto [hits, segments] = hits_of(make_builtin_scene("furnace"));
+  CHECK((hits == segments && hits > 3.0));
+  material lamp;
+  lamp.base_color = vec3(0.0f);
+  lamp.emission = vec3(1.0f);
+  scene s = square_of(lamp);
+  s.view.vertical_fov = 0.01f;
+  CHECK(hits_of(s).first == 1.0);
+  s.view.position.z = -2.0f;
+  s.view.forward = {0.0f, 0.0f, 1.0f};
+  CHECK(hits_of(s).first == 0.0);
+  s.view.forward = {0.0f, 0.0f, -1.0f};
+  CHECK(hits_of(s) == std::make_pair(0.0, 1.0));
+  s.environment = {0.0f, 0.25f, 0.0f};
+  CHECK(hits_of(s).first == 1.0);
+  s.environment = vec3(0.0f);
+  s.sky = {1, 1, {vec3(0.5f)}};
+  CHECK(hits_of(s).first == 1.0);
 }

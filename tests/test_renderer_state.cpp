@@ -95,6 +95,7 @@ TEST_CASE("a rendering that is stopped and goes on gives the picture of one that
       CHECK((!third.is_stopped && third.report.spp == 11));
       CHECK(same_bits(third.picture, whole.picture));
       CHECK(third.report.segments == whole.report.segments);
+      CHECK(third.report.light_hits_per_path == whole.report.light_hits_per_path);
       CHECK(third.report.cones_per_segment == whole.report.cones_per_segment);
       CHECK(third.report.slots.live == whole.report.slots.live);
       CHECK(third.report.slots.born == whole.report.slots.born);

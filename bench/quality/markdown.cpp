@@ -50,8 +50,8 @@ row header(bool has_flip) {
     if (m.name == std::string("relmse_robust")) cells.emplace_back("share of the worst 0.01%");
   }
   if (has_flip) cells.insert(cells.end(), {"HDR-FLIP", "gain"});
-  cells.insert(cells.end(),
-               {"million segments", "MiB kept", "of them in use", "MiB in flight", "cones a segment"});
+  cells.insert(cells.end(), {"million segments", "MiB kept", "of them in use", "MiB in flight",
+                             "cones a segment", "light hits a path"});
   return cells;
 }
 
@@ -74,6 +74,7 @@ row cells_of(const json& method) {
   cells.push_back(formatted("%.2f", double(method["used_bytes"]) / mebibyte));
   cells.push_back(formatted("%.2f", double(method["transient_bytes"]) / mebibyte));
   cells.push_back(formatted("%.2f", method["cones_per_segment"]));
+  cells.push_back(formatted("%.3g", method["light_hits_per_path"]));
   return cells;
 }
 

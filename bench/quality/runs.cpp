@@ -48,6 +48,7 @@ json to_json(const run_record& record) {
           {"used_bytes", cost.used_bytes},
           {"transient_bytes", cost.transient_bytes},
           {"cones_per_segment", cost.cones_per_segment},
+          {"light_hits_per_path", cost.light_hits_per_path},
           {"points", points}};
 }
 
@@ -65,6 +66,7 @@ run_record record_from_json(const json& object) {
   cost.used_bytes = object.at("used_bytes").get<std::size_t>();
   cost.transient_bytes = object.at("transient_bytes").get<std::size_t>();
   cost.cones_per_segment = object.at("cones_per_segment").get<double>();
+  cost.light_hits_per_path = object.at("light_hits_per_path").get<double>();
   return record;
 }
 
@@ -121,7 +123,8 @@ run_record measured(const render::render_result& result, const render::image& re
                  report.persistent_bytes,
                  report.used_bytes,
                  report.transient_bytes,
-                 report.cones_per_segment};
+                 report.cones_per_segment,
+                 report.light_hits_per_path};
   return record;
 }
 

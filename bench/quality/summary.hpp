@@ -42,9 +42,9 @@ struct reference_noise {
   std::optional<double> flip;  ///< half of the halves' difference
 };
 
-/// An object for each budget, with one for each method in it: samples, seconds, segments, bytes, cones and
-/// errors, with ratios to the baseline, which is the method called pt, or the first. Errors are less the
-/// noise where they are squared; one that the noise hides is null.
+/// An object for each budget, with one for each method in it: samples, seconds, segments, bytes, cones,
+/// hits of lights and errors, with ratios to the baseline, which is the method called pt, or the first.
+/// Errors are less the noise where they are squared; one that the noise hides is null.
 json summary_of(const settings& given, const std::vector<measured_run>& runs, const reference_noise& noise);
 
 /// The index of the method that ratios are to.

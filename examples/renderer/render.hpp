@@ -94,6 +94,9 @@ struct render_report {
   std::string scene, method, device;
   int spp = 0;                 ///< rendered, before a rendering went on too; times are since then
   std::uint64_t segments = 0;  ///< rays that paths were extended by
+  /// Of them, those that hit a surface that emits toward them or left for an environment that does, the
+  /// camera's among them; over the number of paths.
+  double light_hits_per_path = 0.0;
   double total_seconds = 0.0;  ///< from building to the last sample
   named_seconds seconds;       ///< by stage; "guide ..." are parts of "directions" and of "update"
   std::vector<std::pair<std::string, std::size_t>> memory;  ///< the guider's bytes, by part

@@ -172,6 +172,8 @@ render_result render_by(const Exec& exec, const scene& scene, const render_optio
   result.guide = before.guide;
   take(tracer, geometry.view(), lights, camera, building, result);
   report.segments = tracer.segments();
+  const double paths = double(report.spp) * double(options.width) * double(options.height);
+  report.light_hits_per_path = static_cast<double>(tracer.light_hits()) / paths;
   if (options.keep_state)
     result.state = state_bytes(scene, options, {report.spp, tracer.film(), result.guide});
   result.picture = {options.width, options.height, tracer.picture()};

@@ -59,6 +59,7 @@ void write_stats(const std::string& path, const render_report& report,
   json stats{
       {"scene", report.scene}, {"method", report.method}, {"device", report.device}, {"spp", report.spp}};
   stats["segments"] = report.segments;
+  stats["light_hits_per_path"] = report.light_hits_per_path;
   stats["seconds"] = seconds_of(report);
   stats["memory"] = memory_of(report);
   stats["octree"] = octree_of(report.octree);
