@@ -38,10 +38,11 @@ quality::measured_run hand_made(std::size_t method, int seed, double error, doub
   run.seed = seed;
   render::image_error e;
   e.mse_reinhard = error;
-  e.smape = error;
+  e.mae = e.smape = error;
   run.record.points = {{4, seconds, e}};
   run.record.cost.samples = 4;
   run.record.cost.seconds = seconds;
+  run.record.cost.light_hits_per_path = seconds / 4.0;
   return run;
 }
 
@@ -90,6 +91,9 @@ TEST_CASE("summaries: noise, gains and equal time by hand", "[quality]") {
   const json& smape = summary[0]["methods"][1]["errors"]["smape"];
   CHECK(smape["mean"].get<double>() == Approx(6.0));
   CHECK_FALSE(smape.contains("equal_time_ratio"));
+  const json& mae = summary[0]["methods"][1]["errors"]["mae"];
+  CHECK((mae["mean"].get<double>() == Approx(6.0) && mae["ratio"].get<double>() == Approx(41.0 / 6.0)));
+  CHECK(summary[0]["methods"][1]["light_hits_per_path"].get<double>() == Approx(0.5));
   // All that the reference's noise hides.
   noise.error.mse_reinhard = 6.5;
   const json hidden =
@@ -106,12 +110,13 @@ TEST_CASE("records survive JSON, infinite errors too", "[quality]") {
   error.relmse_robust = 0.25;
   error.non_finite = 3;
   record.points = {{1, 0.5, {}}, {2, 1.5, error}};
-  record.cost = {2, 1.5, 2.0, 12345678901u, 10, 8, 20, 0.75};
+  record.cost = {2, 1.5, 2.0, 12345678901u, 10, 8, 20, 0.75, 0.5};
   const json object = quality::to_json(record);
   const quality::run_record back = quality::record_from_json(json::parse(object.dump()));
   CHECK(quality::to_json(back) == object);
   CHECK(std::isinf(back.points[1].error.mse));
   CHECK(back.cost.segments == 12345678901u);
+  CHECK(back.cost.light_hits_per_path == 0.5);
   CHECK_THROWS_AS(quality::record_from_json(json::object()), json::exception);
 }
 
@@ -178,8 +183,8 @@ TEST_CASE("cache: what is stored is found, what is damaged is not", "[quality]")
 }
 
 TEST_CASE("references: halves in chunks, and all that tells them apart", "[quality]") {
-  const quality::settings given =
-      parsed({"--scenes", "ajar", "ajar --nee off", "--size", "16x16", "--max-depth", "4"});
+  const quality::settings given = parsed({"--scenes", "ajar", "ajar --nee off", "ajar --roulette-depth 8",
+                                          "--size", "16x16", "--max-depth", "4"});
   const quality::reference_plan plan = quality::plan_reference(given.scenes[0], "x", 11, 4);
   REQUIRE(plan.halves[0].size() == 2);
   CHECK(plan.halves[0][1].options.spp == 2);
@@ -191,6 +196,7 @@ TEST_CASE("references: halves in chunks, and all that tells them apart", "[quali
   CHECK(plan.hash() != quality::plan_reference(given.scenes[0], "y", 11, 4).hash());
   CHECK(plan.hash() != quality::plan_reference(given.scenes[0], "x", 12, 4).hash());
   CHECK(plan.hash() != quality::plan_reference(given.scenes[1], "x", 11, 4).hash());
+  CHECK(plan.hash() != quality::plan_reference(given.scenes[2], "x", 11, 4).hash());
   // A longer one begins with the same chunks.
   CHECK(plan.halves[0][0].key.hash() ==
         quality::plan_reference(given.scenes[0], "x", 64, 4).halves[0][0].key.hash());

@@ -33,11 +33,12 @@ TEST_CASE("options: presets hold where nothing is given", "[quality]") {
   CHECK(quick.scenes[1].options.nee);
   const quality::settings own =
       parsed({"--preset", "quick", "--size", "32x16", "--spp", "1,4", "--seconds", "0.5", "--scenes", "ajar",
-              "ajar --nee off --max-depth 3", "--seeds", "7"});
+              "ajar --nee off --max-depth 3 --roulette-depth 2", "--seeds", "7"});
   CHECK(own.seeds == 7);
   CHECK(own.scenes[1].options.height == 16);
   CHECK(own.scenes[1].options.max_depth == 3);
-  CHECK(own.scenes[1].title == "ajar --nee off --max-depth 3");
+  CHECK((own.scenes[0].options.roulette_depth == 3 && own.scenes[1].options.roulette_depth == 2));
+  CHECK(own.scenes[1].title == "ajar --nee off --max-depth 3 --roulette-depth 2");
   REQUIRE(own.budgets.size() == 3);
   CHECK(quality::title_of(own.budgets[0]) == "1 sample");
   CHECK(quality::title_of(own.budgets[2]) == "0.5 s");

@@ -83,8 +83,11 @@ TEST_CASE("a whole run, and one after it that renders nothing", "[quality]") {
   CHECK(scene["reference"]["noise"]["mse_reinhard"].get<double>() > 0.0);
   const std::string markdown = content_of(folder.file("out/results.md"));
   CHECK(contains(markdown, "| small | 2 |"));
+  CHECK(contains(markdown, "| light hits a path |"));
+  CHECK(contains(markdown, "depth 8, roulette from vertex 3, next-event"));
+  CHECK(scene["summary"][0]["methods"][0]["light_hits_per_path"].get<double>() > 0.0);
   CHECK(contains(markdown, "| small | pt-linear |"));
-  CHECK(scene["files"]["plots"].size() == 3);
+  CHECK(scene["files"]["plots"].size() == 4);
   for (const json& row : scene["files"]["plots"])
     for (const json& file : row)
       CHECK(std::filesystem::exists(folder.file("out/" + file.get<std::string>())));

@@ -5,6 +5,8 @@
 #include "support/renderer_io.hpp"
 #include "support/tiny_gltf.hpp"
 
+#include <CLI/CLI.hpp>
+
 #include <sstream>
 #include <string>
 
@@ -50,4 +52,17 @@ TEST_CASE("an environment that is named takes the place of the scene's", "[rende
   std::ostringstream log;
   CHECK(render::load_scene(given, {}, "it", log).sky.width == 4);
   CHECK_FALSE(contains(log.str(), "no light"));
+}
+
+TEST_CASE("the vertex that roulette begins at is an option", "[renderer][arguments]") {
+  const auto depth_of = [](const std::string& arguments) {
+    render::render_options options;
+    CLI::App app;
+    render::add_picture_options(app, options);
+    app.parse(arguments);
+    return options.roulette_depth;
+  };
+  CHECK(depth_of("") == 3);
+  CHECK(depth_of("--roulette-depth 8") == 8);
+  CHECK_THROWS_AS(depth_of("--roulette-depth 0"), CLI::ValidationError);
 }

@@ -10,6 +10,7 @@
 
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -30,6 +31,21 @@ std::string refusal(const render_options& options) {
   return "nothing";
 }
 
+/// The mean of a part of a path-traced picture of 32 x 32 pixels, by its first and last column and row.
+double mean_of_part(const std::string& name, int max_depth, const int (&columns)[2], const int (&rows)[2]) {
+  render_options options;
+  options.method = sampling_method::pt;
+  options.width = options.height = 32;
+  options.max_depth = max_depth;
+  options.spp = 16;
+  const image picture = render::render(make_builtin_scene(name), options, {}).picture;
+  std::vector<vec3> part;
+  for (int y = rows[0]; y <= rows[1]; ++y)
+    for (int x = columns[0]; x <= columns[1]; ++x)
+      part.push_back(picture.pixels[static_cast<std::size_t>(32 * y + x)]);
+  return mean_of(part);
+}
+
 }  // namespace
 
 TEST_CASE("scenes and options that cannot be right are refused by name", "[renderer]") {
@@ -48,6 +64,8 @@ TEST_CASE("scenes and options that cannot be right are refused by name", "[rende
   options.spp = 1;
   options.combine = wfpg::sample_combination::discard_first;
   CHECK(refusal(options).find("spp is 1") != std::string::npos);
+  options.roulette_depth = 0;
+  CHECK(refusal(options).find("roulette_depth is 0") != std::string::npos);
 }
 
 TEST_CASE("a rendering reports itself and takes samples or seconds", "[renderer]") {
@@ -194,4 +212,65 @@ TEST_CASE("the first sample of a guided rendering is path tracing's, later ones 
   CHECK(guided.report.slots.capacity > guided.report.slots.live);
   CHECK(guided.report.slots.live > 0);
   CHECK(guided.report.slots.refreshed > 0.0);
+}
+
+TEST_CASE("left of the wall of cornell-wall all light is indirect", "[renderer][builtin]") {
+  CHECK(mean_of_part("cornell-wall", 2, {2, 13}, {4, 23}) == 0.0);
+  CHECK(mean_of_part("cornell-wall", 8, {2, 13}, {4, 23}) > 0.0);
+  CHECK(mean_of_part("cornell-wall", 2, {18, 29}, {4, 23}) > 0.1);
+}
+
+TEST_CASE("light gets to the floor of caustic-pool through the water alone", "[renderer][builtin]") {
+  CHECK(mean_of_part("caustic-pool", 2, {0, 31}, {20, 31}) == 0.0);
+  CHECK(mean_of_part("caustic-pool", 3, {0, 31}, {20, 31}) > 0.02);
+}
+
+TEST_CASE("roulette ends no path before its depth, and keeps the mean", "[renderer]") {
+  scene dark = make_builtin_scene("furnace");
+  dark.materials[0].base_color = vec3(0.05f);
+  render_options options;
+  options.method = sampling_method::pt;
+  options.width = options.height = 64;
+  options.spp = 16;
+  for (const bool nee : {false, true})
+    for (const int depth : {1, 2, 5, 8}) {
+      INFO("roulette from vertex " << depth << ", nee " << nee);
+      options.nee = nee;
+      options.roulette_depth = depth;
+      const render_result result = render::render(dark, options, {});
+      CHECK(mean_of(result.picture.pixels) == Approx(1.0 / 0.95).epsilon(0.005));
+      // One in forty goes on from the vertex that roulette begins at.
+      const double segments = static_cast<double>(result.report.segments) / (64.0 * 64.0 * 16.0);
+      CHECK(segments >= std::min(depth + 1, 8));
+      CHECK(segments <= std::min(depth + 1.05, 8.0));
+    }
+}
+
+TEST_CASE("hits of lights are counted, of the side that emits and of skies that do", "[renderer]") {
+  render_options options;
+  options.method = sampling_method::pt;
+  options.width = options.height = 8;
+  options.spp = 2;
+  const auto hits_of = [&options](const scene& seen) {
+    const render_report report = render::render(seen, options, {}).report;
+    return std::make_pair(report.light_hits_per_path, static_cast<double>(report.segments) / (64.0 * 2.0));
+  };
+  const auto [hits, segments] = hits_of(make_builtin_scene("furnace"));
+  CHECK((hits == segments && hits > 3.0));
+  material lamp;
+  lamp.base_color = vec3(0.0f);
+  lamp.emission = vec3(1.0f);
+  scene s = square_of(lamp);
+  s.view.vertical_fov = 0.01f;
+  CHECK(hits_of(s).first == 1.0);
+  s.view.position.z = -2.0f;
+  s.view.forward = {0.0f, 0.0f, 1.0f};
+  CHECK(hits_of(s).first == 0.0);
+  s.view.forward = {0.0f, 0.0f, -1.0f};
+  CHECK(hits_of(s) == std::make_pair(0.0, 1.0));
+  s.environment = {0.0f, 0.25f, 0.0f};
+  CHECK(hits_of(s).first == 1.0);
+  s.environment = vec3(0.0f);
+  s.sky = {1, 1, {vec3(0.5f)}};
+  CHECK(hits_of(s).first == 1.0);
 }

@@ -95,6 +95,7 @@ TEST_CASE("a rendering that is stopped and goes on gives the picture of one that
       CHECK((!third.is_stopped && third.report.spp == 11));
       CHECK(same_bits(third.picture, whole.picture));
       CHECK(third.report.segments == whole.report.segments);
+      CHECK(third.report.light_hits_per_path == whole.report.light_hits_per_path);
       CHECK(third.report.cones_per_segment == whole.report.cones_per_segment);
       CHECK(third.report.slots.live == whole.report.slots.live);
       CHECK(third.report.slots.born == whole.report.slots.born);
@@ -162,6 +163,7 @@ TEST_CASE("a rendering does not go on as another one", "[renderer][state]") {
   };
   refused("--size 24x16, not 24x17", [](render_options& o) { o.height = 17; });
   refused("--max-depth 6, not 7", [](render_options& o) { o.max_depth = 7; });
+  refused("--roulette-depth 3, not 4", [](render_options& o) { o.roulette_depth = 4; });
   refused("--seed 0, not 1", [](render_options& o) { o.seed = 1; });
   refused("--nee on, not off", [](render_options& o) { o.nee = false; });
   refused("--method wfpg, not pt", [](render_options& o) { o.method = sampling_method::pt; });

@@ -41,6 +41,7 @@ constexpr auto product_method = sampling_method::wfpg_product;
 TEST_CASE("pictures guided by kept fields have the mean of unguided ones", "[renderer][unbiased]") {
   for (const char* scene : {"cornell-box", "cornell-enclosed", "ajar", "thin-wall", "furnace"})
     for (const bool nee : {false, true}) check_unbiased({scene, nee});
+  check_unbiased({"cornell-wall", true});
   check_unbiased({"many-lamps", true});  // whose choice is learnt
   check_unbiased({"cornell-enclosed", false, wfpg_method, fields::kept, guiding::plain});
   check_unbiased({"thin-wall", true, wfpg_method, fields::kept, guiding::plain});

@@ -152,6 +152,7 @@ json measure_scene(const settings& given, const scene_plan& plan, runner& runs) 
           {"width", options.width},
           {"height", options.height},
           {"max_depth", options.max_depth},
+          {"roulette_depth", options.roulette_depth},
           {"nee", options.nee},
           {"reference",
            {{"samples", given.reference_spp},

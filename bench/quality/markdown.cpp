@@ -50,8 +50,8 @@ row header(bool has_flip) {
     if (m.name == std::string("relmse_robust")) cells.emplace_back("share of the worst 0.01%");
   }
   if (has_flip) cells.insert(cells.end(), {"HDR-FLIP", "gain"});
-  cells.insert(cells.end(),
-               {"million segments", "MiB kept", "of them in use", "MiB in flight", "cones a segment"});
+  cells.insert(cells.end(), {"million segments", "MiB kept", "of them in use", "MiB in flight",
+                             "cones a segment", "light hits a path"});
   return cells;
 }
 
@@ -74,6 +74,7 @@ row cells_of(const json& method) {
   cells.push_back(formatted("%.2f", double(method["used_bytes"]) / mebibyte));
   cells.push_back(formatted("%.2f", double(method["transient_bytes"]) / mebibyte));
   cells.push_back(formatted("%.2f", method["cones_per_segment"]));
+  cells.push_back(formatted("%.3g", method["light_hits_per_path"]));
   return cells;
 }
 
@@ -132,7 +133,8 @@ std::string describe(const json& scene) {
   const json& reference = scene["reference"];
   std::string text =
       std::to_string(scene["width"].get<int>()) + " x " + std::to_string(scene["height"].get<int>()) +
-      " pixels, depth " + std::to_string(scene["max_depth"].get<int>()) + ", next-event estimation " +
+      " pixels, depth " + std::to_string(scene["max_depth"].get<int>()) + ", roulette from vertex " +
+      std::to_string(scene["roulette_depth"].get<int>()) + ", next-event estimation " +
       (scene["nee"].get<bool>() ? "on" : "off") +
       ". Reference: " + std::to_string(reference["samples"].get<int>()) + " samples; its own noise: ";
   for (const measure& m : measures)

@@ -23,6 +23,7 @@ render::image_error error_from_json(const json& object) {
   error.relmse_robust = number_of(object.at("relmse_robust"));
   error.worst_share = number_of(object.at("worst_share"));
   error.mse_reinhard = number_of(object.at("mse_reinhard"));
+  error.mae = number_of(object.at("mae"));
   error.smape = number_of(object.at("smape"));
   error.non_finite = object.at("non_finite").get<std::size_t>();
   return error;
@@ -47,6 +48,7 @@ json to_json(const run_record& record) {
           {"used_bytes", cost.used_bytes},
           {"transient_bytes", cost.transient_bytes},
           {"cones_per_segment", cost.cones_per_segment},
+          {"light_hits_per_path", cost.light_hits_per_path},
           {"points", points}};
 }
 
@@ -64,16 +66,21 @@ run_record record_from_json(const json& object) {
   cost.used_bytes = object.at("used_bytes").get<std::size_t>();
   cost.transient_bytes = object.at("transient_bytes").get<std::size_t>();
   cost.cones_per_segment = object.at("cones_per_segment").get<double>();
+  cost.light_hits_per_path = object.at("light_hits_per_path").get<double>();
   return record;
 }
 
 json key_of_scene(const scene_choice& scene, const std::string& identity) {
-  return {{"format", format},
-          {"scene", identity},
-          {"width", scene.options.width},
-          {"height", scene.options.height},
-          {"max_depth", scene.options.max_depth},
-          {"nee", scene.options.nee}};
+  json key{{"format", format},
+           {"scene", identity},
+           {"width", scene.options.width},
+           {"height", scene.options.height},
+           {"max_depth", scene.options.max_depth},
+           {"nee", scene.options.nee}};
+  // References are worth finding that were made before there was a choice.
+  if (scene.options.roulette_depth != render::render_options().roulette_depth)
+    key["roulette_depth"] = scene.options.roulette_depth;
+  return key;
 }
 
 void add_program_and_machine(json& key, render::device where) {
@@ -116,7 +123,8 @@ run_record measured(const render::render_result& result, const render::image& re
                  report.persistent_bytes,
                  report.used_bytes,
                  report.transient_bytes,
-                 report.cones_per_segment};
+                 report.cones_per_segment,
+                 report.light_hits_per_path};
   return record;
 }
 

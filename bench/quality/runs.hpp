@@ -36,6 +36,7 @@ struct run_cost {
   std::size_t used_bytes = 0;  ///< of them
   std::size_t transient_bytes = 0;
   double cones_per_segment = 0.0;
+  double light_hits_per_path = 0.0;  ///< segments that ended at a light
 };
 
 /// A measured rendering. Errors contain the reference's noise.

@@ -93,6 +93,7 @@ json summary_of_method(const runs_of_method& runs, const runs_of_method& baselin
           {"used_bytes", cost(&run_cost::used_bytes).mean},
           {"transient_bytes", cost(&run_cost::transient_bytes).mean},
           {"cones_per_segment", cost(&run_cost::cones_per_segment).mean},
+          {"light_hits_per_path", cost(&run_cost::light_hits_per_path).mean},
           {"worst_share",
            over(runs, [](const measured_run& r) { return r.record.points.back().error.worst_share; }).mean},
           {"non_finite_pixels",

@@ -18,9 +18,10 @@ struct measure {
   double render::image_error::*value;
   bool is_squared;  ///< the reference's noise adds to it and is subtracted
 };
-inline constexpr std::array<measure, 3> measures = {
+inline constexpr std::array<measure, 4> measures = {
     {{"mse_reinhard", "MSE after c / (1 + c)", &render::image_error::mse_reinhard, true},
      {"relmse_robust", "relative MSE without the worst 0.01%", &render::image_error::relmse_robust, true},
+     {"mae", "mean absolute error", &render::image_error::mae, false},
      {"smape", "SMAPE", &render::image_error::smape, false}}};
 
 /// Noise of a reference above this share of an error is said beside it.
@@ -41,9 +42,9 @@ struct reference_noise {
   std::optional<double> flip;  ///< half of the halves' difference
 };
 
-/// An object for each budget, with one for each method in it: samples, seconds, segments, bytes, cones and
-/// errors, with ratios to the baseline, which is the method called pt, or the first. Errors are less the
-/// noise where they are squared; one that the noise hides is null.
+/// An object for each budget, with one for each method in it: samples, seconds, segments, bytes, cones,
+/// hits of lights and errors, with ratios to the baseline, which is the method called pt, or the first.
+/// Errors are less the noise where they are squared; one that the noise hides is null.
 json summary_of(const settings& given, const std::vector<measured_run>& runs, const reference_noise& noise);
 
 /// The index of the method that ratios are to.

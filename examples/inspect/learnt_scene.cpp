@@ -23,7 +23,8 @@ const render::render_options& checked(const render::render_options& options) {
 }
 
 render::tracer_settings settings_of(const render::render_options& options) {
-  return {options.width, options.height, static_cast<std::uint32_t>(options.max_depth), options.seed};
+  return {options.width, options.height, static_cast<std::uint32_t>(options.max_depth), options.seed,
+          static_cast<std::uint32_t>(options.roulette_depth)};
 }
 
 /// The surfaces of a wave with a ray for each pixel.

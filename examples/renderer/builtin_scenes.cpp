@@ -1,6 +1,7 @@
-// The built-in scenes: a small builder of quads and boxes, and one function a scene.
-// Every quad is given the side it faces, because emitters emit to that side only.
+// The built-in scenes: one function a scene.
 #include "builtin_scenes.hpp"
+
+#include "scene_builder.hpp"
 
 #include <cmath>
 #include <stdexcept>
@@ -8,144 +9,6 @@
 
 namespace render {
 namespace {
-
-/// Where a surface faces and what it is made of.
-struct side {
-  vec3 facing;
-  std::uint32_t material;
-};
-
-/// A box on the floor or anywhere else, turned about the vertical axis through its centre.
-struct box_shape {
-  vec3 centre;
-  vec3 size;
-  float turn = 0.0f;  ///< radians, counter-clockwise seen from above
-};
-
-/// An axis-aligned box by its corners.
-struct room_shape {
-  vec3 lower;
-  vec3 upper;
-};
-
-/// The materials of a room's six sides, indices into scene::materials; `open` leaves a side out.
-struct room_materials {
-  static constexpr std::uint32_t open = 0xffffffffu;
-  std::uint32_t left, right;     ///< x = lower, x = upper
-  std::uint32_t floor, ceiling;  ///< y = lower, y = upper
-  std::uint32_t back, front;     ///< z = lower, z = upper
-};
-
-/// Rotation about the vertical axis, counter-clockwise seen from above (y towards the viewer).
-vec3 turned(vec3 v, float angle) {
-  const float c = std::cos(angle), s = std::sin(angle);
-  return {c * v.x + s * v.z, v.y, c * v.z - s * v.x};
-}
-
-class scene_builder {
- public:
-  explicit scene_builder(std::string name) { scene_.name = std::move(name); }
-
-  std::uint32_t add(const material& m) {
-    scene_.materials.push_back(m);
-    return static_cast<std::uint32_t>(scene_.materials.size() - 1);
-  }
-
-  std::uint32_t diffuse(vec3 reflectance) {
-    material m;
-    m.base_color = reflectance;
-    return add(m);
-  }
-
-  std::uint32_t lamp(vec3 radiance) {
-    material m;
-    m.base_color = vec3(0.0f);
-    m.emission = radiance;
-    return add(m);
-  }
-
-  /// A plastic or a metal.
-  std::uint32_t glossy(material_kind kind, vec3 colour, float alpha) {
-    material m;
-    m.kind = kind;
-    m.base_color = colour;
-    m.alpha = alpha;
-    return add(m);
-  }
-
-  /// The planar quad p0 p1 p2 p3, corners in order around it, counter-clockwise seen from where `facing`
-  /// points to.
-  void quad(const vec3 (&p)[4], vec3 facing, std::uint32_t material_index) {
-    const bool flip = glm::dot(glm::cross(p[1] - p[0], p[2] - p[0]), facing) < 0.0f;
-    const auto first = static_cast<std::uint32_t>(scene_.positions.size());
-    scene_.positions.insert(scene_.positions.end(), std::begin(p), std::end(p));
-    const std::uint32_t second = flip ? first + 3 : first + 1, fourth = flip ? first + 1 : first + 3;
-    triangle({first, second, first + 2}, material_index);
-    triangle({first, first + 2, fourth}, material_index);
-  }
-
-  /// The parallelogram with one corner and two edges.
-  void parallelogram(vec3 corner, vec3 u, vec3 v, const side& s) {
-    quad({corner, corner + u, corner + u + v, corner + v}, s.facing, s.material);
-  }
-
-  /// A closed box whose six sides face outwards; faces that meet share their corners to the last bit.
-  void box(const box_shape& shape, std::uint32_t material_index) {
-    const auto at = [&](vec3 signs) { return shape.centre + turned(0.5f * shape.size * signs, shape.turn); };
-    for (int axis = 0; axis < 3; ++axis)
-      for (float sign : {-1.0f, 1.0f}) {
-        vec3 normal(0.0f), u(0.0f), v(0.0f);
-        normal[axis] = sign;
-        u[(axis + 1) % 3] = 1.0f;
-        v[(axis + 2) % 3] = 1.0f;
-        quad({at(normal - u - v), at(normal + u - v), at(normal + u + v), at(normal - u + v)},
-             turned(normal, shape.turn), material_index);
-      }
-  }
-
-  /// The sides of an axis-aligned room, facing inwards.
-  void room(const room_shape& shape, const room_materials& sides) {
-    const std::uint32_t materials[6] = {sides.left,    sides.right, sides.floor,
-                                        sides.ceiling, sides.back,  sides.front};
-    for (int i = 0; i < 6; ++i) {
-      if (materials[i] == room_materials::open) continue;
-      const int axis = i / 2;
-      const vec3 size = shape.upper - shape.lower;
-      vec3 corner = shape.lower, inwards(0.0f), u(0.0f), v(0.0f);
-      u[(axis + 1) % 3] = size[(axis + 1) % 3];
-      v[(axis + 2) % 3] = size[(axis + 2) % 3];
-      inwards[axis] = i % 2 == 0 ? 1.0f : -1.0f;
-      if (i % 2 == 1) corner[axis] = shape.upper[axis];
-      parallelogram(corner, u, v, {inwards, materials[i]});
-    }
-  }
-
-  /// A horizontal rectangle that faces down.
-  void ceiling_lamp(vec3 centre, vec2 size, std::uint32_t material_index) {
-    const vec3 u(size.x, 0.0f, 0.0f), v(0.0f, 0.0f, size.y);
-    parallelogram(centre - 0.5f * (u + v), u, v, {vec3(0.0f, -1.0f, 0.0f), material_index});
-  }
-
-  void look(vec3 from, vec3 at, float vertical_fov) {
-    scene_.view.position = from;
-    scene_.view.forward = glm::normalize(at - from);
-    scene_.view.up = vec3(0.0f, 1.0f, 0.0f);
-    scene_.view.vertical_fov = vertical_fov;
-  }
-
-  scene finish(int max_depth) {
-    scene_.max_depth = max_depth;
-    return std::move(scene_);
-  }
-
- private:
-  void triangle(uvec3 corners, std::uint32_t material_index) {
-    scene_.triangles.push_back(corners);
-    scene_.triangle_materials.push_back(material_index);
-  }
-
-  scene scene_;
-};
 
 constexpr vec3 red{0.65f, 0.05f, 0.05f};
 constexpr vec3 green{0.12f, 0.45f, 0.15f};
@@ -207,6 +70,26 @@ scene cornell_enclosed() {
   return b.finish(8);
 }
 
+/// A box with a wall in its middle that goes to the floor, the ceiling and the back, and leaves a way in
+/// front.
+scene cornell_wall() {
+  scene_builder b("cornell-wall");
+  const auto white = b.diffuse(vec3(0.75f)), left = b.diffuse(red), right = b.diffuse(green);
+  const auto light = b.lamp({60.0f, 48.0f, 27.0f});
+  b.room({{-1.0f, 0.0f, -1.0f}, {1.0f, 2.0f, 1.0f}},
+         {left, right, white, white, white, room_materials::open});
+  for (float sign : {-1.0f, 1.0f})
+    b.parallelogram({0.04f * sign, 0.0f, -1.0f}, {0.0f, 2.0f, 0.0f}, {0.0f, 0.0f, 1.1f},
+                    {{sign, 0.0f, 0.0f}, white});
+  b.parallelogram({-0.04f, 0.0f, 0.1f}, {0.08f, 0.0f, 0.0f}, {0.0f, 2.0f, 0.0f}, {{0.0f, 0.0f, 1.0f}, white});
+  b.box({{-0.55f, 0.6f, -0.35f}, {0.45f, 1.2f, 0.45f}, 0.3f}, white);
+  b.box({{0.5f, 0.25f, -0.1f}, {0.5f, 0.5f, 0.5f}, -0.3f}, white);
+  // So far back that the wall's edge hides it from all of the left half.
+  b.ceiling_lamp({0.55f, 1.99f, -0.7f}, {0.4f, 0.3f}, light);
+  b.look({0.0f, 1.0f, 3.9f}, {0.0f, 1.0f, 0.0f}, 0.686f);
+  return b.finish(8);
+}
+
 /// The separating wall of `ajar`, z in [-0.05, 0.05], with a doorway 1.0 wide and 2.2 high in its middle.
 /// Only the faces that can be seen are made.
 void wall_with_doorway(scene_builder& b, std::uint32_t material_index) {
@@ -260,7 +143,7 @@ scene glossy_room() {
   const auto white = b.diffuse(vec3(0.75f));
   const auto steel = b.glossy(material_kind::conductor, vec3(0.75f), 0.3f),
              copper = b.glossy(material_kind::conductor, {0.9f, 0.6f, 0.45f}, 0.3f);
-  const auto light = b.lamp(vec3(150.0f));
+  const auto light = b.lamp(vec3(50.0f));
   b.room({{-2.0f, 0.0f, -2.0f}, {2.0f, 3.0f, 2.0f}}, {copper, steel, steel, white, steel, steel});
   // A trough hides the lamp from below: all light comes by way of the ceiling.
   b.parallelogram({-1.5f, 2.2f, -1.9f}, {0.5f, 0.0f, 0.0f}, {0.0f, 0.0f, 3.0f}, {-up, white});
@@ -311,6 +194,31 @@ scene many_lamps() {
   return s;
 }
 
+/// A closed room of 4 x 3.2 x 4 whose walls hold the water; the camera is in it.
+scene caustic_pool() {
+  scene_builder b("caustic-pool");
+  const auto white = b.diffuse(vec3(0.75f)), tiles = b.diffuse({0.35f, 0.55f, 0.6f}),
+             stone = b.diffuse({0.7f, 0.65f, 0.55f});
+  const auto light = b.lamp(vec3(50.0f));
+  material smooth_water;
+  smooth_water.kind = material_kind::dielectric;
+  smooth_water.base_color = vec3(1.0f);
+  smooth_water.ior = 1.33f;
+  const auto water = b.add(smooth_water);
+  b.room({{-2.0f, 0.0f, -2.0f}, {2.0f, 3.2f, 2.0f}}, {tiles, tiles, white, white, tiles, tiles});
+  b.box({{0.7f, 0.3f, -0.9f}, {0.6f, 0.6f, 0.6f}, 0.4f}, stone);
+  // Waves of less than a metre, whose crests focus about as deep as the floor. The sheet goes on behind the
+  // walls, so that no path gets past its edge.
+  const water_surface surface(1.2f, {{{7.3f, 2.9f}, 0.018f, 0.3f},
+                                     {{-4.3f, 8.3f}, 0.013f, 1.7f},
+                                     {{10.9f, -6.4f}, 0.007f, 4.1f},
+                                     {{5.6f, 13.7f}, 0.0045f, 2.6f}});
+  b.water(surface, 2.02f, 64, water);
+  b.ceiling_lamp({0.0f, 3.15f, -0.4f}, {0.4f, 0.4f}, light);
+  b.look({-0.4f, 0.95f, 1.9f}, {0.0f, 0.4f, -0.4f}, 1.2f);
+  return b.finish(8);
+}
+
 scene furnace() {
   scene_builder b("furnace");
   material wall;
@@ -325,10 +233,15 @@ scene furnace() {
 using maker = scene (*)();
 
 const std::vector<std::pair<std::string, maker>>& makers() {
-  static const std::vector<std::pair<std::string, maker>> all = {
-      {"cornell-box", cornell_box}, {"cornell-enclosed", cornell_enclosed}, {"ajar", ajar},
-      {"thin-wall", thin_wall},     {"glossy-room", glossy_room},           {"many-lamps", many_lamps},
-      {"furnace", furnace}};
+  static const std::vector<std::pair<std::string, maker>> all = {{"cornell-box", cornell_box},
+                                                                 {"cornell-enclosed", cornell_enclosed},
+                                                                 {"cornell-wall", cornell_wall},
+                                                                 {"ajar", ajar},
+                                                                 {"thin-wall", thin_wall},
+                                                                 {"glossy-room", glossy_room},
+                                                                 {"caustic-pool", caustic_pool},
+                                                                 {"many-lamps", many_lamps},
+                                                                 {"furnace", furnace}};
   return all;
 }
 

@@ -22,6 +22,7 @@ void print_table(const render::image_error& error) {
   std::printf("relmse robust   %.6e   (worst 0.01%% dropped, which are %.1f%% of the sum)\n",
               error.relmse_robust, 100.0 * error.worst_share);
   std::printf("mse reinhard    %.6e   (after c / (1 + c))\n", error.mse_reinhard);
+  std::printf("mae             %.6e\n", error.mae);
   std::printf("smape           %.6e\n", error.smape);
   if (error.non_finite > 0)
     std::printf("pixels with NaN or infinity: %zu, each counted as infinitely wrong\n", error.non_finite);

@@ -21,6 +21,7 @@ struct pixel_error {
   double squared = 0.0;
   double relative = 0.0;
   double reinhard = 0.0;
+  double absolute = 0.0;
   double symmetric = 0.0;
 };
 
@@ -41,6 +42,7 @@ pixel_error error_of(vec3 test, vec3 reference) {
     sum.squared += (t - r) * (t - r) / 3.0;
     sum.relative += (t - r) * (t - r) / (r * r + relative_floor) / 3.0;
     sum.reinhard += mapped * mapped / 3.0;
+    sum.absolute += std::abs(t - r) / 3.0;
     sum.symmetric += std::abs(t - r) / (std::abs(t) + std::abs(r) + relative_floor) / 3.0;
   }
   return sum;
@@ -49,7 +51,7 @@ pixel_error error_of(vec3 test, vec3 reference) {
 pixel_error error_where_finite(vec3 test, vec3 reference) {
   constexpr double infinite = std::numeric_limits<double>::infinity();
   if (finite(test) && finite(reference)) return error_of(test, reference);
-  return {infinite, infinite, infinite, infinite};
+  return {infinite, infinite, infinite, infinite, infinite};
 }
 
 /// The mean without the largest `share` of the values, which it reorders.
@@ -102,12 +104,14 @@ image_error compare(const image& test, const image& reference) {
     if (!finite(test.pixels[i]) || !finite(reference.pixels[i])) ++error.non_finite;
     error.mse += pixel.squared;
     error.mse_reinhard += pixel.reinhard;
+    error.mae += pixel.absolute;
     error.smape += pixel.symmetric;
     relative.push_back(pixel.relative);
   }
   const double count = static_cast<double>(test.pixels.size());
   error.mse /= count;
   error.mse_reinhard /= count;
+  error.mae /= count;
   error.smape /= count;
   add_relative(relative, error);
   return error;
@@ -131,7 +135,7 @@ image_error noise_of_halves(const image& half_a, const image& half_b) {
   const image_error other = compare(half_b, mean);
   for (double image_error::*const value :
        {&image_error::mse, &image_error::relmse, &image_error::relmse_trimmed, &image_error::relmse_robust,
-        &image_error::mse_reinhard, &image_error::smape})
+        &image_error::mse_reinhard, &image_error::mae, &image_error::smape})
     error.*value = 0.5 * (error.*value + other.*value);
   return error;
 }

@@ -17,6 +17,7 @@ struct image_error {
   double relmse_robust = 0.0;   ///< relmse without the worst 0.01% of the pixels (rounded down)
   double worst_share = 0.0;     ///< of relmse's sum, what those had, in [0, 1]; 1 where relmse is infinite
   double mse_reinhard = 0.0;    ///< (t' - r')² with c' = c / (1 + c), negative values taken as 0
+  double mae = 0.0;             ///< |t - r|
   double smape = 0.0;           ///< |t - r| / (|t| + |r| + 0.01)
   std::size_t non_finite = 0;   ///< pixels with a NaN or an infinity; trimming may hide these, this does not
 };

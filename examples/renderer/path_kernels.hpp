@@ -122,6 +122,7 @@ struct trace_paths {
   wfpg::array_view<std::uint32_t> keys;  ///< the material's kind, or excluded
   wfpg::array_view<vec3> radiance;
   wfpg::array_view<std::uint32_t> segments;
+  wfpg::array_view<std::uint32_t> light_hits;  ///< segments that ended where light is emitted toward them
   std::uint32_t excluded;
 
   WFPG_HD void operator()(std::size_t slot) const {
@@ -134,14 +135,16 @@ struct trace_paths {
     const triangle_hit hit = answers.hit(slot, path.ray());
     if (!hit.is_hit()) {
       recorder.escape(id, at.depth, path.throughput);
-      gather(id, path.throughput * world.scene.environment.radiance(path.direction) *
-                     environment_weight(id, path));
+      const vec3 sky = world.scene.environment.radiance(path.direction);
+      count_light(id, sky);
+      gather(id, path.throughput * sky * environment_weight(id, path));
       return end(id);
     }
     const hit_surface found = world.scene.surface(hit, -path.direction);
     const wfpg::surface<bsdf>& surface = found.surface;
     const vec3 before = path.throughput, throughput = before * absorb(id, path, found);
     recorder.vertex(id, at.depth, surface.position, surface.outgoing, throughput);
+    count_light(id, found.emission);
     gather(id, throughput * found.emission * emission_weight(id, path, hit, found));
     if (at.is_last()) return end(id);
     vertices.emplace(id, found);
@@ -163,6 +166,10 @@ struct trace_paths {
       p.reflectance *= wfpg::luminance(left);
     });
     return left;
+  }
+
+  WFPG_HD void count_light(std::uint32_t id, vec3 emitted) const {
+    if (emitted != vec3(0.0f)) ++light_hits[id];
   }
 
   WFPG_HD void gather(std::uint32_t id, vec3 contribution) const {
@@ -264,6 +271,7 @@ struct shade_paths {
   tiled_view<path_state> paths;
   wfpg::array_view<vec3> radiance;
   wfpg::light_guide_view lights;
+  std::uint32_t roulette_depth;  ///< paths go on from vertices before it
 
   WFPG_HD void operator()(std::size_t slot) const {
     if (!queue.holds(slot)) return;
@@ -278,9 +286,7 @@ struct shade_paths {
   }
 
  private:
-  // The first bounces carry most of the light. Later ones are spared while a tenth of it is left: ending
-  // those added more noise than it saved time.
-  static constexpr std::uint32_t first_roulette_depth = 3;
+  // Bounces are spared while a tenth of the light is left: ending those added more noise than it saved time.
   static constexpr float spared_reflectance = 0.1f;
 
   WFPG_HD void add_light(std::size_t slot, std::uint32_t id) const {
@@ -313,7 +319,7 @@ struct shade_paths {
   // By the throughput that the path would have if its directions were all drawn from BSDFs. Its real one is
   // low where guiding is sure of a direction, and those are the paths worth keeping.
   WFPG_HD bool survive_roulette(path_state& path, float u) const {
-    if (at.depth < first_roulette_depth) return true;
+    if (at.depth < roulette_depth) return true;
     const float probability = glm::min(1.0f, path.reflectance / spared_reflectance);
     if (!(u < probability)) return false;
     path.throughput /= probability;

@@ -48,6 +48,8 @@ render_options completed(const scene& scene, render_options options) {
   require(options.height > 0 && options.height <= largest_side, "height", options.height, "1 to 32768");
   require(options.max_depth > 0 && options.max_depth <= largest_depth, "max_depth", options.max_depth,
           "1 to 1024");
+  require(options.roulette_depth >= 1 && options.roulette_depth <= 1 << 30, "roulette_depth",
+          options.roulette_depth, "1 to 2^30");
   require(options.method != sampling_method::wfpg_product || options.product_resolution > 0,
           "product_resolution", options.product_resolution, "4, 8 or 16 for wfpg-product");
   require(!is_openpgl(options.method) || options.where == device::cpu, "device",

@@ -39,8 +39,9 @@ struct render_options {
   double seconds = 0.0;  ///< time for samples, building not counted; the last may use more; 0: spp decides
   int width = 0;         ///< pixels, both positive; 0 x 0: the scene's own
   int height = 0;
-  int max_depth = 0;  ///< segments of a path, positive; 0: the scene's own
-  bool nee = true;    ///< next-event estimation toward area lights, with MIS
+  int max_depth = 0;       ///< segments of a path, positive; 0: the scene's own
+  int roulette_depth = 3;  ///< Russian roulette ends no path before this vertex, from 0; 1 to 2^30
+  bool nee = true;         ///< next-event estimation toward area lights, with MIS
   std::uint64_t seed = 0;
   std::uint32_t octree_resolution = 128;             ///< voxels a side, a power of two
   std::uint32_t field_resolution = 32;               ///< cells a side of transient fields at the first vertex
@@ -106,6 +107,9 @@ struct render_report {
   std::string scene, method, device;
   int spp = 0;                 ///< rendered, before a rendering went on too; times are since then
   std::uint64_t segments = 0;  ///< rays that paths were extended by
+  /// Of them, those that hit a surface that emits toward them or left for an environment that does, the
+  /// camera's among them; over the number of paths.
+  double light_hits_per_path = 0.0;
   double total_seconds = 0.0;  ///< from building to the last sample
   named_seconds seconds;       ///< by stage; "guide ..." are parts of "directions" and of "update"
   std::vector<std::pair<std::string, std::size_t>> memory;  ///< the guider's bytes, by part

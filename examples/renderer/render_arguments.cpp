@@ -116,6 +116,9 @@ void add_picture_options(CLI::App& app, render_options& options) {
       "picture, WIDTHxHEIGHT (default: the scene's)");
   app.add_option("--max-depth", options.max_depth, "segments of a path (default: the scene's)")
       ->check(CLI::Range(1, 1 << 30));
+  app.add_option("--roulette-depth", options.roulette_depth,
+                 "vertex before which Russian roulette ends no path; the first hit is 0 (default: 3)")
+      ->check(CLI::Range(1, 1 << 30));
 }
 
 void add_guider_options(CLI::App& app, render_options& options) {

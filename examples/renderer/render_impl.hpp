@@ -172,7 +172,7 @@ render_result render_by(const Exec& exec, const scene& scene, const render_optio
   building.measure(Accelerated::name,
                    [&] { accelerated = std::make_unique<const Accelerated>(exec, scene, geometry.view()); });
   const tracer_settings settings{options.width, options.height, static_cast<std::uint32_t>(options.max_depth),
-                                 options.seed};
+                                 options.seed, static_cast<std::uint32_t>(options.roulette_depth)};
   path_tracer<Exec, decltype(accelerated->caster())> tracer(
       exec, settings, {geometry.view(), lights.view(), options.nee}, accelerated->caster());
   const pinhole camera(scene.view, options.width, options.height);
@@ -182,6 +182,8 @@ render_result render_by(const Exec& exec, const scene& scene, const render_optio
   result.guide = before.guide;
   take(tracer, geometry.view(), lights, camera, building, result);
   report.segments = tracer.segments();
+  const double paths = double(report.spp) * double(options.width) * double(options.height);
+  report.light_hits_per_path = static_cast<double>(tracer.light_hits()) / paths;
   if (options.keep_state)
     result.state = state_bytes(scene, options, {report.spp, tracer.film(), result.guide});
   result.picture = {options.width, options.height, tracer.picture()};

@@ -54,6 +54,7 @@ void add_guider_values(const render_options& o, named_values& values) {
 named_values values_of(const render_options& o) {
   named_values values = {{"--size", std::to_string(o.width) + "x" + std::to_string(o.height)},
                          {"--max-depth", std::to_string(o.max_depth)},
+                         {"--roulette-depth", std::to_string(o.roulette_depth)},
                          {"--seed", std::to_string(o.seed)},
                          {"--nee", o.nee ? "on" : "off"},
                          {"--method", name_of(method_names(), o.method)},
@@ -95,6 +96,7 @@ section_writer film_to_bytes(const render_state& state) {
   bytes.put(static_cast<std::uint32_t>(state.samples));
   bytes.put(state.film.weight);
   bytes.put(state.film.segments);
+  bytes.put(state.film.light_hits);
   for (const glm::dvec3& sum : state.film.sums)
     for (int c = 0; c < 3; ++c) bytes.put(sum[c]);
   return bytes;
@@ -107,6 +109,7 @@ void restore_film(section_reader bytes, std::size_t pixels, render_state& state)
   state.film.weight = bytes.get<double>();
   bytes.require(state.film.weight >= 0.0 && state.film.weight <= 1e30, "has a weight out of range");
   state.film.segments = bytes.get<std::uint64_t>();
+  state.film.light_hits = bytes.get<std::uint64_t>();
   const std::vector<double> sums = bytes.get_all<double>(3 * pixels);
   bytes.end();
   state.film.sums.resize(pixels);

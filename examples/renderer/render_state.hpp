@@ -1,7 +1,7 @@
 // What a rendering needs to go on later as if it had never stopped: the film, the samples so far, the guide,
 // and what it was rendered with. State files are sections as in wfpg/detail/section_file.hpp:
 //   options  the scene's name and checksum (8); an option's name and value, for each that decides the picture
-//   film     samples (4), their weight (8), segments (8), a pixel's sums (3 x 8)
+//   film     samples (4), their weight (8), segments (8), of them hits of lights (8), a pixel's sums (3 x 8)
 //   guide    a guide file, or nothing
 // Texts, and the guide, follow their lengths (8).
 #pragma once
@@ -22,6 +22,7 @@ namespace render {
 struct film_state {
   double weight = 0.0;           ///< of all samples
   std::uint64_t segments = 0;    ///< rays that paths were extended by
+  std::uint64_t light_hits = 0;  ///< of them, those that ended at a light
   std::vector<glm::dvec3> sums;  ///< a pixel, row by row: weighted radiance
 };
 

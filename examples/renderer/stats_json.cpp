@@ -56,6 +56,7 @@ json to_json(const image_error& error) {
           {"relmse_robust", error.relmse_robust},
           {"worst_share", error.worst_share},
           {"mse_reinhard", error.mse_reinhard},
+          {"mae", error.mae},
           {"smape", error.smape},
           {"non_finite", error.non_finite}};
 }
@@ -65,6 +66,7 @@ void write_stats(const std::string& path, const render_report& report,
   json stats{
       {"scene", report.scene}, {"method", report.method}, {"device", report.device}, {"spp", report.spp}};
   stats["segments"] = report.segments;
+  stats["light_hits_per_path"] = report.light_hits_per_path;
   stats["seconds"] = seconds_of(report);
   stats["memory"] = memory_of(report);
   stats["octree"] = octree_of(report.octree);

@@ -21,6 +21,7 @@ struct tracer_settings {
   int height = 512;             ///< pixels, positive
   std::uint32_t max_depth = 8;  ///< vertices of a path and segments from the camera, at least 1
   std::uint64_t seed = 0;
+  std::uint32_t roulette_depth = 3;  ///< Russian roulette begins at this vertex; the camera's first hit is 0
 };
 
 /// Renders samples of a scene with directions from a guider.
@@ -51,6 +52,7 @@ class path_tracer {
         directions_(exec, count_),
         keys_(exec, count_),
         segments_(exec, std::vector<std::uint32_t>(count_, 0)),
+        light_hits_(exec, std::vector<std::uint32_t>(count_, 0)),
         radiance_(exec, count_),
         film_(exec, std::vector<glm::dvec3>(count_, glm::dvec3(0.0))),
         partitioner_(exec, count_),
@@ -97,16 +99,17 @@ class path_tracer {
   }
 
   /// Rays traced to extend paths, shadow rays not among them.
-  std::uint64_t segments() const {
-    const std::vector<std::uint32_t> counts = segments_.to_host(exec_);
-    return std::accumulate(counts.begin(), counts.end(), segments_before_);
-  }
+  std::uint64_t segments() const { return sum_of(segments_, segments_before_); }
+
+  /// Those of them that ended at a surface that emits toward them, or in an environment that does.
+  std::uint64_t light_hits() const { return sum_of(light_hits_, light_hits_before_); }
 
   /// The samples so far, and to go on from them. Precondition: of a picture of this size.
-  film_state film() const { return {weight_, segments(), film_.to_host(exec_)}; }
+  film_state film() const { return {weight_, segments(), light_hits(), film_.to_host(exec_)}; }
   void restore(const film_state& film) {
     weight_ = film.weight;
     segments_before_ = film.segments;
+    light_hits_before_ = film.light_hits;
     film_ = wfpg::buffer<glm::dvec3, Exec>(exec_, film.sums);
   }
 
@@ -117,6 +120,11 @@ class path_tracer {
 
  private:
   static constexpr bool is_inline = wfpg::is_inline_caster_v<Caster>;
+
+  std::uint64_t sum_of(const wfpg::buffer<std::uint32_t, Exec>& counts, std::uint64_t before) const {
+    const std::vector<std::uint32_t> all = counts.to_host(exec_);
+    return std::accumulate(all.begin(), all.end(), before);
+  }
 
   template <class Guider>
   void trace(Guider& guider, const wave_position& at, const path_queue& queue) {
@@ -134,10 +142,10 @@ class path_tracer {
   template <class Guider, class Answers>
   void trace_with(Guider& guider, const wave_position& at, const path_queue& queue, const Answers& answers) {
     auto recorder = guider.recorder();
-    exec_.for_each(count_,
-                   trace_paths<Answers, decltype(recorder)>{
-                       at, world_, answers, recorder, queue, paths_.view(), vertices_.view(), keys_.view(),
-                       radiance_.view(), segments_.view(), wfpg::partitioner<Exec>::excluded});
+    exec_.for_each(count_, trace_paths<Answers, decltype(recorder)>{
+                               at, world_, answers, recorder, queue, paths_.view(), vertices_.view(),
+                               keys_.view(), radiance_.view(), segments_.view(), light_hits_.view(),
+                               wfpg::partitioner<Exec>::excluded});
   }
 
   path_queue sort_by_material() {
@@ -183,9 +191,10 @@ class path_tracer {
   void shade(Guider& guider, const wave_position& at, const path_queue& queue) {
     clock_.measure("shade", [&] {
       auto recorder = guider.recorder();
-      exec_.for_each(count_, shade_paths<decltype(recorder)>{
-                                 at, recorder, queue, vertices_.view(), queries_.view(), densities_.view(),
-                                 directions_.view(), paths_.view(), radiance_.view(), world_.guide});
+      exec_.for_each(
+          count_, shade_paths<decltype(recorder)>{at, recorder, queue, vertices_.view(), queries_.view(),
+                                                  densities_.view(), directions_.view(), paths_.view(),
+                                                  radiance_.view(), world_.guide, settings_.roulette_depth});
     });
   }
 
@@ -199,7 +208,7 @@ class path_tracer {
   tiled_array<light_query, Exec> queries_;
   wfpg::buffer<float, Exec> densities_;
   wfpg::buffer<wfpg::sampled_direction, Exec> directions_;
-  wfpg::buffer<std::uint32_t, Exec> keys_, segments_;
+  wfpg::buffer<std::uint32_t, Exec> keys_, segments_, light_hits_;
   wfpg::buffer<vec3, Exec> radiance_;
   wfpg::buffer<glm::dvec3, Exec> film_;
   wfpg::partitioner<Exec> partitioner_;
@@ -207,7 +216,7 @@ class path_tracer {
   wfpg::buffer<triangle_hit, Exec> hits_;
   wfpg::buffer<std::uint32_t, Exec> hidden_;
   double weight_ = 0.0;
-  std::uint64_t segments_before_ = 0;  // of samples that were taken elsewhere
+  std::uint64_t segments_before_ = 0, light_hits_before_ = 0;  // of samples that were taken elsewhere
   policy_clock<Exec> clock_;
 };
 
