@@ -143,7 +143,7 @@ scene glossy_room() {
   const auto white = b.diffuse(vec3(0.75f));
   const auto steel = b.glossy(material_kind::conductor, vec3(0.75f), 0.3f),
              copper = b.glossy(material_kind::conductor, {0.9f, 0.6f, 0.45f}, 0.3f);
-  const auto light = b.lamp(vec3(50.0f));
+  const auto light = b.lamp(vec3(150.0f));
   b.room({{-2.0f, 0.0f, -2.0f}, {2.0f, 3.0f, 2.0f}}, {copper, steel, steel, white, steel, steel});
   // A trough hides the lamp from below: all light comes by way of the ceiling.
   b.parallelogram({-1.5f, 2.2f, -1.9f}, {0.5f, 0.0f, 0.0f}, {0.0f, 0.0f, 3.0f}, {-up, white});

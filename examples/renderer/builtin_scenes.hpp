@@ -29,10 +29,9 @@ bool is_builtin_scene(const std::string& name);
 ///   wall's edge: all light in the dark half is indirect. Closed.
 /// - `glossy-room`: metal walls, and a lamp in a trough that shines at the ceiling alone. Closed.
 /// - `caustic-pool`: a room filled with water to a third of its height, seen from in the water. The lamp
-/// hangs
-///   above: its light gets to the floor through the waves alone, where next-event estimation finds none.
-///   Waves focus it to caustics. The water is a sheet of 8,192 triangles; air is above, water below. Closed.
-///   After their second case.
+///   hangs above: its light gets to the floor through the waves alone, where next-event estimation finds
+///   none. Waves focus it to caustics. The water is a sheet of 8,192 triangles; air is above, water below.
+///   Closed. After their second case.
 /// - `many-lamps`: four rooms in a row, each with three lamps of very different power, a bulb and a spot. Of
 ///   the lamps in other rooms little is seen. Closed.
 /// - `furnace`: a closed box of albedo 0.5 that emits radiance 1 everywhere; see furnace_radiance().
