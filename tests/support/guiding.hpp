@@ -214,62 +214,90 @@ WFPG_HD inline vec3 inward_normal(vec3 p) {
   return face_normal(nearest);
 }
 
-/// Follows a sampled direction to the wall that it meets, and records what is there.
+/// The box with its patch: all paths go on.
+struct patch_box {
+  static constexpr float survival = 1.0f;
+  WFPG_HD float operator()(vec3 p) const { return emitted(p); }
+};
+
+/// Follows a sampled direction to the wall that it meets, and records what is there. A World emits what it
+/// says of a point, and of the paths a share goes on.
+template <class World>
 struct follow_path {
+  World world;
   wfpg::array_view<path_step> paths;
   wfpg::array_view<const wfpg::sampled_direction> directions;
   wfpg::array_view<test_surface> surfaces;
   wfpg::path_recorder_view recorder;
   std::uint32_t depth;
+  std::uint64_t seed;
 
-  WFPG_HD void operator()(std::size_t path) const {
+  WFPG_HD void operator()(std::size_t i) const {
+    const auto path = static_cast<std::uint32_t>(i);
     path_step& step = paths[path];
     test_surface& surface = surfaces[path];
     const wfpg::sampled_direction& d = directions[path];
     if (!surface.active) return;
-    surface.active = d.pdf > 0.0f;
-    if (!surface.active) return;
     recorder.scatter(path, depth, d);
-    step.throughput *= surface.bsdf.eval(surface.outgoing, d.direction) / d.pdf;
+    surface.active = d.pdf > 0.0f && hashed_numbers{seed}(path, 2).x < World::survival;
+    if (!surface.active) return;
+    step.throughput *= surface.bsdf.eval(surface.outgoing, d.direction) / (World::survival * d.pdf);
     wfpg::ray ray;
     ray.origin = surface.position;
     ray.direction = d.direction;
     const float distance = box_caster()(ray).distance;
     const vec3 p = glm::clamp(ray.origin + distance * d.direction, vec3(0.0f), vec3(1.0f));
     surface = make_surface(p, inward_normal(p), -d.direction);
+    surface.active = step.throughput > 0.0f;
+    const float found = step.throughput * world(p);
     recorder.vertex(path, depth + 1, p, -d.direction, vec3(step.throughput));
-    recorder.emission(path, depth + 1, vec3(step.throughput * emitted(p)));
-    step.radiance += step.throughput * emitted(p);
+    recorder.emission(path, depth + 1, vec3(found));
+    step.radiance += found;
   }
 };
 
-/// Traces `samples` samples of paths of two bounces from points on the walls; what each path gathered.
-template <class Exec, class Guide, class Caster>
+/// Which samples of which paths to trace: from points on the walls, over so many directions.
+struct paths_to_trace {
+  std::uint32_t samples;
+  std::size_t paths;
+  std::uint32_t directions = 2;
+  std::uint64_t first = 0;  ///< sample: others have other points and numbers
+};
+
+/// Traces samples; what each path gathered.
+template <class Exec, class Guide, class Caster, class World>
 std::vector<float> trace_paths(const Exec& exec, wfpg::path_guider<Exec, Guide>& guider,
-                               std::uint32_t samples, std::size_t paths, const Caster& caster) {
+                               const paths_to_trace& what, const Caster& caster, const World& world) {
   std::vector<float> picture;
-  for (std::uint32_t sample = 0; sample < samples; ++sample) {
-    const auto first = wall_surfaces(paths, sample);
-    const wfpg::buffer<test_surface, Exec> surfaces(exec, first);
-    const wfpg::buffer<path_step, Exec> steps(exec, std::vector<path_step>(paths));
-    const wfpg::buffer<wfpg::sampled_direction, Exec> directions(exec, paths);
+  for (std::uint64_t sample = what.first; sample < what.first + what.samples; ++sample) {
+    const wfpg::buffer<test_surface, Exec> surfaces(exec, wall_surfaces(what.paths, sample));
+    const wfpg::buffer<path_step, Exec> steps(exec, std::vector<path_step>(what.paths));
+    const wfpg::buffer<wfpg::sampled_direction, Exec> directions(exec, what.paths);
     guider.begin_sample();
     const wfpg::path_recorder_view recorder = guider.recorder();
     const wfpg::array_view<test_surface> at = surfaces.view();
-    exec.for_each(paths, [=] WFPG_HD(std::size_t i) {
+    exec.for_each(what.paths, [=] WFPG_HD(std::size_t i) {
       recorder.vertex(i, 0, at[i].position, at[i].outgoing, vec3(1.0f));
     });
-    for (std::uint32_t depth = 0; depth < 2; ++depth) {
+    for (std::uint32_t depth = 0; depth < what.directions; ++depth) {
+      const std::uint64_t seed = 100 * sample + depth;
       const stored_surfaces stored{const_view<test_surface>(surfaces)};
-      guider.sample_directions(wfpg::wave{depth, paths, stored, hashed_numbers{100 * sample + depth}}, caster,
+      guider.sample_directions(wfpg::wave{depth, what.paths, stored, hashed_numbers{seed}}, caster,
                                directions.view());
-      exec.for_each(paths, follow_path{steps.view(), const_view<wfpg::sampled_direction>(directions),
-                                       surfaces.view(), recorder, depth});
+      exec.for_each(what.paths,
+                    follow_path<World>{world, steps.view(), const_view<wfpg::sampled_direction>(directions),
+                                       surfaces.view(), recorder, depth, seed});
     }
     guider.end_sample();
     for (const path_step& step : steps.to_host(exec)) picture.push_back(step.radiance);
   }
   return picture;
+}
+/// Of two bounces, in the box with its patch.
+template <class Exec, class Guide, class Caster>
+std::vector<float> trace_paths(const Exec& exec, wfpg::path_guider<Exec, Guide>& guider,
+                               std::uint32_t samples, std::size_t paths, const Caster& caster) {
+  return trace_paths(exec, guider, paths_to_trace{samples, paths}, caster, patch_box());
 }
 
 /// Options for trace_paths.

@@ -84,62 +84,18 @@ struct bright_spot {
 /// The unit box as a furnace: walls that emit 1 and reflect 0.8, so that 5 arrives everywhere.
 constexpr float furnace_radiance = 1.0f / (1.0f - 0.8f);
 
-/// Follows a direction to a wall. Of the paths a share of 0.8 goes on.
-struct follow_in_furnace {
-  wfpg::array_view<path_step> paths;
-  wfpg::array_view<const wfpg::sampled_direction> directions;
-  wfpg::array_view<test_surface> surfaces;
-  wfpg::path_recorder_view recorder;
-  std::uint32_t depth;
-  std::uint64_t seed;
-
-  WFPG_HD void operator()(std::size_t i) const {
-    const auto path = static_cast<std::uint32_t>(i);
-    path_step& step = paths[path];
-    test_surface& surface = surfaces[path];
-    const wfpg::sampled_direction& d = directions[path];
-    if (!surface.active) return;
-    recorder.scatter(path, depth, d);
-    surface.active = d.pdf > 0.0f && hashed_numbers{seed}(path, 2).x < 0.8f;
-    if (!surface.active) return;
-    step.throughput *= surface.bsdf.eval(surface.outgoing, d.direction) / (0.8f * d.pdf);
-    wfpg::ray ray;
-    ray.origin = surface.position;
-    ray.direction = d.direction;
-    const float distance = box_caster()(ray).distance;
-    const vec3 p = glm::clamp(ray.origin + distance * d.direction, vec3(0.0f), vec3(1.0f));
-    surface = make_surface(p, inward_normal(p), -d.direction);
-    surface.active = step.throughput > 0.0f;
-    recorder.vertex(path, depth + 1, p, -d.direction, vec3(step.throughput));
-    recorder.emission(path, depth + 1, vec3(step.throughput));
-  }
+/// Of the paths as many go on as light does.
+struct furnace {
+  static constexpr float survival = 0.8f;
+  WFPG_HD float operator()(vec3) const { return 1.0f; }
 };
 
 /// Samples of paths in the furnace, as long as they get.
 template <class Exec>
 void trace_in_furnace(const Exec& exec, sarsa_guider<Exec>& guider, std::uint32_t samples) {
-  const std::size_t paths = guider.options().max_paths;
-  for (std::uint32_t i = 0; i < samples; ++i) {
-    const std::uint32_t sample = guider.statistics().samples;
-    const wfpg::buffer<test_surface, Exec> surfaces(exec, wall_surfaces(paths, sample));
-    const wfpg::buffer<path_step, Exec> steps(exec, std::vector<path_step>(paths));
-    const wfpg::buffer<wfpg::sampled_direction, Exec> directions(exec, paths);
-    guider.begin_sample();
-    const wfpg::path_recorder_view recorder = guider.recorder();
-    const wfpg::array_view<test_surface> at = surfaces.view();
-    exec.for_each(paths, [=] WFPG_HD(std::size_t path) {
-      recorder.vertex(path, 0, at[path].position, at[path].outgoing, vec3(1.0f));
-    });
-    for (std::uint32_t depth = 0; depth + 1 < guider.options().max_depth; ++depth) {
-      const std::uint64_t seed = 1000 * std::uint64_t(sample) + depth;
-      const stored_surfaces stored{const_view<test_surface>(surfaces)};
-      guider.sample_directions(wfpg::wave{depth, paths, stored, hashed_numbers{seed}}, box_caster(),
-                               directions.view());
-      exec.for_each(paths, follow_in_furnace{steps.view(), const_view<wfpg::sampled_direction>(directions),
-                                             surfaces.view(), recorder, depth, seed});
-    }
-    guider.end_sample();
-  }
+  const paths_to_trace what{samples, guider.options().max_paths, guider.options().max_depth - 1,
+                            guider.statistics().samples};
+  trace_paths(exec, guider, what, box_caster(), furnace());
 }
 
 struct radiance_toward {

@@ -99,6 +99,15 @@ struct has_mixture<
     std::void_t<decltype(std::declval<const View&>().mixture(0u, std::declval<const Surface&>()))>>
     : std::true_type {};
 
+/// What a ray draws from at a surface.
+template <class View, class Surface>
+WFPG_HD auto mixture_at(const View& view, std::uint32_t ray, const Surface& s) {
+  if constexpr (has_mixture<View, Surface>::value)
+    return view.mixture(ray, s);
+  else
+    return view_of_ray<View>{view, ray};
+}
+
 /// Rays of any guide.
 template <class Serve, class View>
 struct serve_guide_view {
@@ -106,12 +115,7 @@ struct serve_guide_view {
   View view;
   WFPG_HD void operator()(std::size_t i) const {
     const auto ray = static_cast<std::uint32_t>(i);
-    serve(ray, [&](const auto& s) {
-      if constexpr (has_mixture<View, std::decay_t<decltype(s)>>::value)
-        return view.mixture(ray, s);
-      else
-        return view_of_ray<View>{view, ray};
-    });
+    serve(ray, [&](const auto& s) { return mixture_at(view, ray, s); });
   }
 };
 
