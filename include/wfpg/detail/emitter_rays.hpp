@@ -168,7 +168,7 @@ struct land_rays {
   WFPG_HD void arrive(vec3 p, vec3 direction, std::uint32_t power) const {
     const node_id leaf = tree.nearest_leaf(p);
     if (leaf == invalid_node) return;
-    const voxel_cones sides{tree, nullptr, normals};
+    const lit_nodes sides{nullptr, normals};
     atomic_add(&light[leaf - tree.first_leaf()].arrived[sides.side_facing(leaf, -direction)],
                std::uint64_t(power));
   }
@@ -188,7 +188,7 @@ struct emit_in_leaves {
     const emitting_triangle& e = from.emitters[i];
     const voxel_grid& grid = tree.grid();
     const grid_triangle t{grid.to_grid(e.a), grid.to_grid(e.b), grid.to_grid(e.c)};
-    const voxel_cones sides{tree, nullptr, normals};
+    const lit_nodes sides{nullptr, normals};
     const triangle_columns columns(t, grid.resolution);
     const vec3 normal = unit_normal(e.a, e.b, e.c);
     block.for_each(static_cast<int>(columns.count()), [&](int column) {
