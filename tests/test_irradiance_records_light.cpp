@@ -15,6 +15,7 @@ using wfpg::irradiance_record;
 using wfpg::irradiance_records_options;
 using wfpg::node_id;
 using wfpg::voxel_tag;
+using voxel_cones = wfpg::detail::voxel_cones<wfpg::detail::lit_nodes>;
 
 template <class Radiance>
 struct glow {
@@ -56,7 +57,7 @@ struct glowing_voxels {
     wfpg::detail::for_each_bottom_up(exec, tree, 0,
                                      wfpg::detail::gather_children{tree, swapped.data(), nodes.data()});
   }
-  wfpg::detail::voxel_cones cones() const { return {octree.view(), nodes.data(), normals.data()}; }
+  voxel_cones cones() const { return {octree.view(), {nodes.data(), normals.data()}}; }
 };
 
 /// Different in each voxel.
@@ -72,7 +73,7 @@ struct slopes {
 
 /// A thin cone, and the voxel that a ray meets.
 struct thin_cone {
-  wfpg::detail::voxel_cones cones;
+  voxel_cones cones;
   WFPG_HD float operator()(std::size_t i) const {
     const hashed_numbers random{3};
     const auto ray_number = static_cast<std::uint32_t>(i);
@@ -80,11 +81,11 @@ struct thin_cone {
     wfpg::ray r;
     r.origin = vec3(0.2f + 0.6f * place.x, 0.2f + 0.6f * place.y, 0.5f);
     r.direction = wfpg::square_to_sphere(random(ray_number, 1));
-    const wfpg::detail::gathered_light found = cones.gather(r.origin, r.direction, 1.0e-9f);
+    const wfpg::detail::gathered_light found = cones.gather(r, 1.0e-9f);
     const float distance = wfpg::svo_ray_caster(cones.tree, 0.0f, 0.0f)(r).distance;
     const node_id leaf = cones.tree.leaf_at(r.origin + distance * r.direction);
     if (leaf == wfpg::invalid_node) return 1.0f;
-    const float known = cones.nodes[leaf].radiance[cones.side_facing(leaf, -r.direction)];
+    const float known = cones.nodes.radiance(leaf, -r.direction);
     return std::fabs(found.radiance - known) + found.clear;
   }
 };
@@ -100,7 +101,7 @@ WFPG_TEST_CASE("irradiance records: thin cones see the voxel that a ray meets", 
 
 /// A cone as wide as a record's cell, and the mean of rays in the cell.
 struct wide_cone {
-  wfpg::detail::voxel_cones cones;
+  voxel_cones cones;
   WFPG_HD vec2 operator()(std::size_t i) const {
     const auto cell = static_cast<std::uint32_t>(i % irradiance_record::cells);
     const hashed_numbers random{5};
@@ -111,10 +112,11 @@ struct wide_cone {
     float sum = 0.0f;
     for (int k = 0; k < n * n; ++k) {
       const vec2 inside(float(k % n) + 0.5f, float(k / n) + 0.5f);
-      sum += cones.gather(from, irradiance_record::direction(cell, inside / float(n)), 1.0e-9f).radiance;
+      sum +=
+          cones.gather({from, 0.0f, irradiance_record::direction(cell, inside / float(n))}, 1.0e-9f).radiance;
     }
     const vec3 middle = irradiance_record::direction(cell, vec2(0.5f));
-    return {cones.gather(from, middle, cell_angle).radiance, sum / float(n * n)};
+    return {cones.gather({from, 0.0f, middle}, cell_angle).radiance, sum / float(n * n)};
   }
 };
 

@@ -159,7 +159,8 @@ WFPG_HD vec3 off_surface(const surface<Bsdf>& s, const sparse_voxel_octree_view&
 
 /// The fields of a wave's bins: a functor of blocks that fills each bin's field and hands it to `sink`.
 ///   Surfaces  (std::uint32_t ray) -> surface<Bsdf>
-///   Hits      (std::size_t bin, std::uint32_t i, const ray&) -> ray_hit, of the i-th cone in their order
+///   Hits      (std::size_t bin, std::uint32_t i, const ray&, float solid_angle) -> ray_hit, of the i-th
+///             cone in their order
 ///   Sink      words(block&, bin) -> std::uint32_t*, room for F²;
 ///             finish(block&, bin, directional_field), by the whole block;
 ///             scratch_bytes(): what that takes
@@ -192,12 +193,13 @@ struct bin_fields {
     const auto size = static_cast<int>(resolution);
     const field_cells cells(origin(bin), resolution);
     const cell_words words{sink.words(block, bin)};
+    const float solid_angle = cells.domain.cell_solid_angle();
     block.for_each(size * size, [&](int k) {
       const auto i = static_cast<std::uint32_t>(k);
       const field_cell cell = cell_in_order(i, resolution);
       const ray cone = cells.cone(cell);
-      words.set(static_cast<int>(cell.index(resolution)),
-                cells.weigh(cells.find(cache, cone, hits(bin, i, cone)).radiance(cache), cone.direction));
+      const cone_hit found = cells.find(cache, cone, hits(bin, i, cone, solid_angle));
+      words.set(static_cast<int>(cell.index(resolution)), cells.weigh(found.radiance(cache), cone.direction));
     });
     block.sync();
     const bool hemisphere = cells.origin.hemisphere;
@@ -211,7 +213,13 @@ struct bin_fields {
 template <class Caster>
 struct inline_hits {
   Caster caster;
-  WFPG_HD ray_hit operator()(std::size_t, std::uint32_t, const ray& cone) const { return caster(cone); }
+  WFPG_HD ray_hit operator()(std::size_t, std::uint32_t, const ray& cone,
+                             [[maybe_unused]] float solid_angle) const {
+    if constexpr (is_cone_caster_v<Caster>)
+      return caster(cone, solid_angle);
+    else
+      return caster(cone);
+  }
 };
 
 /// Hits that a batch caster wrote for bins from `first_bin`.
@@ -219,7 +227,7 @@ struct stored_hits {
   array_view<const ray_hit> hits;
   std::size_t first_bin;
   std::uint32_t cells;
-  WFPG_HD ray_hit operator()(std::size_t bin, std::uint32_t i, const ray&) const {
+  WFPG_HD ray_hit operator()(std::size_t bin, std::uint32_t i, const ray&, float) const {
     return hits[(bin - first_bin) * cells + i];
   }
 };

@@ -4,6 +4,10 @@
 //   batch    void cast(const Exec&, array_view<const ray>, array_view<ray_hit>) const;
 //                                                                   launched by the host over a span
 //
+// An inline caster may take cones too, and is then told how wide those of fields are, in steradians:
+//
+//   cone     ray_hit operator()(const ray&, float solid_angle) const;
+//
 // A hit carries the distance or, on a miss, the environment's radiance; where next-event estimation samples
 // the environment, a caster answers 0 for it so that guiding looks for what that does not find. Hits may be
 // ignored outside (t_min, t_max).
@@ -26,6 +30,13 @@ struct is_inline_caster<C,
                         std::void_t<decltype(ray_hit(std::declval<const C&>()(std::declval<const ray&>())))>>
     : std::true_type {};
 
+template <class C, class = void>
+struct is_cone_caster : std::false_type {};
+template <class C>
+struct is_cone_caster<
+    C, std::void_t<decltype(ray_hit(std::declval<const C&>()(std::declval<const ray&>(), 0.0f)))>>
+    : is_inline_caster<C> {};
+
 template <class C, class Exec, class = void>
 struct is_batch_caster : std::false_type {};
 template <class C, class Exec>
@@ -40,6 +51,10 @@ struct is_batch_caster<C, Exec,
 template <class C>
 inline constexpr bool is_inline_caster_v = detail::is_inline_caster<C>::value;
 
+/// True where C is such a caster that is told how wide cones are.
+template <class C>
+inline constexpr bool is_cone_caster_v = detail::is_cone_caster<C>::value;
+
 /// True where C casts a span of rays when the host asks.
 template <class C, class Exec>
 inline constexpr bool is_batch_caster_v = detail::is_batch_caster<C, Exec>::value;
@@ -49,7 +64,7 @@ template <class C, class Exec>
 inline constexpr bool is_ray_caster_v = is_inline_caster_v<C> || is_batch_caster_v<C, Exec>;
 
 /// An inline caster that needs no host: marches through the octree, over empty nodes in one step, to the
-/// first leaf (the paper's alternative in section 3.3, after Laine & Karras 2010). Leaves nearer than
+/// first leaf (one of the paper's alternatives in section 3.3, after Laine & Karras 2010). Leaves nearer than
 /// `clearance` voxels are passed, since a ray starts in a voxel of its own surface. Cost: O(nodes passed ·
 /// depth).
 class svo_ray_caster {

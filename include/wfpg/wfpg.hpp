@@ -4,6 +4,7 @@
 
 #include <wfpg/bsdf.hpp>
 #include <wfpg/buffer.hpp>
+#include <wfpg/cone_caster.hpp>
 #include <wfpg/error.hpp>
 #include <wfpg/exec/policy.hpp>
 #include <wfpg/exec/seq.hpp>

@@ -79,6 +79,10 @@ __global__ void use_caster(wfpg::svo_ray_caster caster, wfpg::ray r, wfpg::ray_h
   *out = caster(r);
 }
 
+__global__ void use_cones(wfpg::svo_cone_caster caster, wfpg::ray r, wfpg::ray_hit* out) {
+  *out = caster(r, 0.01f);
+}
+
 // What detail/ runs inside for_each.
 template <class Functor>
 __global__ void run(Functor f) {
@@ -103,6 +107,7 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   use_bins<<<1, 32>>>(wfpg::bins_view{}, out);
   use_guide<<<1, 32>>>(wfpg::guide_view{}, directions, out);
   use_caster<<<1, 1>>>(wfpg::svo_ray_caster(tree), wfpg::ray{}, nullptr);
+  use_cones<<<1, 1>>>(wfpg::svo_cone_caster(cache, wfpg::voxel_opacity_view()), wfpg::ray{}, nullptr);
 
   launch(d::count_items{});
   launch(d::mark_first_items{});
@@ -121,6 +126,7 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(d::add_queued_values{});
   launch(d::fold_deposits{});
   launch(d::average_children{});
+  launch(d::compose_opacity{});
   launch(wfpg::deposit_paths{recorder, cache, {}});
   launch(d::starts_key_group{});
   launch(d::write_group_offsets{});

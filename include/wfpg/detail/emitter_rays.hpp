@@ -176,7 +176,7 @@ struct land_rays {
     atomic_add(&light[leaf - tree.first_leaf()].arrived[side(leaf, -direction)], std::uint64_t(power));
   }
   WFPG_HD std::uint32_t side(node_id leaf, vec3 direction) const {
-    return voxel_cones{tree, nullptr, normals}.side_facing(leaf, direction);
+    return lit_nodes{nullptr, normals}.side_facing(leaf, direction);
   }
 };
 
@@ -194,7 +194,7 @@ struct emit_in_leaves {
     const emitting_triangle& e = from.emitters[i];
     const voxel_grid& grid = tree.grid();
     const grid_triangle t{grid.to_grid(e.a), grid.to_grid(e.b), grid.to_grid(e.c)};
-    const voxel_cones sides{tree, nullptr, normals};
+    const lit_nodes sides{nullptr, normals};
     const triangle_columns columns(t, grid.resolution);
     const vec3 normal = unit_normal(e.a, e.b, e.c);
     block.for_each(static_cast<int>(columns.count()), [&](int column) {

@@ -49,7 +49,7 @@ struct average_outside {
 /// Radiance that arrives at records from `first` on, along each direction: cones from some of its leaves, off
 /// the surface there on the side that they lead to.
 struct gather_records {
-  voxel_cones cones;
+  voxel_cones<lit_nodes> cones;
   std::uint32_t level;  // of records
   std::uint32_t cones_per_direction;
   std::size_t first;
@@ -70,7 +70,7 @@ struct gather_records {
       const vec2 u = unit_vec2(hash(bits, 1));
       const vec3 d = irradiance_record::direction(cell, {(static_cast<float>(k) + u.x) / n, u.y});
       const node_id leaf = begin + static_cast<node_id>((bits >> 32) * leaves >> 32);
-      const gathered_light found = cones.gather(start(leaf, d), d, solid_angle);
+      const gathered_light found = cones.gather({start(leaf, d), 0.0f, d}, solid_angle);
       sum += found.radiance + found.clear * environment[cell];
     }
     radiance[i] = min(sum / n, 1.0e30f);
@@ -85,7 +85,7 @@ struct gather_records {
   }
   WFPG_HD vec3 start(node_id leaf, vec3 direction) const {
     constexpr float voxels_off = 1.5f;  // a surface through a voxel's middle may touch the next one
-    const vec3 n = unpack_voxel_normal(cones.normals[leaf]);
+    const vec3 n = unpack_voxel_normal(cones.nodes.normals[leaf]);
     const float off = voxels_off * cones.tree.grid().voxel_size();
     return cones.tree.centre(leaf) + (glm::dot(n, direction) >= 0.0f ? n : -n) * off;
   }
@@ -287,7 +287,7 @@ void irradiance_records<Exec, Smooth>::fill_records(const Exec& exec,
                                                     const buffer<float, Exec>& environment) {
   const std::size_t most = detail::min<std::size_t>(records_.size(), 4096);
   const buffer<float, Exec> radiance(exec, most * irradiance_record::cells);
-  const detail::voxel_cones cones{octree_.view(), nodes.data(), normals_.data()};
+  const detail::voxel_cones<detail::lit_nodes> cones{octree_.view(), {nodes.data(), normals_.data()}};
   for (std::size_t first = 0; first < records_.size(); first += most) {
     const std::size_t n = detail::min(most, records_.size() - first);
     exec.for_each(

@@ -123,11 +123,12 @@ struct build_kept_fields {
     const field_cells cells = builder.cells(slot, whole);
     const std::uint32_t n = builder.kept.resolution * builder.kept.resolution;
     cone_hit* const kept = builder.kept.hits + std::size_t(slot) * n;
+    const float solid_angle = cells.domain.cell_solid_angle();
     block.for_each(static_cast<int>(builder.cone_count(whole)), [&](int c) {
       const auto cone = static_cast<std::uint32_t>(c);
       const field_cell cell = builder.cell(slot, whole, cone);
       const ray r = cells.cone(cell);
-      kept[cell.index(cells.resolution)] = cells.find(builder.wave.cache, r, hits(i, cone, r));
+      kept[cell.index(cells.resolution)] = cells.find(builder.wave.cache, r, hits(i, cone, r, solid_angle));
     });
     block.sync();
     builder.finish(block, slot, cells, whole);
