@@ -11,6 +11,22 @@
 #include <cstdint>
 #include <vector>
 
+namespace wfpg_test {
+
+/// Counts cones that are not as wide as they should be.
+struct width_caster {
+  float expected;
+  std::uint32_t* wrong;
+  WFPG_HD wfpg::ray_hit operator()(const wfpg::ray&) const { return (*this)(wfpg::ray(), -1.0f); }
+  WFPG_HD wfpg::ray_hit operator()(const wfpg::ray&, float solid_angle) const {
+    const bool right = std::fabs(solid_angle - expected) < 1.0e-4f * expected;
+    wfpg::detail::atomic_add(right ? wrong + 1 : wrong, 1u);
+    return {-1.0f, 1.0f};
+  }
+};
+
+}  // namespace wfpg_test
+
 namespace {
 
 using namespace wfpg_test;
@@ -22,18 +38,6 @@ using wfpg::svo_cone_caster;
 
 static_assert(!wfpg::is_cone_caster_v<box_caster>);
 static_assert(!wfpg::is_cone_caster_v<batch_box_caster>);
-
-/// Counts cones that are not as wide as they should be.
-struct width_caster {
-  float expected;
-  std::uint32_t* wrong;
-  WFPG_HD ray_hit operator()(const ray&) const { return (*this)(ray(), -1.0f); }
-  WFPG_HD ray_hit operator()(const ray&, float solid_angle) const {
-    const bool right = std::fabs(solid_angle - expected) < 1.0e-4f * expected;
-    wfpg::detail::atomic_add(right ? wrong + 1 : wrong, 1u);
-    return {-1.0f, 1.0f};
-  }
-};
 
 WFPG_TEST_CASE("cone caster: fields say how wide their cones are", "[cone_caster]") {
   for (const guiding_mode mode : {guiding_mode::plain, guiding_mode::oriented})
