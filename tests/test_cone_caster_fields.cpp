@@ -32,8 +32,6 @@ namespace {
 using namespace wfpg_test;
 using wfpg::field_lifetime;
 using wfpg::guiding_mode;
-using wfpg::ray;
-using wfpg::ray_hit;
 using wfpg::svo_cone_caster;
 
 static_assert(!wfpg::is_cone_caster_v<box_caster>);
