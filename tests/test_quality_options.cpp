@@ -90,6 +90,7 @@ TEST_CASE("options: what cannot be right is said", "[quality]") {
   CHECK(contains(refused({"--method", "a=--method best"}), "method a"));
   CHECK(contains(refused({"--method", "a=--spp 3"}), "--spp"));
   CHECK(contains(refused({"--method", "a=--product-resolution 8"}), "wfpg-product"));
+  CHECK(contains(refused({"--method", "a=--method pt --cones trace"}), "wfpg-product"));
   CHECK(contains(refused({"--methods", "pt", "pt"}), "two methods"));
   CHECK(contains(refused({"--scenes", "ajar --spp 3"}), "--spp"));
   CHECK(contains(refused({"--scenes", "ajar", "ajar"}), "two scenes"));

@@ -55,6 +55,19 @@ TEST_CASE("pictures guided by transient fields have the mean of unguided ones", 
   check_unbiased({"many-lamps", true, wfpg_method, fields::transient, guiding::oriented});
 }
 
+TEST_CASE("pictures guided by fields of the octree's cones have the mean of unguided ones",
+          "[renderer][unbiased]") {
+  for (const render::cones through : {render::cones::march, render::cones::trace})
+    for (const fields lifetime : {fields::kept, fields::transient}) {
+      rendering what{"thin-wall", true, wfpg_method, lifetime};
+      what.through = through;
+      check_unbiased(what);
+    }
+  rendering what{"cornell-enclosed", false, product_method};
+  what.through = render::cones::trace;
+  check_unbiased(what);
+}
+
 TEST_CASE("pictures guided by products have the mean of unguided ones", "[renderer][unbiased]") {
   for (const char* scene : {"cornell-box", "cornell-enclosed", "ajar", "thin-wall", "glossy-room"})
     for (const bool nee : {false, true}) check_unbiased({scene, nee, product_method});

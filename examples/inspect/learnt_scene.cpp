@@ -144,6 +144,9 @@ void require_fields(const render::render_options& options) {
           "wfpg or wfpg-product: others have no fields to look at");
   require(options.where == render::device::cpu, "device",
           render::name_of(render::device_names(), options.where), "cpu: fields are looked at in its memory");
+  require(options.through == render::cones::scene, "cones",
+          render::name_of(render::cones_names(), options.through),
+          "scene: by others fields are not looked at");
   require(options.max_depth >= 2, "max_depth", options.max_depth, "at least 2, for light to arrive from");
 }
 

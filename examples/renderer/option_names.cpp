@@ -33,6 +33,12 @@ const std::map<std::string, wfpg::sample_combination>& combination_names() {
   return names;
 }
 
+const std::map<std::string, cones>& cones_names() {
+  static const std::map<std::string, cones> names = {
+      {"scene", cones::scene}, {"march", cones::march}, {"trace", cones::trace}};
+  return names;
+}
+
 const std::map<std::string, wfpg::sarsa_update>& sarsa_update_names() {
   using update = wfpg::sarsa_update;
   static const std::map<std::string, update> names = {

@@ -23,6 +23,8 @@ namespace render {
 enum class sampling_method { pt, wfpg, wfpg_product, sarsa, records, openpgl_vmm, openpgl_dqt };
 enum class guiding { oriented, plain };
 enum class fields { kept, transient };
+/// How fields' cones find light: by the scene's ray caster, or through the octree alone, by rays or as cones.
+enum class cones { scene, march, trace };
 enum class checkpoint_times {
   none,
   powers_of_two,
@@ -34,6 +36,7 @@ struct render_options {
   sampling_method method = sampling_method::wfpg;
   guiding mode = guiding::oriented;
   fields lifetime = fields::kept;
+  cones through = cones::scene;
   device where = device::cpu;
   int spp = 64;          ///< samples a pixel, positive; not used where `seconds` is
   double seconds = 0.0;  ///< time for samples, building not counted; the last may use more; 0: spp decides

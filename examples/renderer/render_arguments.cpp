@@ -87,6 +87,9 @@ void add_method_options(CLI::App& app, render_options& options) {
   add_choice<fields>(app, "--fields", options.lifetime,
                      {{"kept", fields::kept}, {"transient", fields::transient}},
                      "kept across depths and samples (default), or made anew each time");
+  add_choice<cones>(app, "--cones", options.through, cones_names(),
+                    "cones of fields find light by rays through the scene (default), by rays through the "
+                    "octree, or as cones through it");
   add_choice<wfpg::sample_combination>(app, "--combine", options.combine, combination_names(),
                                        "how samples add up (default: pt-linear; constant for pt)");
 }
@@ -163,6 +166,8 @@ void check_render_options(const CLI::App& app, const render_options& options) {
     throw CLI::RequiresError("--samples-per-leaf", "--method openpgl-vmm or openpgl-dqt");
   if (app.count("--caster-buffer") > 0 && options.where != device::optix)
     throw CLI::RequiresError("--caster-buffer", "--device optix");
+  if (app.count("--cones") > 0 && !is_wfpg(options.method))
+    throw CLI::RequiresError("--cones", "--method wfpg or wfpg-product");
   for (const char* const name : sarsa_option_names)
     if (app.count(name) > 0 && options.method != sampling_method::sarsa)
       throw CLI::RequiresError(name, "--method sarsa");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "guider_report.hpp"
+#include "octree_cones.hpp"
 #include "records_scene.hpp"
 #include "render.hpp"
 #include "render_state.hpp"
@@ -236,7 +237,12 @@ render_result render_on(const Exec& exec, const scene& scene, const render_optio
               begin_guider(exec, mesh, guider_options_of(options, lights.shares()), options, result.guide);
           building.add("octree", build.seconds());
           result.report.octree.build_seconds = build.seconds();
-          take_samples(tracer, guider, camera, options, progress, result);
+          if (options.through == cones::scene) {
+            take_samples(tracer, guider, camera, options, progress, result);
+          } else {
+            octree_cone_guider<Exec> with_cones(exec, guider, geometry.environment, options.through);
+            take_samples(tracer, with_cones, camera, options, progress, result);
+          }
           report_guider(guider, tracer.segments(), result.report);
           result.guide = kept_guide(guider, options);
         }

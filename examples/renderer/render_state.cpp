@@ -34,6 +34,7 @@ void add_guider_values(const render_options& o, named_values& values) {
   std::snprintf(fraction, sizeof fraction, "%.9g", static_cast<double>(o.guide_fraction));
   values.insert(values.end(), {{"--guiding", o.mode == guiding::plain ? "plain" : "oriented"},
                                {"--fields", o.lifetime == fields::kept ? "kept" : "transient"},
+                               {"--cones", name_of(cones_names(), o.through)},
                                {"--octree-resolution", to_string(o.octree_resolution)},
                                {"--rays-per-bin", to_string(o.rays_per_bin)},
                                {"--min-bin-level", to_string(o.min_bin_level)},

@@ -9,13 +9,14 @@
 // A cone passes nodes as large as it is wide, from front to back, and gathers the radiance of each through
 // what those before it let pass: a blurred view of all that the cone covers, where a ray sees one voxel of
 // it. The price are leaks, which the paper names. Walls cover some nodes in part: along no axis they let
-// through up to 2% of the light behind them in tests, single cones that graze them a quarter; none do where
+// through about 2% of the light behind them in tests, single cones that graze them a quarter; none do where
 // nodes are leaves. And openings look smaller, by part of the nodes at their rim.
 //
 // Cones answer as misses do, with the radiance that they gathered, since it comes from no one distance.
 // Transient fields are made of that as of any caster's. Kept fields remember it as it is: they do not see the
-// cache change until the cell is cast again, after kept.recast refreshes, so 1 is a good kept.recast here;
-// and a host that calls path_guider::forget_light() calls invalidate_all() too.
+// cache change until the cell is cast again, once in kept.recast refreshes, and a host that calls
+// path_guider::forget_light() calls invalidate_all() too. What they gain beside the other ways is in
+// docs/algorithm.md.
 #pragma once
 
 #include <wfpg/buffer.hpp>

@@ -28,6 +28,7 @@ struct rendering {
   render::device where = render::device::cpu;
   wfpg::sarsa_update update = wfpg::sarsa_update::sarsa;
   wfpg::sarsa_sampler sampler = wfpg::sarsa_sampler::mixed_rejection;
+  render::cones through = render::cones::scene;
 
   render::render_options options() const {
     render::render_options options;
@@ -35,6 +36,7 @@ struct rendering {
     options.method = method;
     options.lifetime = lifetime;
     options.mode = mode;
+    options.through = through;
     options.where = where;
     options.width = options.height = tiles * tile_pixels;
     options.max_depth = 6;
@@ -68,6 +70,8 @@ struct rendering {
     if (method == render::sampling_method::records) return view + "irradiance records";
     return view + (mode == render::guiding::plain ? "plain" : "oriented") + ", " +
            (lifetime == render::fields::kept ? "kept" : "transient") + " fields" +
+           (through == render::cones::scene ? ""
+                                            : ", cones " + render::name_of(render::cones_names(), through)) +
            (method == render::sampling_method::wfpg_product ? ", products" : "") +
            (method == render::sampling_method::openpgl_vmm ? ", Open PGL's mixtures" : "") +
            (method == render::sampling_method::openpgl_dqt ? ", Open PGL's quadtrees" : "");
