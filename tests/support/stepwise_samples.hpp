@@ -112,8 +112,9 @@ class stepwise_samples {
   void follow(std::uint32_t depth) {
     for (const wfpg::sampled_direction& d : directions_.to_host(host_)) drawn_.push_back(d);
     host_.for_each(paths_,
-                   follow_path{paths_in_flight_.view(), const_view<wfpg::sampled_direction>(directions_),
-                               surfaces_.view(), guider_.recorder(), depth});
+                   follow_path<patch_box>{patch_box(), paths_in_flight_.view(),
+                                          const_view<wfpg::sampled_direction>(directions_), surfaces_.view(),
+                                          guider_.recorder(), depth, 100 * std::uint64_t(sample_) + depth});
   }
 
   wfpg::path_guider<Exec>& guider_;
