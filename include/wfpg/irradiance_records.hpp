@@ -14,7 +14,7 @@
 // is that which voxels are known to send, so what is lit indirectly is dark. Where light leaves the octree,
 // rays from beyond the scene ask the caster for the environment.
 //
-// Memory: 64 bytes a record, 75 KiB for cosines; of the octree and its tags 11 a leaf, 12 an inner node.
+// Memory: 64 bytes a record, 82 KiB for cosines; of the octree and its tags 11 a leaf, 12 an inner node.
 // While it builds 40 a leaf, 24 a node, 44 a ray in flight (2^16 of them), 512 a record (4096 of them). Time:
 // `emitter_rays` rays, with smooth surfaces one for each bounce more, 2048 for the environment, and 128
 // `cones_per_direction` cones a record. Directions: some 300 integer operations each; a density beside one, a

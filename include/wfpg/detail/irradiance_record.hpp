@@ -86,8 +86,9 @@ class record_cosines {
   int x_ = 0, y_ = 0, z_ = 0;
 };
 
-/// Cosines of a record's cells above a normal, where four cells' products with counters are summed in one
-/// multiplication: the topmost 16 of the product's 64 bits. Of columns alike modulo 4 the first is topmost.
+/// Cosines of a record's cells above a normal, where the products of four cells with their counters are
+/// summed in one multiplication: in the topmost 16 of its 64 bits. Of columns alike modulo 4 the first is
+/// topmost. No sum of a row, 16 · 15 · 192 at most, leaves its 16 bits.
 class cell_cosines {
  public:
   static constexpr std::uint32_t groups = 4;  ///< of a row: columns alike modulo 4
@@ -106,14 +107,18 @@ class cell_cosines {
   WFPG_HD std::uint32_t operator()(std::uint32_t cell) const {
     return static_cast<std::uint32_t>(lanes_[cell / columns][cell % groups] >> shift(cell)) & 0xffffu;
   }
-  WFPG_HD std::uint32_t sum() const { return sum_; }
+  WFPG_HD std::uint32_t sum(std::uint32_t row) const { return sums_[row]; }
   WFPG_HD std::uint32_t sum(std::uint32_t row, std::uint32_t group) const {
     return static_cast<std::uint32_t>(lanes_[row][group] * 0x0001000100010001u >> 48);
   }
   /// Times the counters of a record's row.
+  WFPG_HD std::uint32_t dot(std::uint64_t counters, std::uint32_t row) const {
+    std::uint64_t sums = 0;
+    for (std::uint32_t group = 0; group < groups; ++group) sums += products(counters, row, group);
+    return static_cast<std::uint32_t>(sums >> 48);
+  }
   WFPG_HD std::uint32_t dot(std::uint64_t counters, std::uint32_t row, std::uint32_t group) const {
-    const std::uint64_t four = counters >> 4 * group & 0x000f000f000f000fu;
-    return static_cast<std::uint32_t>(four * lanes_[row][group] >> 48);
+    return static_cast<std::uint32_t>(products(counters, row, group) >> 48);
   }
 
  private:
@@ -122,11 +127,14 @@ class cell_cosines {
   WFPG_HD static std::uint32_t shift(std::uint32_t cell) { return 48 - 16 * (cell % columns / groups); }
   WFPG_HD void set(std::uint32_t cell, std::uint32_t cosine) {
     lanes_[cell / columns][cell % groups] |= std::uint64_t(cosine) << shift(cell);
-    sum_ += cosine;
+    sums_[cell / columns] += cosine;
+  }
+  WFPG_HD std::uint64_t products(std::uint64_t counters, std::uint32_t row, std::uint32_t group) const {
+    return (counters >> 4 * group & 0x000f000f000f000fu) * lanes_[row][group];
   }
 
   std::uint64_t lanes_[irradiance_record::rows][groups] = {};
-  std::uint32_t sum_ = 0;
+  std::uint32_t sums_[irradiance_record::rows] = {};
 };
 
 /// Those above each normal of a lattice, and flat ones behind them.
@@ -148,11 +156,10 @@ class record_distribution {
   /// The record times cosines. `floor`: that each direction has at least, times the record's mean; at most 1.
   WFPG_HD record_distribution(const irradiance_record* record, float floor, const cell_cosines* cosines)
       : record_(record), cosines_(cosines), base_(base_of(*record, floor)) {
-    std::uint32_t products = 0;
-    for (std::uint32_t row = 0; row < irradiance_record::rows; ++row)
-      for (std::uint32_t group = 0; group < cell_cosines::groups; ++group)
-        products += cosines->dot(record->words[row], row, group);
-    total_ = products * counter_scale + base_ * cosines->sum();
+    for (std::uint32_t row = 0; row < irradiance_record::rows; ++row) {
+      rows_[row] = cosines->dot(record->words[row], row) * counter_scale + base_ * cosines->sum(row);
+      total_ += rows_[row];
+    }
   }
 
   WFPG_HD bool empty() const { return total_ == 0; }
@@ -163,12 +170,14 @@ class record_distribution {
   WFPG_HD vec3 sample(vec2 u, float& density) const {
     const auto scaled = static_cast<std::uint64_t>(u.x * 0x1p24f) * total_;
     auto target = static_cast<std::uint32_t>(scaled >> 24);
-    const std::uint32_t row = find(target, [&](std::uint32_t r) { return row_weight(r); });
-    const std::uint32_t group = find(target, [&](std::uint32_t g) { return group_weight(row, g); });
-    const std::uint32_t first = row * irradiance_record::columns + group;
-    const std::uint32_t cell = first + cell_cosines::groups * find(target, [&](std::uint32_t k) {
-                                         return weight(first + cell_cosines::groups * k);
-                                       });
+    const auto row = find<irradiance_record::rows>(target, [&](std::uint32_t r) { return rows_[r]; });
+    const auto group =
+        find<cell_cosines::groups>(target, [&](std::uint32_t g) { return group_weight(row, g); });
+    const auto cell_in_group = [&](std::uint32_t k) {
+      return row * irradiance_record::columns + group + cell_cosines::groups * k;
+    };
+    const std::uint32_t cell =
+        cell_in_group(find<cells_a_group>(target, [&](std::uint32_t k) { return weight(cell_in_group(k)); }));
     const std::uint32_t width = weight(cell);
     density = density_of(width);
     const float rest = static_cast<float>(scaled & 0xffffffu) * 0x1p-24f;
@@ -180,6 +189,7 @@ class record_distribution {
 
  private:
   static constexpr std::uint32_t counter_scale = 1024;
+  static constexpr std::uint32_t cells_a_group = irradiance_record::columns / cell_cosines::groups;
 
   WFPG_HD static std::uint32_t base_of(const irradiance_record& record, float floor) {
     std::uint32_t counters = 0;
@@ -197,17 +207,18 @@ class record_distribution {
   WFPG_HD std::uint32_t group_weight(std::uint32_t row, std::uint32_t group) const {
     return cosines_->dot(record_->words[row], row, group) * counter_scale + base_ * cosines_->sum(row, group);
   }
-  WFPG_HD std::uint32_t row_weight(std::uint32_t row) const {
-    std::uint32_t sum = 0;
-    for (std::uint32_t group = 0; group < cell_cosines::groups; ++group) sum += group_weight(row, group);
-    return sum;
-  }
-  /// Which of some weights a target lies in; what is before it is taken off. Precondition: it lies in one.
-  template <class Weight>
+  /// Which of n weights a target lies in; what is before it is taken off. Precondition: it lies in one.
+  template <std::uint32_t n, class Weight>
   WFPG_HD static std::uint32_t find(std::uint32_t& target, const Weight& weight_of) {
-    std::uint32_t i = 0;
-    for (std::uint32_t width = weight_of(0); width <= target; width = weight_of(++i)) target -= width;
-    return i;
+    std::uint32_t found = 0, before = 0, through = 0;
+    for (std::uint32_t i = 0; i < n; ++i) {
+      through += weight_of(i);
+      const bool passed = through <= target;
+      found += passed ? 1u : 0u;
+      before = passed ? through : before;
+    }
+    target -= before;
+    return found;
   }
   WFPG_HD float density_of(std::uint32_t weight) const {
     constexpr float cells_per_steradian = static_cast<float>(irradiance_record::cells) / (4.0f * pi);
@@ -216,6 +227,7 @@ class record_distribution {
 
   const irradiance_record* record_ = nullptr;
   const cell_cosines* cosines_ = nullptr;
+  std::uint32_t rows_[irradiance_record::rows] = {};  // weights
   std::uint32_t base_ = 0, total_ = 0;
 };
 
