@@ -91,6 +91,8 @@ TEST_CASE("options: what cannot be right is said", "[quality]") {
   CHECK(contains(refused({"--method", "a=--spp 3"}), "--spp"));
   CHECK(contains(refused({"--method", "a=--product-resolution 8"}), "wfpg-product"));
   CHECK(contains(refused({"--method", "a=--method pt --cones trace"}), "wfpg-product"));
+  CHECK(contains(refused({"--method", "a=--method wfpg --records-level 3"}), "--method records"));
+  CHECK(contains(refused({"--method", "a=--method records --sarsa-step 3"}), "--method sarsa"));
   CHECK(contains(refused({"--methods", "pt", "pt"}), "two methods"));
   CHECK(contains(refused({"--scenes", "ajar --spp 3"}), "--spp"));
   CHECK(contains(refused({"--scenes", "ajar", "ajar"}), "two scenes"));

@@ -182,6 +182,29 @@ TEST_CASE("a guided rendering is one picture on any device and number of threads
   }
 }
 
+TEST_CASE("a rendering reports its irradiance records, all samples of which are guided and count alike",
+          "[renderer][guided]") {
+  render_options options;
+  options.width = options.height = 16;
+  options.spp = 2;
+  options.method = sampling_method::records;
+  options.records.octree_resolution = 32;
+  options.records.emitter_rays = 1 << 12;
+  CHECK(combination_of(options) == wfpg::sample_combination::constant);
+  const scene enclosed = make_builtin_scene("cornell-enclosed");
+  const render_report report = render::render(enclosed, options, {}).report;
+  CHECK(report.records.builds == 1);
+  CHECK(report.records.records > 100);
+  CHECK(report.records.lights > 0);
+  CHECK(report.records.directly_lit > 100);  // through glass
+  CHECK(report.records.rays > 2 * options.records.emitter_rays);
+  CHECK(report.records.cones == std::uint64_t(report.records.records) * 128 * 4);
+  CHECK(report.persistent_bytes > 64 * std::size_t(report.records.records));
+  CHECK(report.used_bytes == report.persistent_bytes);
+  options.method = sampling_method::pt;
+  CHECK(render::render(enclosed, options, {}).report.records.builds == 0);
+}
+
 TEST_CASE("the first sample of a guided rendering is path tracing's, later ones are not",
           "[renderer][guided]") {
   const scene scene = make_builtin_scene("thin-wall");
