@@ -159,7 +159,9 @@ WFPG_TEST_CASE("cone caster: behind a wall it is dark, however wide a cone is", 
       CHECK(mean_of(cast(scene.exec, caster, between, solid_angle)) > 0.95);
       // A wall along no axis covers nodes in part, some a corner of which the next one does not make up for.
       CHECK(hidden < (along_axis ? 0.001 : 0.03));
-      if (solid_angle < 0.004f) CHECK(hidden < 1.0e-4);  // hardly a node is larger than a voxel
+      // Thin cones read leaves alone, the next ones a few larger nodes, where they are 25 voxels away.
+      if (solid_angle < 0.001f) CHECK(hidden == 0.0);
+      if (solid_angle < 0.004f) CHECK(hidden < 1.0e-4);
     }
   }
 }

@@ -177,9 +177,7 @@ constexpr bool require_guide() {
 ///   sampled_direction sample(std::uint32_t ray, const surface<Bsdf>& s, float u_technique, vec2 u) const;
 ///   float pdf(std::uint32_t ray, const surface<Bsdf>& s, vec3 direction) const;
 /// `pdf` is the density of `sample`, per steradian, all that it mixes included: basic_guide_mixture
-/// (mis.hpp) mixes a distribution of directions and the surface's BSDF so. Where there is
-///   auto mixture(std::uint32_t ray, const surface<Bsdf>& s) const;
-/// with the mixture's `sample` and `pdf`, it is made once for a ray of which both are wanted.
+/// (mis.hpp) mixes a distribution of directions and the surface's BSDF so, and mixture_view asks for that alone.
 template <class View>
 inline constexpr bool is_guide_view_v = detail::is_guide_view<View>::value;
 // clang-format on

@@ -61,7 +61,7 @@ struct irradiance_records_statistics {
 };
 
 /// What a wave's rays draw from. Trivially copyable; holds until the guider's next call.
-class irradiance_records_view {
+class irradiance_records_view : public mixture_view<irradiance_records_view> {
  public:
   irradiance_records_view() = default;
 
@@ -70,18 +70,6 @@ class irradiance_records_view {
   WFPG_HD bool guides(const surface<Bsdf>& s) const {
     return fraction_ > 0.0f && !s.bsdf.is_delta() && detail::is_finite(s.position) &&
            detail::is_normal(s.normal) && record(s.position) != nullptr;
-  }
-
-  /// A direction of the mixture with the surface's BSDF, and the mixture's density.
-  template <class Bsdf>
-  WFPG_HD sampled_direction sample(std::uint32_t ray, const surface<Bsdf>& s, float u_technique,
-                                   vec2 u) const {
-    return mixture(ray, s).sample(s, u_technique, u);
-  }
-  /// The mixture's density of a unit direction, per steradian.
-  template <class Bsdf>
-  WFPG_HD float pdf(std::uint32_t ray, const surface<Bsdf>& s, vec3 direction) const {
-    return mixture(ray, s).pdf(s, direction);
   }
 
   /// The mixture at a surface, whatever the ray; of one that is not guided, the BSDF alone.

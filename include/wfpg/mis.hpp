@@ -158,4 +158,27 @@ using guide_mixture = basic_guide_mixture<directional_field>;
 /// A product and a BSDF. `fraction` below 1: where a product is 0 and the BSDF is not, the BSDF has to draw.
 using product_mixture = basic_guide_mixture<product_field>;
 
+/// What a guide's view (guide.hpp) derives from that says what each ray draws from at a surface:
+///   auto mixture(std::uint32_t ray, const surface<Bsdf>& s) const;
+/// with `sample` and `pdf` as basic_guide_mixture has them. It is made once for a ray of which both a
+/// direction and a density are wanted.
+template <class View>
+class mixture_view {
+ public:
+  /// A direction of the mixture with the surface's BSDF, and the mixture's density.
+  template <class Bsdf>
+  WFPG_HD sampled_direction sample(std::uint32_t ray, const surface<Bsdf>& s, float u_technique,
+                                   vec2 u) const {
+    return view().mixture(ray, s).sample(s, u_technique, u);
+  }
+  /// The mixture's density of a unit direction, per steradian.
+  template <class Bsdf>
+  WFPG_HD float pdf(std::uint32_t ray, const surface<Bsdf>& s, vec3 direction) const {
+    return view().mixture(ray, s).pdf(s, direction);
+  }
+
+ private:
+  WFPG_HD const View& view() const { return static_cast<const View&>(*this); }
+};
+
 }  // namespace wfpg

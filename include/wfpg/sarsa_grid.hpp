@@ -29,7 +29,7 @@
 namespace wfpg {
 
 /// What a sarsa_grid's rays draw from. Trivially copyable; holds until the guider's next call.
-class sarsa_grid_view {
+class sarsa_grid_view : public mixture_view<sarsa_grid_view> {
  public:
   sarsa_grid_view() = default;
 
@@ -38,18 +38,6 @@ class sarsa_grid_view {
   WFPG_HD bool guides(const surface<Bsdf>& s) const {
     return fraction_ > 0.0f && !s.bsdf.is_delta() && detail::is_finite(s.position) &&
            detail::is_normal(s.normal);
-  }
-
-  /// A direction of the mixture with the surface's BSDF, and the mixture's density.
-  template <class Bsdf>
-  WFPG_HD sampled_direction sample(std::uint32_t ray, const surface<Bsdf>& s, float u_technique,
-                                   vec2 u) const {
-    return mixture(ray, s).sample(s, u_technique, u);
-  }
-  /// The mixture's density of a unit direction, per steradian.
-  template <class Bsdf>
-  WFPG_HD float pdf(std::uint32_t ray, const surface<Bsdf>& s, vec3 direction) const {
-    return mixture(ray, s).pdf(s, direction);
   }
 
   /// The mixture at a surface; of one that is not guided, the BSDF alone.

@@ -8,7 +8,6 @@
 #include <wfpg/wave.hpp>
 
 #include <type_traits>
-#include <utility>
 
 namespace wfpg::detail {
 
@@ -91,18 +90,10 @@ struct view_of_ray {
   }
 };
 
-template <class View, class Surface, class = void>
-struct has_mixture : std::false_type {};
-template <class View, class Surface>
-struct has_mixture<
-    View, Surface,
-    std::void_t<decltype(std::declval<const View&>().mixture(0u, std::declval<const Surface&>()))>>
-    : std::true_type {};
-
 /// What a ray draws from at a surface.
 template <class View, class Surface>
 WFPG_HD auto mixture_at(const View& view, std::uint32_t ray, const Surface& s) {
-  if constexpr (has_mixture<View, Surface>::value)
+  if constexpr (std::is_base_of_v<mixture_view<View>, View>)
     return view.mixture(ray, s);
   else
     return view_of_ray<View>{view, ray};
