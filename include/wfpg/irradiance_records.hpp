@@ -14,7 +14,7 @@
 // is that which voxels are known to send, so what is lit indirectly is dark. Where light leaves the octree,
 // rays from beyond the scene ask the caster for the environment.
 //
-// Memory: 64 bytes a record, 82 KiB for cosines; of the octree and its tags 11 a leaf, 12 an inner node.
+// Memory: 64 bytes a record and 48 for its sums, 82 KiB for cosines; of the octree and its tags 11 a leaf, 12 an inner node.
 // While it builds 40 a leaf, 24 a node, 44 a ray in flight (2^16 of them), 512 a record (4096 of them). Time:
 // `emitter_rays` rays, with smooth surfaces one for each bounce more, 2048 for the environment, and 128
 // `cones_per_direction` cones a record. Directions: some 300 integer operations each; a density beside one, a
@@ -68,31 +68,32 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
   /// Whether a surface is guided: it lies in a voxel. Without it is its BSDF's.
   template <class Bsdf>
   WFPG_HD bool guides(const surface<Bsdf>& s) const {
-    return fraction_ > 0.0f && !s.bsdf.is_delta() && detail::is_finite(s.position) &&
-           detail::is_normal(s.normal) && record(s.position) != nullptr;
+    return can_guide(s) && record(s.position) != nullptr;
   }
 
   /// The mixture at a surface, whatever the ray; of one that is not guided, the BSDF alone.
   template <class Bsdf>
   WFPG_HD basic_guide_mixture<detail::record_distribution> mixture(std::uint32_t,
                                                                    const surface<Bsdf>& s) const {
-    if (!guides(s)) return {};
+    if (!can_guide(s)) return {};
     return {distribution(s.position, detail::facing_normal(s), s.bsdf.transmits()), fraction_, no_field};
   }
 
   /// What is drawn at a place with a normal on the side of the light: the record times the cosine; where
   /// light comes from both sides, the record alone. Empty where there is none, or no light.
   WFPG_HD detail::record_distribution distribution(vec3 position, vec3 normal, bool transmits) const {
-    const irradiance_record* const at = record(position);
-    if (at == nullptr) return {};
-    return {at, floor_, cosines_ + (transmits ? normals_.size() : normals_.index(glm::normalize(normal)))};
+    const std::uint32_t at = index(position);
+    if (at == none) return {};
+    const std::uint32_t above = transmits ? normals_.size() : normals_.index(glm::normalize(normal));
+    const detail::record_rows& known = rows_[at];
+    return {records_ + at, cosines_ + above,
+            known.normal == above ? known : detail::record_rows(records_[at], floor_, cosines_, above)};
   }
 
   /// The record of a place, in the policy's memory; null where there is no surface.
   WFPG_HD const irradiance_record* record(vec3 position) const {
-    const node_id leaf = tree_.nearest_leaf(position);
-    if (leaf == invalid_node) return nullptr;
-    return records_ + (tree_.ancestor(leaf, level_) - tree_.level_begin(level_));
+    const std::uint32_t at = index(position);
+    return at == none ? nullptr : records_ + at;
   }
   /// What the voxel is that a point lies in. As of the last build; before it no voxel is known to be lit.
   WFPG_HD voxel_tag tag(vec3 position) const {
@@ -104,11 +105,25 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
   template <class Exec, class Smooth>
   friend class irradiance_records;
 
+  static constexpr std::uint32_t none = 0xffffffffu;
+
+  template <class Bsdf>
+  WFPG_HD bool can_guide(const surface<Bsdf>& s) const {
+    return fraction_ > 0.0f && !s.bsdf.is_delta() && detail::is_finite(s.position) &&
+           detail::is_normal(s.normal);
+  }
+  /// Of the record of a place.
+  WFPG_HD std::uint32_t index(vec3 position) const {
+    const node_id leaf = tree_.nearest_leaf(position);
+    return leaf == invalid_node ? none : tree_.ancestor(leaf, level_) - tree_.level_begin(level_);
+  }
+
   sparse_voxel_octree_view tree_;
   std::uint32_t level_ = 0;             // of records
   detail::normal_lattice normals_{16};  // of cosines
   const detail::cell_cosines* cosines_ = nullptr;
   const irradiance_record* records_ = nullptr;
+  const detail::record_rows* rows_ = nullptr;  // a record: above its voxels' normal
   const voxel_tag* tags_ = nullptr;
   float floor_ = 0.0f;
   float fraction_ = 0.0f;
@@ -155,7 +170,7 @@ class irradiance_records : public guide_base {
   const irradiance_records_statistics& statistics() const { return statistics_; }
   /// Adds what of the geometry was left out.
   void report(const Exec&, guider_statistics& statistics) const { statistics.build = build_; }
-  /// Records; cosines that they are multiplied by; the octree with its tags.
+  /// Records; sums that rays need of them; cosines that they are multiplied by; the octree with its tags.
   std::vector<memory_part> memory() const;
 
  private:
@@ -193,6 +208,7 @@ class irradiance_records : public guide_base {
   buffer<float, Exec> areas_;            // a leaf: in faces
   buffer<voxel_tag, Exec> tags_;         // a leaf
   buffer<irradiance_record, Exec> records_;
+  buffer<detail::record_rows, Exec> rows_;  // a record
   buffer<detail::cell_cosines, Exec> cosines_;
   irradiance_records_view view_;
   irradiance_records_statistics statistics_;

@@ -148,19 +148,51 @@ struct tabulate_cell_cosines {
   }
 };
 
+/// Weights of a record's rows above one normal.
+struct alignas(16) record_rows {
+  std::uint32_t weights[irradiance_record::rows] = {};
+  std::uint32_t base = 0;      ///< of each direction, before its cosine
+  std::uint32_t normal = ~0u;  ///< whose cosines these are, by its number in a table; of none
+
+  static constexpr std::uint32_t counter_scale = 1024;
+
+  record_rows() = default;
+  /// `floor`: what each direction has at least, times the record's mean; at most 1.
+  WFPG_HD record_rows(const irradiance_record& record, float floor, const cell_cosines* table,
+                      std::uint32_t normal)
+      : base(base_of(record, floor)), normal(normal) {
+    const cell_cosines& cosines = table[normal];
+    for (std::uint32_t row = 0; row < irradiance_record::rows; ++row)
+      weights[row] = cosines.dot(record.words[row], row) * counter_scale + base * cosines.sum(row);
+  }
+  WFPG_HD std::uint32_t total() const {
+    std::uint32_t result = 0;
+    for (const std::uint32_t weight : weights) result += weight;
+    return result;
+  }
+
+ private:
+  WFPG_HD static std::uint32_t base_of(const irradiance_record& record, float floor) {
+    std::uint32_t counters = 0;
+    for (const std::uint64_t word : record.words) {
+      constexpr std::uint64_t every_other = 0x0f0f0f0f0f0f0f0fu;
+      const std::uint64_t pairs = (word & every_other) + (word >> 4 & every_other);
+      counters += static_cast<std::uint32_t>(pairs * 0x0101010101010101u >> 56);
+    }
+    constexpr float share = static_cast<float>(counter_scale) / static_cast<float>(irradiance_record::cells);
+    return static_cast<std::uint32_t>(ceilf(floor * share * static_cast<float>(counters)));
+  }
+};
+
 /// What a mixture (mis.hpp) draws from. A record without light is empty, and so is one that has none above
 /// the surface where there is no floor.
 class record_distribution {
  public:
   record_distribution() = default;
-  /// The record times cosines. `floor`: that each direction has at least, times the record's mean; at most 1.
-  WFPG_HD record_distribution(const irradiance_record* record, float floor, const cell_cosines* cosines)
-      : record_(record), cosines_(cosines), base_(base_of(*record, floor)) {
-    for (std::uint32_t row = 0; row < irradiance_record::rows; ++row) {
-      rows_[row] = cosines->dot(record->words[row], row) * counter_scale + base_ * cosines->sum(row);
-      total_ += rows_[row];
-    }
-  }
+  /// The record times cosines, those that the rows' weights are made with.
+  WFPG_HD record_distribution(const irradiance_record* record, const cell_cosines* cosines,
+                              const record_rows& rows)
+      : record_(record), cosines_(cosines), rows_(rows), total_(rows.total()) {}
 
   WFPG_HD bool empty() const { return total_ == 0; }
   /// It knows of no lobe but the diffuse one.
@@ -170,7 +202,7 @@ class record_distribution {
   WFPG_HD vec3 sample(vec2 u, float& density) const {
     const auto scaled = static_cast<std::uint64_t>(u.x * 0x1p24f) * total_;
     auto target = static_cast<std::uint32_t>(scaled >> 24);
-    const auto row = find<irradiance_record::rows>(target, [&](std::uint32_t r) { return rows_[r]; });
+    const auto row = find<irradiance_record::rows>(target, [&](std::uint32_t r) { return rows_.weights[r]; });
     const auto group =
         find<cell_cosines::groups>(target, [&](std::uint32_t g) { return group_weight(row, g); });
     const auto cell_in_group = [&](std::uint32_t k) {
@@ -188,24 +220,15 @@ class record_distribution {
   WFPG_HD float pdf(vec3 d) const { return density_of(weight(irradiance_record::cell_of(d))); }
 
  private:
-  static constexpr std::uint32_t counter_scale = 1024;
+  static constexpr std::uint32_t counter_scale = record_rows::counter_scale;
   static constexpr std::uint32_t cells_a_group = irradiance_record::columns / cell_cosines::groups;
 
-  WFPG_HD static std::uint32_t base_of(const irradiance_record& record, float floor) {
-    std::uint32_t counters = 0;
-    for (const std::uint64_t word : record.words) {
-      constexpr std::uint64_t every_other = 0x0f0f0f0f0f0f0f0fu;
-      const std::uint64_t pairs = (word & every_other) + (word >> 4 & every_other);
-      counters += static_cast<std::uint32_t>(pairs * 0x0101010101010101u >> 56);
-    }
-    constexpr float share = static_cast<float>(counter_scale) / static_cast<float>(irradiance_record::cells);
-    return static_cast<std::uint32_t>(ceilf(floor * share * static_cast<float>(counters)));
-  }
   WFPG_HD std::uint32_t weight(std::uint32_t cell) const {
-    return (record_->counter(cell) * counter_scale + base_) * (*cosines_)(cell);
+    return (record_->counter(cell) * counter_scale + rows_.base) * (*cosines_)(cell);
   }
   WFPG_HD std::uint32_t group_weight(std::uint32_t row, std::uint32_t group) const {
-    return cosines_->dot(record_->words[row], row, group) * counter_scale + base_ * cosines_->sum(row, group);
+    return cosines_->dot(record_->words[row], row, group) * counter_scale +
+           rows_.base * cosines_->sum(row, group);
   }
   /// Which of n weights a target lies in; what is before it is taken off. Precondition: it lies in one.
   template <std::uint32_t n, class Weight>
@@ -227,8 +250,8 @@ class record_distribution {
 
   const irradiance_record* record_ = nullptr;
   const cell_cosines* cosines_ = nullptr;
-  std::uint32_t rows_[irradiance_record::rows] = {};  // weights
-  std::uint32_t base_ = 0, total_ = 0;
+  record_rows rows_;
+  std::uint32_t total_ = 0;
 };
 
 /// Radiances of a record's cells to its counters.

@@ -91,6 +91,23 @@ struct gather_records {
   }
 };
 
+/// Above a record's normal, on the side that more light comes to: most rays that are there leave that side.
+struct sum_rows {
+  const irradiance_record* records;
+  const std::uint16_t* normals;  // a record
+  normal_lattice lattice;
+  const cell_cosines* cosines;
+  float floor;
+  record_rows* rows;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const vec3 normal = unpack_voxel_normal(normals[i]);
+    const record_rows ahead(records[i], floor, cosines, lattice.index(normal));
+    const record_rows behind(records[i], floor, cosines, lattice.index(-normal));
+    rows[i] = ahead.total() < behind.total() ? behind : ahead;
+  }
+};
+
 }  // namespace detail
 
 template <class Exec, class Smooth>
@@ -133,6 +150,7 @@ irradiance_records<Exec, Smooth>::irradiance_records(const Exec& exec, const Exe
   view_.level_ = detail::min(options_.record_level, tree.depth());
   records_ = buffer<irradiance_record, Exec>(
       exec, tree.level_begin(view_.level_ + 1) - tree.level_begin(view_.level_));
+  rows_ = buffer<detail::record_rows, Exec>(exec, records_.size());
   detail::build_voxel_normals(working, octree_, fragments, normals_.view(), swapped_.view());
   const float voxel = tree.grid().voxel_size();
   working.for_each(tree.leaf_count(),
@@ -142,9 +160,11 @@ irradiance_records<Exec, Smooth>::irradiance_records(const Exec& exec, const Exe
   ::thrust::fill_n(working.thrust(), tags_.data(), tags_.size(), voxel_tag::object);
   exec.fill_bytes(records_.data(), 0, records_.bytes());
   cosines_ = buffer<detail::cell_cosines, Exec>(exec, view_.normals_.size() + 1);
+  ::thrust::fill_n(working.thrust(), rows_.data(), rows_.size(), detail::record_rows{});
   exec.for_each(cosines_.size(), detail::tabulate_cell_cosines{view_.normals_, cosines_.data()});
   view_.cosines_ = cosines_.data();
   view_.records_ = records_.data();
+  view_.rows_ = rows_.data();
   view_.tags_ = tags_.data();
   view_.floor_ = options_.floor;
   statistics_.records = static_cast<std::uint32_t>(records_.size());
@@ -280,7 +300,7 @@ void irradiance_records<Exec, Smooth>::see_environment(const Exec& exec, const C
   exec.for_each(environment.size(), detail::average_outside{hits.data(), environment.data()});
 }
 
-/// Cones from all records, some at once.
+/// Cones from all records, some at once, and what rays need of what they found.
 template <class Exec, class Smooth>
 void irradiance_records<Exec, Smooth>::fill_records(const Exec& exec,
                                                     const buffer<detail::voxel_light, Exec>& nodes,
@@ -296,6 +316,9 @@ void irradiance_records<Exec, Smooth>::fill_records(const Exec& exec,
                                detail::hash(options_.seed, 3), environment.data(), radiance.data()});
     exec.for_each(n, detail::count_record{radiance.data(), records_.data() + first});
   }
+  exec.for_each(records_.size(),
+                detail::sum_rows{records_.data(), normals_.data() + octree_.view().level_begin(view_.level_),
+                                 view_.normals_, cosines_.data(), options_.floor, rows_.data()});
   statistics_.cones =
       std::uint64_t(records_.size()) * irradiance_record::cells * options_.cones_per_direction;
 }
@@ -314,6 +337,7 @@ void irradiance_records<Exec, Smooth>::count_tags(const Exec& exec) {
 template <class Exec, class Smooth>
 std::vector<memory_part> irradiance_records<Exec, Smooth>::memory() const {
   return {{"records", records_.bytes(), true},
+          {"sums of records", rows_.bytes(), true},
           {"cosines", cosines_.bytes(), true},
           {"octree", octree_.bytes() + normals_.bytes() + swapped_.bytes() + areas_.bytes() + tags_.bytes(),
            true}};
