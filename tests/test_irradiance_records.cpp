@@ -80,6 +80,23 @@ TEST_CASE("irradiance records: products of cosines and counters are summed four 
   }
 }
 
+TEST_CASE("lattice of normals: each direction is near one, and the axes are on it", "[records]") {
+  const wfpg::detail::normal_lattice lattice{16};
+  for (int axis = 0; axis < 3; ++axis)
+    for (const float sign : {-1.0f, 1.0f}) {
+      vec3 n(0.0f);
+      n[axis] = sign;
+      CHECK(lattice.normal(lattice.index(n)) == n);
+    }
+  random_numbers random(9);
+  for (int i = 0; i < 10000; ++i) {
+    const vec3 n = random.direction();
+    const std::uint32_t near = lattice.index(n);
+    REQUIRE(near < lattice.size());
+    REQUIRE(glm::dot(lattice.normal(near), n) > 0.96f);  // 16 degrees; 6 on average
+  }
+}
+
 struct draw_directions {
   wfpg::irradiance_records_view view;
   vec3 place, normal;
