@@ -1,4 +1,6 @@
 // Owning storage: moves, transfers, what happens when memory runs out, and the resource that keeps blocks.
+#define WFPG_TEST_EACH_POLICY
+
 #include "support/catch.hpp"
 #include "support/failing_resource.hpp"
 #include "support/policies.hpp"

@@ -1,4 +1,6 @@
 // The execution policies: loops, blocks, scratch memory and warps, against plain loops.
+#define WFPG_TEST_EACH_POLICY
+
 #include "support/catch.hpp"
 #include "support/policies.hpp"
 

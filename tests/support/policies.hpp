@@ -3,17 +3,23 @@
 // sources the CUDA policy's tests, "NAME - cuda" and tagged [cuda].
 //
 // A warp's text is the same on every policy: all widths run on seq, and 32, which users have, on the others.
-// WFPG_TEST_ONE_WIDTH compiles one width of each, another each, which is quick and runs nearly as many lines;
-// WFPG_TEST_SEVERAL_POLICIES says that seq, omp and tbb are there side by side.
+// Under sanitizers, where all is slow, WFPG_TEST_POLICY and WFPG_TEST_WIDTH choose one of them; tests of the
+// policies themselves define WFPG_TEST_EACH_POLICY first and keep all. WFPG_TEST_SEVERAL_POLICIES says that
+// seq, omp and tbb are tested side by side.
 #pragma once
 
 #include "support/catch.hpp"
 
+#if defined(WFPG_TEST_EACH_POLICY)
+#undef WFPG_TEST_POLICY
+#endif
 #if defined(__CUDACC__)
 #include <wfpg/exec/cuda.hpp>
 #include <wfpg/exec/seq.hpp>
 #else
+#if !defined(WFPG_TEST_POLICY)
 #define WFPG_TEST_SEVERAL_POLICIES
+#endif
 #include <wfpg/exec/omp.hpp>
 #include <wfpg/exec/seq.hpp>
 #include <wfpg/exec/tbb.hpp>
@@ -30,7 +36,8 @@
 #define WFPG_TEST_JOIN_(a, b) a##b
 #define WFPG_TEST_JOIN(a, b) WFPG_TEST_JOIN_(a, b)
 
-#define WFPG_TEST_ONE(function, name, tags, policy, width)                  \
+#define WFPG_TEST_ONE(function, name, tags, policy, width) WFPG_TEST_ONE_(function, name, tags, policy, width)
+#define WFPG_TEST_ONE_(function, name, tags, policy, width)                 \
   TEST_CASE(name " - " #policy #width, tags "[" #policy "][w" #width "]") { \
     function<wfpg::exec::basic_##policy<width>>();                          \
   }
@@ -39,11 +46,9 @@
   TEST_CASE(name " - cuda", tags "[cuda]") {     \
     function<wfpg::exec::cuda>();                \
   }
-#elif defined(WFPG_TEST_ONE_WIDTH)
+#elif defined(WFPG_TEST_POLICY)
 #define WFPG_TEST_POLICIES(function, name, tags) \
-  WFPG_TEST_ONE(function, name, tags, seq, 8)    \
-  WFPG_TEST_ONE(function, name, tags, omp, 16)   \
-  WFPG_TEST_ONE(function, name, tags, tbb, 32)
+  WFPG_TEST_ONE(function, name, tags, WFPG_TEST_POLICY, WFPG_TEST_WIDTH)
 #else
 #define WFPG_TEST_POLICIES(function, name, tags) \
   WFPG_TEST_ONE(function, name, tags, seq, 8)    \
@@ -74,8 +79,12 @@ using host_policy = wfpg::exec::seq;
 /// resource.
 constexpr bool loops_on_host = false;
 #else
+#if defined(WFPG_TEST_POLICY)
+using one_policy = wfpg::exec::WFPG_TEST_JOIN(basic_, WFPG_TEST_POLICY)<WFPG_TEST_WIDTH>;
+#else
 using one_policy = wfpg::exec::tbb;
-using host_policy = wfpg::exec::tbb;
+#endif
+using host_policy = one_policy;
 constexpr bool loops_on_host = true;
 #endif
 
