@@ -14,11 +14,11 @@
 // is that which voxels are known to send, so what is lit indirectly is dark. Where light leaves the octree,
 // rays from beyond the scene ask the caster for the environment.
 //
-// Memory: 64 bytes a record and 64 for sums of it, 82 KiB for cosines; of the octree and its tags 11 a leaf,
-// 12 an inner node. While it builds 40 a leaf, 24 a node, 44 a ray in flight (2^16 of them), 512 a record
-// (4096 of them). Time: `emitter_rays` rays, with smooth surfaces one for each bounce more, 2048 for the
-// environment, and 128 `cones_per_direction` cones a record. Directions: some 300 integer operations each; a
-// density beside one, a few.
+// Memory: 64 bytes a record and 48 for its sums, 82 KiB for cosines; of the octree and its tags 11 a leaf, 12 an inner node.
+// While it builds 40 a leaf, 24 a node, 44 a ray in flight (2^16 of them), 512 a record (4096 of them). Time:
+// `emitter_rays` rays, with smooth surfaces one for each bounce more, 2048 for the environment, and 128
+// `cones_per_direction` cones a record. Directions: some 300 integer operations each; a density beside one, a
+// few.
 #pragma once
 
 #include <wfpg/buffer.hpp>
@@ -84,11 +84,10 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
   WFPG_HD detail::record_distribution distribution(vec3 position, vec3 normal, bool transmits) const {
     const std::uint32_t at = index(position);
     if (at == none) return {};
-    const vec3 up = glm::normalize(normal);
-    const detail::known_rows& known = rows_[at];
-    if (!transmits && known.serve(up)) return {records_ + at, cosines_ + known.rows.table, known.rows};
-    const std::uint32_t table = transmits ? normals_.size() : normals_.index(up);
-    return {records_ + at, cosines_ + table, {records_[at], floor_, cosines_, table}};
+    const std::uint32_t above = transmits ? normals_.size() : normals_.index(glm::normalize(normal));
+    const detail::record_rows& known = rows_[at];
+    return {records_ + at, cosines_ + above,
+            known.normal == above ? known : detail::record_rows(records_[at], floor_, cosines_, above)};
   }
 
   /// The record of a place, in the policy's memory; null where there is no surface.
@@ -124,7 +123,7 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
   detail::normal_lattice normals_{16};  // of cosines
   const detail::cell_cosines* cosines_ = nullptr;
   const irradiance_record* records_ = nullptr;
-  const detail::known_rows* rows_ = nullptr;  // a record
+  const detail::record_rows* rows_ = nullptr;  // a record: above its voxels' normal
   const voxel_tag* tags_ = nullptr;
   float floor_ = 0.0f;
   float fraction_ = 0.0f;
@@ -209,7 +208,7 @@ class irradiance_records : public guide_base {
   buffer<float, Exec> areas_;            // a leaf: in faces
   buffer<voxel_tag, Exec> tags_;         // a leaf
   buffer<irradiance_record, Exec> records_;
-  buffer<detail::known_rows, Exec> rows_;  // a record
+  buffer<detail::record_rows, Exec> rows_;  // a record
   buffer<detail::cell_cosines, Exec> cosines_;
   irradiance_records_view view_;
   irradiance_records_statistics statistics_;

@@ -151,17 +151,17 @@ struct tabulate_cell_cosines {
 /// Weights of a record's rows above one normal.
 struct alignas(16) record_rows {
   std::uint32_t weights[irradiance_record::rows] = {};
-  std::uint32_t base = 0;   ///< of each direction, before its cosine
-  std::uint32_t table = 0;  ///< of the cosines
+  std::uint32_t base = 0;      ///< of each direction, before its cosine
+  std::uint32_t normal = ~0u;  ///< whose cosines these are, by its number in a table; of none
 
   static constexpr std::uint32_t counter_scale = 1024;
 
   record_rows() = default;
   /// `floor`: what each direction has at least, times the record's mean; at most 1.
-  WFPG_HD record_rows(const irradiance_record& record, float floor, const cell_cosines* tables,
-                      std::uint32_t table)
-      : base(base_of(record, floor)), table(table) {
-    const cell_cosines& cosines = tables[table];
+  WFPG_HD record_rows(const irradiance_record& record, float floor, const cell_cosines* table,
+                      std::uint32_t normal)
+      : base(base_of(record, floor)), normal(normal) {
+    const cell_cosines& cosines = table[normal];
     for (std::uint32_t row = 0; row < irradiance_record::rows; ++row)
       weights[row] = cosines.dot(record.words[row], row) * counter_scale + base * cosines.sum(row);
   }
@@ -182,15 +182,6 @@ struct alignas(16) record_rows {
     constexpr float share = static_cast<float>(counter_scale) / static_cast<float>(irradiance_record::cells);
     return static_cast<std::uint32_t>(ceilf(floor * share * static_cast<float>(counters)));
   }
-};
-
-/// Those that most rays at a record want, above the normal of its voxels.
-struct alignas(16) known_rows {
-  record_rows rows;
-  vec3 normal{0.0f};
-
-  /// Whether they serve a surface with a unit normal: to 2.5 degrees, less than the normals of tables are apart.
-  WFPG_HD bool serve(vec3 of_surface) const { return glm::dot(normal, of_surface) > 0.999f; }
 };
 
 /// What a mixture (mis.hpp) draws from. A record without light is empty, and so is one that has none above

@@ -98,13 +98,13 @@ struct sum_rows {
   normal_lattice lattice;
   const cell_cosines* cosines;
   float floor;
-  known_rows* rows;
+  record_rows* rows;
 
   WFPG_HD void operator()(std::size_t i) const {
     const vec3 normal = unpack_voxel_normal(normals[i]);
     const record_rows ahead(records[i], floor, cosines, lattice.index(normal));
     const record_rows behind(records[i], floor, cosines, lattice.index(-normal));
-    rows[i] = ahead.total() < behind.total() ? known_rows{behind, -normal} : known_rows{ahead, normal};
+    rows[i] = ahead.total() < behind.total() ? behind : ahead;
   }
 };
 
@@ -150,7 +150,7 @@ irradiance_records<Exec, Smooth>::irradiance_records(const Exec& exec, const Exe
   view_.level_ = detail::min(options_.record_level, tree.depth());
   records_ = buffer<irradiance_record, Exec>(
       exec, tree.level_begin(view_.level_ + 1) - tree.level_begin(view_.level_));
-  rows_ = buffer<detail::known_rows, Exec>(exec, records_.size());
+  rows_ = buffer<detail::record_rows, Exec>(exec, records_.size());
   detail::build_voxel_normals(working, octree_, fragments, normals_.view(), swapped_.view());
   const float voxel = tree.grid().voxel_size();
   working.for_each(tree.leaf_count(),
@@ -160,7 +160,7 @@ irradiance_records<Exec, Smooth>::irradiance_records(const Exec& exec, const Exe
   ::thrust::fill_n(working.thrust(), tags_.data(), tags_.size(), voxel_tag::object);
   exec.fill_bytes(records_.data(), 0, records_.bytes());
   cosines_ = buffer<detail::cell_cosines, Exec>(exec, view_.normals_.size() + 1);
-  ::thrust::fill_n(working.thrust(), rows_.data(), rows_.size(), detail::known_rows{});
+  ::thrust::fill_n(working.thrust(), rows_.data(), rows_.size(), detail::record_rows{});
   exec.for_each(cosines_.size(), detail::tabulate_cell_cosines{view_.normals_, cosines_.data()});
   view_.cosines_ = cosines_.data();
   view_.records_ = records_.data();
