@@ -1,5 +1,5 @@
 // Owning storage: moves, transfers, what happens when memory runs out, and the resource that keeps blocks.
-#define WFPG_TEST_EACH_POLICY
+#define WFPG_TEST_EACH_WIDTH
 
 #include "support/catch.hpp"
 #include "support/failing_resource.hpp"

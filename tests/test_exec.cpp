@@ -1,5 +1,5 @@
 // The execution policies: loops, blocks, scratch memory and warps, against plain loops.
-#define WFPG_TEST_EACH_POLICY
+#define WFPG_TEST_EACH_WIDTH
 
 #include "support/catch.hpp"
 #include "support/policies.hpp"

@@ -2,15 +2,15 @@
 // per policy and warp width, named "NAME - tbb32" and tagged [tbb][w32]. A CUDA compiler makes of the same
 // sources the CUDA policy's tests, "NAME - cuda" and tagged [cuda].
 //
-// A warp's text is the same on every policy: all widths run on seq, and 32, which users have, on the others.
-// Under sanitizers, where all is slow, WFPG_TEST_POLICY and WFPG_TEST_WIDTH choose one of them; tests of the
-// policies themselves define WFPG_TEST_EACH_POLICY first and keep all. WFPG_TEST_SEVERAL_POLICIES says that
-// seq, omp and tbb are tested side by side.
+// A warp's text is the same on every policy: seq has narrow ones, the others 32, which users have. Tests of
+// the policies themselves define WFPG_TEST_EACH_WIDTH first. Under sanitizers, where all is slow,
+// WFPG_TEST_POLICY and WFPG_TEST_WIDTH choose one of them for all other tests. WFPG_TEST_SEVERAL_POLICIES
+// says that seq, omp and tbb are tested side by side.
 #pragma once
 
 #include "support/catch.hpp"
 
-#if defined(WFPG_TEST_EACH_POLICY)
+#if defined(WFPG_TEST_EACH_WIDTH)
 #undef WFPG_TEST_POLICY
 #endif
 #if defined(__CUDACC__)
@@ -46,14 +46,19 @@
   TEST_CASE(name " - cuda", tags "[cuda]") {     \
     function<wfpg::exec::cuda>();                \
   }
+#elif defined(WFPG_TEST_EACH_WIDTH)
+#define WFPG_TEST_POLICIES(function, name, tags) \
+  WFPG_TEST_ONE(function, name, tags, seq, 8)    \
+  WFPG_TEST_ONE(function, name, tags, seq, 16)   \
+  WFPG_TEST_ONE(function, name, tags, seq, 32)   \
+  WFPG_TEST_ONE(function, name, tags, omp, 32)   \
+  WFPG_TEST_ONE(function, name, tags, tbb, 32)
 #elif defined(WFPG_TEST_POLICY)
 #define WFPG_TEST_POLICIES(function, name, tags) \
   WFPG_TEST_ONE(function, name, tags, WFPG_TEST_POLICY, WFPG_TEST_WIDTH)
 #else
 #define WFPG_TEST_POLICIES(function, name, tags) \
   WFPG_TEST_ONE(function, name, tags, seq, 8)    \
-  WFPG_TEST_ONE(function, name, tags, seq, 16)   \
-  WFPG_TEST_ONE(function, name, tags, seq, 32)   \
   WFPG_TEST_ONE(function, name, tags, omp, 32)   \
   WFPG_TEST_ONE(function, name, tags, tbb, 32)
 #endif
