@@ -282,7 +282,7 @@ std::uint32_t seen_of_lamp(const Exec& exec, const Smooth& smooth) {
 
 WFPG_TEST_CASE("irradiance records: a lamp is seen through what its light goes through", "[records]") {
   const Exec exec;
-  CHECK(seen_of_lamp(exec, window()) >= 8);  // the lamp is in other cells, too
+  CHECK(seen_of_lamp(exec, window()) >= 8);                    // the lamp is in other cells, too
   CHECK(seen_of_lamp(exec, wfpg::no_smooth_surfaces()) <= 1);  // no light there at all
 }
 

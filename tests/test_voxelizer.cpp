@@ -39,9 +39,7 @@ struct fragments {
 
   template <class Exec>
   fragments(const Exec& exec, const wfpg::voxel_fragments<Exec>& device)
-      : codes(device.codes.to_host(exec)),
-        grid(device.grid),
-        report(device.report) {
+      : codes(device.codes.to_host(exec)), grid(device.grid), report(device.report) {
     for (const wfpg::fragment_surface& s : device.surfaces.to_host(exec)) {
       normals.push_back(s.normal);
       areas.push_back(s.area);

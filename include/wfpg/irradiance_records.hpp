@@ -14,11 +14,11 @@
 // is that which voxels are known to send, so what is lit indirectly is dark. Where light leaves the octree,
 // rays from beyond the scene ask the caster for the environment.
 //
-// Memory: 64 bytes a record and 48 for its sums, 82 KiB for cosines; of the octree and its tags 11 a leaf, 12 an inner node.
-// While it builds 40 a leaf, 24 a node, 44 a ray in flight (2^16 of them), 512 a record (4096 of them). Time:
-// `emitter_rays` rays, with smooth surfaces one for each bounce more, 2048 for the environment, and 128
-// `cones_per_direction` cones a record. Directions: some 300 integer operations each; a density beside one, a
-// few.
+// Memory: 64 bytes a record and 48 for sums of it, 82 KiB for cosines; of the octree and its tags 11 a leaf,
+// 12 an inner node. While it builds 40 a leaf, 24 a node, 44 a ray in flight (2^16 of them), 512 a record
+// (4096 of them). Time: `emitter_rays` rays, with smooth surfaces one for each bounce more, 2048 for the
+// environment, and 128 `cones_per_direction` cones a record. Directions: some 100 integer operations each,
+// and 300 more where the normal is not that of most of the record; a density beside one, a few.
 #pragma once
 
 #include <wfpg/buffer.hpp>
