@@ -1,13 +1,7 @@
 # The CUDA compiler, where there is one: enables the language and sets WFPG_HAS_CUDA, and wfpg_add_cuda_options()
 # gives a target what all of the project's CUDA programs have in common. WFPG_CUDA_ARCHITECTURES chooses what is
-# compiled for; without it CMake's own environment variable does.
-set(architectures 75 90)
-if(DEFINED ENV{CUDAARCHS})
-  set(architectures $ENV{CUDAARCHS})
-endif()
-set(WFPG_CUDA_ARCHITECTURES
-    ${architectures}
-    CACHE STRING "Compute capabilities that CUDA programs are compiled for, a list")
+# compiled for.
+set(WFPG_CUDA_ARCHITECTURES 75 90 CACHE STRING "Compute capabilities that CUDA programs are compiled for, a list")
 set(CMAKE_CUDA_ARCHITECTURES "${WFPG_CUDA_ARCHITECTURES}")
 
 find_program(WFPG_NVCC nvcc HINTS ENV CUDA_HOME PATHS /usr/local/cuda /opt/cuda PATH_SUFFIXES bin)

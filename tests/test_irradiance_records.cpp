@@ -126,10 +126,13 @@ WFPG_TEST_CASE("irradiance records: densities integrate to one, and frequencies 
     begin_with_wave(exec, guider, box_caster());
     const wfpg::irradiance_records_view view = guider.guide().view();
     for (const vec3 place : {vec3(0.4f, 0.0f, 0.3f), vec3(1.0f, 0.5f, 0.5f), vec3(0.2f, 1.0f, 0.9f)})
-      for (const bool transmits : {false, true}) {
-        const vec3 normal = transmits ? vec3(1, 0, 0) : glm::normalize(vec3(0.5f) - place + 0.1f * up);
-        const std::string name = "floor " + std::to_string(floor) + ", x " + std::to_string(place.x) +
-                                 (transmits ? ", sphere" : "");
+      for (const char* kind : {"the wall's normal", "another normal", "both sides"}) {
+        const bool transmits = kind == std::string("both sides");
+        const vec3 inside = glm::normalize(vec3(0.5f) - place + 0.1f * up);
+        const vec3 wall = place.x == 1.0f ? vec3(-1, 0, 0) : place.y == 1.0f ? -up : up;
+        const vec3 normal = kind == std::string("another normal") ? inside : wall;
+        const std::string name =
+            "floor " + std::to_string(floor) + ", x " + std::to_string(place.x) + ", " + kind;
         INFO(name);
         const auto drawn = evaluate(exec, 8000, draw_directions{view, place, normal, transmits});
         sampler_check_options how;
@@ -142,7 +145,7 @@ WFPG_TEST_CASE("irradiance records: densities integrate to one, and frequencies 
       }
   }
   INFO(family.message());
-  CHECK(family.size() == 18);
+  CHECK(family.size() == 27);
   CHECK(family.accepted());
 }
 

@@ -18,7 +18,7 @@
 // 12 an inner node. While it builds 40 a leaf, 24 a node, 44 a ray in flight (2^16 of them), 512 a record
 // (4096 of them). Time: `emitter_rays` rays, with smooth surfaces one for each bounce more, 2048 for the
 // environment, and 128 `cones_per_direction` cones a record. Directions: some 100 integer operations each,
-// and 300 more where the normal is not that of most of the record; a density beside one, a few.
+// and 200 more where the normal is not that of most of the record; a density beside one, a few.
 #pragma once
 
 #include <wfpg/buffer.hpp>

@@ -2,10 +2,10 @@
 // per policy and warp width, named "NAME - tbb32" and tagged [tbb][w32]. A CUDA compiler makes of the same
 // sources the CUDA policy's tests, "NAME - cuda" and tagged [cuda].
 //
-// A warp's text is the same on every policy: seq has narrow ones, the others 32, which users have. Tests of
-// the policies themselves define WFPG_TEST_EACH_WIDTH first. Under sanitizers, where all is slow,
-// WFPG_TEST_POLICY and WFPG_TEST_WIDTH choose one of them for all other tests. WFPG_TEST_SEVERAL_POLICIES
-// says that seq, omp and tbb are tested side by side.
+// A warp's text is the same on every policy: seq has narrow ones here, the others 32 lanes, as users have on
+// all. Tests of the policies themselves define WFPG_TEST_EACH_WIDTH first. Under sanitizers, where all is
+// slow, WFPG_TEST_POLICY and WFPG_TEST_WIDTH choose one of them for all other tests.
+// WFPG_TEST_SEVERAL_POLICIES says that seq, omp and tbb are tested side by side.
 #pragma once
 
 #include "support/catch.hpp"
