@@ -115,6 +115,12 @@ struct density_of_direction {
   WFPG_HD float operator()(vec3 d) const { return view.distribution(place, normal, transmits).pdf(d); }
 };
 
+struct surface_side {
+  const char* name;
+  vec3 normal;
+  bool transmits;
+};
+
 WFPG_TEST_CASE("irradiance records: densities integrate to one, and frequencies are theirs", "[records]") {
   const Exec exec;
   chi_square_family family;
@@ -125,12 +131,12 @@ WFPG_TEST_CASE("irradiance records: densities integrate to one, and frequencies 
     records_guider<Exec> guider(exec, mesh.scene(), options);
     begin_with_wave(exec, guider, box_caster());
     const wfpg::irradiance_records_view view = guider.guide().view();
-    for (const vec3 place : {vec3(0.4f, 0.0f, 0.3f), vec3(1.0f, 0.5f, 0.5f), vec3(0.2f, 1.0f, 0.9f)})
-      for (const char* kind : {"the wall's normal", "another normal", "both sides"}) {
-        const bool transmits = kind == std::string("both sides");
-        const vec3 inside = glm::normalize(vec3(0.5f) - place + 0.1f * up);
-        const vec3 wall = place.x == 1.0f ? vec3(-1, 0, 0) : place.y == 1.0f ? -up : up;
-        const vec3 normal = kind == std::string("another normal") ? inside : wall;
+    for (const vec3 place : {vec3(0.4f, 0.0f, 0.3f), vec3(1.0f, 0.5f, 0.5f), vec3(0.2f, 1.0f, 0.9f)}) {
+      const vec3 wall = place.x == 1.0f ? vec3(-1, 0, 0) : place.y == 1.0f ? -up : up;
+      const vec3 inside = glm::normalize(vec3(0.5f) - place + 0.1f * up);
+      for (const auto& [kind, normal, transmits] :
+           {surface_side{"the wall's normal", wall, false}, surface_side{"another normal", inside, false},
+            surface_side{"both sides", wall, true}}) {
         const std::string name =
             "floor " + std::to_string(floor) + ", x " + std::to_string(place.x) + ", " + kind;
         INFO(name);
@@ -143,6 +149,7 @@ WFPG_TEST_CASE("irradiance records: densities integrate to one, and frequencies 
         INFO(report.message);
         family.add(report.frequencies, name);
       }
+    }
   }
   INFO(family.message());
   CHECK(family.size() == 27);

@@ -28,6 +28,7 @@
 #include <wfpg/detail/voxel_light.hpp>
 #include <wfpg/guide.hpp>
 #include <wfpg/irradiance_records_options.hpp>
+#include <wfpg/mis.hpp>
 #include <wfpg/sparse_voxel_octree.hpp>
 #include <wfpg/voxelizer.hpp>
 
@@ -68,14 +69,14 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
   /// Whether a surface is guided: it lies in a voxel. Without it is its BSDF's.
   template <class Bsdf>
   WFPG_HD bool guides(const surface<Bsdf>& s) const {
-    return can_guide(s) && record(s.position) != nullptr;
+    return fraction_ > 0.0f && detail::can_be_guided(s) && record(s.position) != nullptr;
   }
 
   /// The mixture at a surface, whatever the ray; of one that is not guided, the BSDF alone.
   template <class Bsdf>
   WFPG_HD basic_guide_mixture<detail::record_distribution> mixture(std::uint32_t,
                                                                    const surface<Bsdf>& s) const {
-    if (!can_guide(s)) return {};
+    if (!(fraction_ > 0.0f && detail::can_be_guided(s))) return {};
     return {distribution(s.position, detail::facing_normal(s), s.bsdf.transmits()), fraction_, no_field};
   }
 
@@ -107,11 +108,6 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
 
   static constexpr std::uint32_t none = 0xffffffffu;
 
-  template <class Bsdf>
-  WFPG_HD bool can_guide(const surface<Bsdf>& s) const {
-    return fraction_ > 0.0f && !s.bsdf.is_delta() && detail::is_finite(s.position) &&
-           detail::is_normal(s.normal);
-  }
   /// Of the record of a place.
   WFPG_HD std::uint32_t index(vec3 position) const {
     const node_id leaf = tree_.nearest_leaf(position);

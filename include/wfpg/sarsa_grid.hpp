@@ -20,6 +20,7 @@
 #include <wfpg/detail/sarsa_learning.hpp>
 #include <wfpg/detail/serve_rays.hpp>
 #include <wfpg/guide.hpp>
+#include <wfpg/mis.hpp>
 #include <wfpg/sarsa_options.hpp>
 
 #include <thrust/fill.h>
@@ -36,8 +37,7 @@ class sarsa_grid_view : public mixture_view<sarsa_grid_view> {
   /// Whether a surface is guided; without it is its BSDF's.
   template <class Bsdf>
   WFPG_HD bool guides(const surface<Bsdf>& s) const {
-    return fraction_ > 0.0f && !s.bsdf.is_delta() && detail::is_finite(s.position) &&
-           detail::is_normal(s.normal);
+    return fraction_ > 0.0f && detail::can_be_guided(s);
   }
 
   /// The mixture at a surface; of one that is not guided, the BSDF alone.

@@ -148,11 +148,11 @@ struct tabulate_cell_cosines {
   }
 };
 
-/// Weights of a record's rows above one normal.
+/// Weights of a record's rows above one normal. All zero: those of a record without light.
 struct alignas(16) record_rows {
   std::uint32_t weights[irradiance_record::rows] = {};
-  std::uint32_t base = 0;      ///< of each direction, before its cosine
-  std::uint32_t normal = ~0u;  ///< whose cosines these are, by its number in a table; of none
+  std::uint32_t base = 0;    ///< of each direction, before its cosine
+  std::uint32_t normal = 0;  ///< whose cosines these are, by its number in a table
 
   static constexpr std::uint32_t counter_scale = 1024;
 
@@ -220,14 +220,13 @@ class record_distribution {
   WFPG_HD float pdf(vec3 d) const { return density_of(weight(irradiance_record::cell_of(d))); }
 
  private:
-  static constexpr std::uint32_t counter_scale = record_rows::counter_scale;
   static constexpr std::uint32_t cells_a_group = irradiance_record::columns / cell_cosines::groups;
 
   WFPG_HD std::uint32_t weight(std::uint32_t cell) const {
-    return (record_->counter(cell) * counter_scale + rows_.base) * (*cosines_)(cell);
+    return (record_->counter(cell) * record_rows::counter_scale + rows_.base) * (*cosines_)(cell);
   }
   WFPG_HD std::uint32_t group_weight(std::uint32_t row, std::uint32_t group) const {
-    return cosines_->dot(record_->words[row], row, group) * counter_scale +
+    return cosines_->dot(record_->words[row], row, group) * record_rows::counter_scale +
            rows_.base * cosines_->sum(row, group);
   }
   /// Which of n weights a target lies in; what is before it is taken off. Precondition: it lies in one.

@@ -159,8 +159,8 @@ irradiance_records<Exec, Smooth>::irradiance_records(const Exec& exec, const Exe
   octree_.release_build_data();
   ::thrust::fill_n(working.thrust(), tags_.data(), tags_.size(), voxel_tag::object);
   exec.fill_bytes(records_.data(), 0, records_.bytes());
+  exec.fill_bytes(rows_.data(), 0, rows_.bytes());
   cosines_ = buffer<detail::cell_cosines, Exec>(exec, view_.normals_.size() + 1);
-  ::thrust::fill_n(working.thrust(), rows_.data(), rows_.size(), detail::record_rows{});
   exec.for_each(cosines_.size(), detail::tabulate_cell_cosines{view_.normals_, cosines_.data()});
   view_.cosines_ = cosines_.data();
   view_.records_ = records_.data();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <wfpg/guide_view.hpp>
+#include <wfpg/mis.hpp>
 #include <wfpg/radiance_field.hpp>
 #include <wfpg/spatial_binner.hpp>
 #include <wfpg/wave.hpp>
@@ -182,6 +183,12 @@ struct resident_sink {
 WFPG_HD inline bool is_normal(vec3 n) {
   const float square = glm::dot(n, n);
   return is_finite(square) && square > 0.25f && square < 4.0f;
+}
+
+/// Whether a guide that knows directions by place and normal has something to say of a surface.
+template <class Bsdf>
+WFPG_HD bool can_be_guided(const surface<Bsdf>& s) {
+  return !s.bsdf.is_delta() && is_finite(s.position) && is_normal(s.normal);
 }
 
 /// A wave's rays as the binner wants them. Delta surfaces are sampled alone and need no bin; those whose
