@@ -12,6 +12,7 @@
 // bytes a cell and 8 a value.
 #pragma once
 
+#include <wfpg/detail/allot_slots.hpp>
 #include <wfpg/detail/bin_marks.hpp>
 #include <wfpg/detail/field_slots.hpp>
 #include <wfpg/detail/kept_field.hpp>

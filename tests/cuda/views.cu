@@ -118,7 +118,7 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(d::measure_fragments{});
   launch(d::describe_leaves{});
   launch(d::link_nodes{});
-  launch(d::starts_node{});
+  launch(d::mark_beginnings{});
   launch(d::gather_level_ends{});
   launch(d::find_child_masks{});
   launch(d::leaf_normals{});
