@@ -1,5 +1,6 @@
 // The command line of wfpg-quality: presets, scenes, methods, and what is refused.
 #include "progress.hpp"
+#include "runs.hpp"
 #include "settings.hpp"
 #include "support/catch.hpp"
 #include "support/measurements.hpp"
@@ -89,6 +90,7 @@ TEST_CASE("options: what cannot be right is said", "[quality]") {
   CHECK(contains(refused({"--method", "a b=--method pt"}), "NAME=OPTIONS"));
   CHECK(contains(refused({"--method", "a=--method best"}), "method a"));
   CHECK(contains(refused({"--method", "a=--spp 3"}), "--spp"));
+  CHECK(contains(refused({"--method", "a=--method pt --seed 1000000"}), "--seed"));
   CHECK(contains(refused({"--method", "a=--product-resolution 8"}), "wfpg-product"));
   CHECK(contains(refused({"--method", "a=--method pt --cones trace"}), "wfpg-product"));
   CHECK(contains(refused({"--method", "a=--method wfpg --records-level 3"}), "--method records"));
@@ -103,6 +105,19 @@ TEST_CASE("options: what cannot be right is said", "[quality]") {
        {"--preset", "--scenes", "--methods", "--method", "--spp", "--seconds", "--seeds", "--size",
         "--reference-spp", "--nee", "--device", "--per-sample", "--cache"})
     CHECK(contains(out.str(), option));
+}
+
+TEST_CASE("options: a method may have seeds of its own", "[quality]") {
+  const quality::settings given =
+      parsed({"--scenes", "ajar", "--method", "pt=--method pt", "--method", "other=--method pt --seed 1000"});
+  const auto seed = [&](std::size_t method, int number) {
+    return quality::plan_run(given.scenes[0], "ajar", given.methods[method], {4, 0.0}, number, "reference")
+        .options.seed;
+  };
+  CHECK(seed(0, 1) == 1);
+  CHECK(seed(0, 7) == 7);
+  CHECK(seed(1, 1) == 1001);
+  CHECK(seed(1, 7) == 1007);
 }
 
 TEST_CASE("options: scenes in files", "[quality]") {

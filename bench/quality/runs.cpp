@@ -95,7 +95,7 @@ planned_run plan_run(const scene_choice& scene, const std::string& identity, con
   run.options = options_of(scene, sampled);
   run.options.spp = allowed.spp;
   run.options.seconds = allowed.seconds;
-  run.options.seed = static_cast<std::uint64_t>(seed);
+  run.options.seed += static_cast<std::uint64_t>(seed);
   run.options.checkpoints = render::checkpoint_times::powers_of_two;
   run.title = scene.title + ", " + sampled.name + ", " + title_of(allowed) + ", seed " + std::to_string(seed);
   run.rate = scene.title + ", " + sampled.name;

@@ -52,7 +52,7 @@ run_record record_from_json(const json& object);
 /// What renderings of a scene have in common in their keys.
 json key_of_scene(const scene_choice& scene, const std::string& identity);
 
-/// A measured rendering against the reference of this hash. `seed` counts from 1.
+/// A measured rendering against the reference of this hash. `seed` counts from 1, after the method's own.
 planned_run plan_run(const scene_choice& scene, const std::string& identity, const method& sampled,
                      const budget& allowed, int seed, const std::string& reference_hash);
 

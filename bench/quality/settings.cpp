@@ -90,7 +90,8 @@ void add_measured(CLI::App& app, given_arguments& given) {
       ->delimiter(',');
   app.add_option("--method", given.definitions,
                  "NAME=OPTIONS, measured too: a name for options of wfpg-render's, such as "
-                 "small=\"--method wfpg --slot-resolution 16\"; several times")
+                 "small=\"--method wfpg --slot-resolution 16\"; several times. A --seed here is added to "
+                 "each rendering's, which are 1, 2, ...: for random numbers of the method's own")
       ->type_name("NAME=OPTIONS")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
@@ -299,6 +300,7 @@ render::render_options options_of(const scene_choice& scene, const method& sampl
   render::add_guider_options(app, options);
   render::add_nee_option(app, options);
   render::add_device_option(app, options);
+  app.add_option("--seed", options.seed)->check(CLI::Range(0, 900000));  // below those of references
   parse_part(app, "method " + sampled.name, sampled.arguments,
              [&] { render::check_render_options(app, options); });
   return options;
