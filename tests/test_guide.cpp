@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -42,6 +43,13 @@ template <class Exec>
 struct without_memory : uniform_guide<Exec> {
   using uniform_guide<Exec>::uniform_guide;
   void memory() const {}
+};
+
+/// One that has no use for paths.
+template <class Exec>
+struct without_paths : uniform_guide<Exec> {
+  using uniform_guide<Exec>::uniform_guide;
+  static constexpr bool records_paths = false;
 };
 
 WFPG_TEST_CASE("a guide is what has options, a mesh, a view, and learns", "[guide]") {
@@ -174,6 +182,29 @@ WFPG_TEST_CASE("what paths gather is the same, whichever guide they have", "[gui
   const estimate found = estimate_radiance(exec, make_guider(exec, mesh.view(), paths), samples, paths);
   CHECK(std::abs(found.mean - expected.mean) < 4.0 * std::sqrt(found.variance + expected.variance));
   CHECK(std::sqrt(found.variance) < 0.05 * found.mean);
+}
+
+WFPG_TEST_CASE("a guide that records no paths has a recorder that forgets them", "[guide]") {
+  const Exec exec;
+  const box_mesh<Exec> mesh(exec);
+  wfpg::sampling_options options;
+  options.max_paths = 200;
+  options.max_depth = 3;
+  uniform_guider<Exec> recorded(exec, mesh.view(), options);
+  wfpg::path_guider<Exec, without_paths<Exec>> guider(exec, mesh.view(), options);
+  CHECK(std::is_same_v<decltype(recorded.recorder()), wfpg::path_recorder_view>);
+  CHECK(std::is_same_v<decltype(guider.recorder()), wfpg::no_path_recorder>);
+  CHECK(trace_paths(exec, guider, 3, 200, box_caster()) == trace_paths(exec, recorded, 3, 200, box_caster()));
+  const auto recorder = guider.recorder();
+  exec.for_each(1, [=] WFPG_HD(std::size_t) {
+    recorder.vertex(0, 0, vec3(0.5f), vec3(0, 0, 1), vec3(1.0f));
+    recorder.scatter(0, 0, {});
+    recorder.escape(0, 1, vec3(1.0f));
+    recorder.radiance(0, 0, vec3(1.0f));
+    recorder.emission(0, 0, vec3(1.0f));
+  });
+  CHECK(guider.statistics().dropped_vertices == 0);
+  CHECK(guider.memory().transient() + 200 * 3 * 40 <= recorded.memory().transient());
 }
 
 WFPG_TEST_CASE("a guider that takes another's place gives its own memory back", "[guide]") {

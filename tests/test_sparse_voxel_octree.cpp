@@ -274,19 +274,31 @@ WFPG_TEST_CASE("points find their leaf, or the nearest of the 26 around", "[spar
   }
 }
 
-WFPG_TEST_CASE("every voxel's look-up agrees with the map", "[sparse_voxel_octree]") {
+WFPG_TEST_CASE("every voxel's look-up agrees with the map on every level", "[sparse_voxel_octree]") {
   const Exec exec;
-  const std::uint32_t resolution = 16;
-  const auto codes = random_codes(600, resolution, 77);
-  auto fragments = make_fragments(exec, codes, resolution);
-  const wfpg::sparse_voxel_octree<Exec> tree(exec, fragments);
-  const naive_octree naive(codes, resolution);
-  const octree_view view = tree.view();
-  const auto host =
-      evaluate(exec, 4096, [=] WFPG_HD(std::size_t code) { return view.leaf_at(wfpg::morton_decode(code)); });
-  int wrong = 0;
-  for (morton_code code = 0; code < 4096; ++code) wrong += host[code] != naive.find(4, code);
-  CHECK(wrong == 0);
+  struct dense {
+    std::uint32_t resolution, leaves;
+  };
+  for (const dense c : {dense{1, 1}, dense{2, 3}, dense{16, 60}, dense{16, 600}, dense{32, 5000}}) {
+    const auto codes = random_codes(c.leaves, c.resolution, 77);
+    auto fragments = make_fragments(exec, codes, c.resolution);
+    const wfpg::sparse_voxel_octree<Exec> tree(exec, fragments);
+    const naive_octree naive(codes, c.resolution);
+    const octree_view view = tree.view();
+    const std::size_t n = std::size_t(c.resolution) * c.resolution * c.resolution;
+    int wrong = 0;
+    const auto leaves =
+        evaluate(exec, n, [=] WFPG_HD(std::size_t code) { return view.leaf_at(wfpg::morton_decode(code)); });
+    for (std::size_t code = 0; code < n; ++code) wrong += leaves[code] != naive.find(naive.depth, code);
+    for (std::uint32_t level = 0; level <= naive.depth; ++level) {
+      const auto nodes = evaluate(
+          exec, n, [=] WFPG_HD(std::size_t code) { return view.node_at(wfpg::morton_decode(code), level); });
+      for (std::size_t code = 0; code < n; ++code)
+        wrong += nodes[code] != naive.find(level, code >> 3 * (naive.depth - level));
+    }
+    INFO("resolution " << c.resolution << ", leaves " << c.leaves);
+    CHECK(wrong == 0);
+  }
 }
 
 /// How far the face of a node of a level is from a cone's base, in ratio.

@@ -4,20 +4,12 @@
 
 #include <wfpg/light_guide.hpp>
 #include <wfpg/mis.hpp>
+#include <wfpg/path_recorder.hpp>
 #include <wfpg/wave.hpp>
 
 #include <cstdint>
 
 namespace render {
-
-/// Forgets everything.
-struct null_recorder {
-  WFPG_HD void vertex(std::uint32_t, std::uint32_t, wfpg::vec3, wfpg::vec3, wfpg::vec3) const {}
-  WFPG_HD void radiance(std::uint32_t, std::uint32_t, wfpg::vec3) const {}
-  WFPG_HD void emission(std::uint32_t, std::uint32_t, wfpg::vec3) const {}
-  WFPG_HD void scatter(std::uint32_t, std::uint32_t, const wfpg::sampled_direction&) const {}
-  WFPG_HD void escape(std::uint32_t, std::uint32_t, wfpg::vec3) const {}
-};
 
 /// Draws a direction for each ray from its BSDF, with the numbers that a guider would use for that: a
 /// guider's unguided sample is the same.
@@ -59,7 +51,7 @@ class unguided {
 
   void begin_sample() {}
   void end_sample() {}
-  null_recorder recorder() const { return {}; }
+  wfpg::no_path_recorder recorder() const { return {}; }
   wfpg::light_guide_view lights() const { return {}; }
 
   template <class Wave, class Caster>

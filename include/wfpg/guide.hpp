@@ -66,6 +66,8 @@ struct guide_base {
   bool empty() const { return false; }
   /// All vertices of all paths.
   recording_needs recording() const { return {}; }
+  /// Whether there is anything to record: where not, path_guider::recorder() gives one that costs nothing.
+  static constexpr bool records_paths = true;
   /// Which lights next-event estimation is to ask: it is not told.
   light_guide_view lights() const { return {}; }
   /// Before the waves of a sample.

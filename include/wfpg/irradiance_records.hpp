@@ -66,7 +66,7 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
  public:
   irradiance_records_view() = default;
 
-  /// Whether a surface is guided: it lies in a voxel. Without it is its BSDF's.
+  /// Whether a surface is guided: it lies in a node that has a record. Without it is its BSDF's.
   template <class Bsdf>
   WFPG_HD bool guides(const surface<Bsdf>& s) const {
     return fraction_ > 0.0f && detail::can_be_guided(s) && record(s.position) != nullptr;
@@ -86,9 +86,7 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
     const std::uint32_t at = index(position);
     if (at == none) return {};
     const std::uint32_t above = transmits ? normals_.size() : normals_.index(glm::normalize(normal));
-    const detail::record_rows& known = rows_[at];
-    return {records_ + at, cosines_ + above,
-            known.normal == above ? known : detail::record_rows(records_[at], floor_, cosines_, above)};
+    return {records_ + at, rows_ + at, cosines_, above};
   }
 
   /// The record of a place, in the policy's memory; null where there is no surface.
@@ -110,8 +108,14 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
 
   /// Of the record of a place.
   WFPG_HD std::uint32_t index(vec3 position) const {
-    const node_id leaf = tree_.nearest_leaf(position);
-    return leaf == invalid_node ? none : tree_.ancestor(leaf, level_) - tree_.level_begin(level_);
+    uvec3 voxel;
+    node_id node = tree_.grid().voxel_of(position, voxel) ? tree_.node_at(voxel, level_) : invalid_node;
+    if (node == invalid_node) {
+      const node_id leaf = tree_.nearest_leaf(position);
+      if (leaf == invalid_node) return none;
+      node = tree_.ancestor(leaf, level_);
+    }
+    return node - tree_.level_begin(level_);
   }
 
   sparse_voxel_octree_view tree_;
@@ -121,7 +125,6 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
   const irradiance_record* records_ = nullptr;
   const detail::record_rows* rows_ = nullptr;  // a record: above its voxels' normal
   const voxel_tag* tags_ = nullptr;
-  float floor_ = 0.0f;
   float fraction_ = 0.0f;
 };
 
@@ -142,8 +145,8 @@ class irradiance_records : public guide_base {
 
   /// Whether there is no octree.
   bool empty() const { return octree_.view().empty(); }
-  /// As few paths as there can be.
-  recording_needs recording() const { return {24, false}; }
+  /// It learns nothing from paths.
+  static constexpr bool records_paths = false;
 
   /// What the wave's rays draw from. Builds records where they are not, or no longer; throws what the caster
   /// throws, and then builds them in the next wave.

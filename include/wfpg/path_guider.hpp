@@ -87,8 +87,14 @@ class path_guider {
   /// Fields follow without being cast anew.
   void forget_light() { guide_.forget_light(exec_); }
 
-  /// Where the renderer's kernels record their paths.
-  path_recorder_view recorder() const { return recorder_.view(); }
+  /// Where the renderer's kernels record their paths: a path_recorder_view, or a no_path_recorder where the
+  /// guide has no use for them.
+  auto recorder() const {
+    if constexpr (Guide::records_paths)
+      return recorder_.view();
+    else
+      return no_path_recorder{};
+  }
   /// Which lights next-event estimation is to ask, in this sample; empty without options.lights.weights.
   light_guide_view lights() const { return guide_.lights(); }
   /// Where kernels deposit, and what they read, without the recorder. Of the octree, as those that follow.
@@ -126,8 +132,8 @@ class path_guider {
         working_memory_(std::make_unique<retaining_resource>(exec.resource())),
         exec_(exec.with_resource(working_memory_.get())),
         guide_(exec, exec_, std::forward<Scene>(scene), options_),
-        recorder_(exec_, options_.max_paths, options_.max_depth, options_.include_emission,
-                  guide_.recording().share_shift, guide_.recording().directions) {}
+        recorder_(exec_, Guide::records_paths ? options_.max_paths : 0, options_.max_depth,
+                  options_.include_emission, guide_.recording().share_shift, guide_.recording().directions) {}
 
   static options_type completed(options_type options) {
     detail::require_valid(static_cast<const sampling_options&>(options));

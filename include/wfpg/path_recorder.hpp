@@ -42,9 +42,10 @@ struct alignas(8) recorded_direction {
 
 }  // namespace detail
 
-/// What a kernel sees of the recorder. Calls for one path come from one thread at a time, vertices in order
-/// of depth. A path or depth beyond the capacity, a vertex that was not recorded, or a direction that is zero
-/// or not finite is dropped and counted; what comes for paths that this sample does not record is not.
+/// What a kernel sees of the recorder; of a default one nothing, and all is forgotten. Calls for one path
+/// come from one thread at a time, vertices in order of depth. A path or depth beyond the capacity, a vertex
+/// that was not recorded, or a direction that is zero or not finite is dropped and counted; what comes for
+/// paths that this sample does not record is not.
 class path_recorder_view {
  public:
   /// Paths of a sample, recorded or not.
@@ -120,7 +121,9 @@ class path_recorder_view {
   WFPG_HD static bool leads_somewhere(vec3 direction) {
     return detail::is_finite(direction) && direction != vec3(0.0f);
   }
-  WFPG_HD void drop() const { detail::atomic_add(dropped_, 1); }
+  WFPG_HD void drop() const {
+    if (dropped_) detail::atomic_add(dropped_, 1);
+  }
   /// Where a path is among the recorded ones; false where it is not, and dropped where there is no such path.
   WFPG_HD bool find(std::size_t path, std::uint32_t& place) const {
     if (path < paths_) return runs_.find(path, place);
@@ -143,6 +146,18 @@ class path_recorder_view {
   detail::recorded_light* light_ = nullptr;
   detail::recorded_direction* directions_ = nullptr;  // null: fields do not learn
   std::uint32_t* dropped_ = nullptr;
+};
+
+/// In its place where a guide records no paths: the same calls, which cost nothing.
+struct no_path_recorder {
+  WFPG_HD void vertex(std::size_t, std::uint32_t, vec3, vec3, vec3) const {}
+  WFPG_HD void scatter(std::size_t, std::uint32_t, const sampled_direction&) const {}
+  WFPG_HD void escape(std::size_t, std::uint32_t, vec3) const {}
+  WFPG_HD void radiance(std::size_t, std::uint32_t, vec3) const {}
+  WFPG_HD void emission(std::size_t, std::uint32_t, vec3) const {}
+
+  /// For kernels that are written for the other: one that forgets everything.
+  WFPG_HD operator path_recorder_view() const { return {}; }
 };
 
 /// One path as it was recorded: the surfaces that it met in order, and behind the last of them the

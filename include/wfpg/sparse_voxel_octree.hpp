@@ -91,12 +91,23 @@ class sparse_voxel_octree_view {
   }
 
   /// The leaf at voxel coordinates below resolution, or invalid_node. O(depth).
-  WFPG_HD node_id leaf_at(uvec3 voxel) const {
+  WFPG_HD node_id leaf_at(uvec3 voxel) const { return empty() ? invalid_node : descend(voxel, depth_); }
+  /// The node of a level, at most depth(), that a voxel lies in, by its coordinates below resolution, or
+  /// invalid_node. O(depth).
+  WFPG_HD node_id node_at(uvec3 voxel, std::uint32_t level) const {
     if (empty()) return invalid_node;
-    std::uint32_t below = depth_ - top_level_;  // an even number of levels
-    std::uint32_t at = top_[top_index(voxel >> below, top_level_)];
-    for (; below > 0 && at != invalid_node; below -= 2) at = steps_[at].at(voxel >> (below - 2));
-    return at;
+    std::uint32_t at_level = 0;
+    node_id node = 0;
+    if (level >= top_level_) {
+      at_level = level - (level - top_level_) % 2;
+      const std::uint32_t at = descend(voxel, at_level);
+      node = at == invalid_node ? at : node_of_step(at, at_level);
+    }
+    while (at_level < level && node != invalid_node) {
+      const uvec3 p = voxel >> (depth_ - ++at_level);
+      node = child(node, (p.x & 1u) | (p.y & 1u) << 1 | (p.z & 1u) << 2);
+    }
+    return node;
   }
   /// The leaf that holds a point, or invalid_node. O(depth).
   WFPG_HD node_id leaf_at(vec3 p) const {
@@ -158,6 +169,22 @@ class sparse_voxel_octree_view {
     return p.x | p.y << level | p.z << 2 * level;
   }
 
+  /// The step of the node that a voxel lies in on a level an even number of levels above the leaves and not
+  /// above the top, or the leaf; invalid_node where there is none. Precondition: not empty.
+  WFPG_HD std::uint32_t descend(uvec3 voxel, std::uint32_t level) const {
+    const std::uint32_t end = depth_ - level;
+    std::uint32_t below = depth_ - top_level_;
+    std::uint32_t at = top_[top_index(voxel >> below, top_level_)];
+    for (; below > end && at != invalid_node; below -= 2) at = steps_[at].at(voxel >> (below - 2));
+    return at;
+  }
+  /// Whose step of a level descend() found.
+  WFPG_HD node_id node_of_step(std::uint32_t at, std::uint32_t level) const {
+    if (level == depth_) return at;
+    for (std::uint32_t above = top_level_; above < level; above += 2)
+      at -= level_begin_[above + 1] - level_begin_[above];
+    return level_begin_[level] + at;
+  }
   WFPG_HD std::uint32_t octant_of(node_id node, node_id up) const {
     std::uint32_t mask = child_masks_[up];
     for (node_id before = first_children_[up]; before < node; ++before) mask &= mask - 1u;
