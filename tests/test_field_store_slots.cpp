@@ -59,7 +59,7 @@ WFPG_TEST_CASE("field store: a budget is spent on its slots and on nothing else"
         CHECK(box.counts().capacity == slots);
         CHECK(box.counts().bytes_a_slot * slots == budget);
         CHECK(box.store.slot_bytes() <= budget);
-        CHECK(budget / slots >= (learns ? 12 : 8) * resolution * resolution);
+        CHECK(budget / slots >= (learns ? 10 : 8) * resolution * resolution);
         CHECK(box.store.learnt().empty() == !learns);
         CHECK((box.store.value_bytes() >= 800) == learns);
       }
@@ -262,7 +262,8 @@ WFPG_TEST_CASE(
   for (int i = 0; i < 400; ++i)  // dense at first leaves, sparse at the last ones
     rays.push_back(tree.first_leaf() + random.below(1 + random.below(tree.leaf_count())));
   const wfpg::buffer<wfpg::node_id, Exec> leaves(box.exec, rays);
-  const wfpg::buffer<std::uint32_t, Exec> pressure(box.exec, std::vector<std::uint32_t>{2});
+  const wfpg::buffer<std::uint32_t, Exec> pressure(
+      box.exec, std::vector<std::uint32_t>{2 * wfpg::detail::mark_threshold::pressure_unit});
   const std::vector<node_record> nodes = nodes_of(box.exec, tree);
   for (std::uint32_t min_level : {0u, 2u, 9u}) {
     const std::uint32_t least = std::min(min_level, tree.depth());

@@ -102,7 +102,7 @@ WFPG_TEST_CASE("field store: a limit on cones is shared evenly, however large th
   CHECK(*most < 14 * 4);
 }
 
-WFPG_TEST_CASE("field store: a limit on cones leaves levels alone", "[field_store]") {
+WFPG_TEST_CASE("field store: a limit on cones makes no bins larger", "[field_store]") {
   kept_field_options options = slots_of(4, 2000);
   options.max_wave_cones = 16;
   kept_box<Exec> box(options);
@@ -112,7 +112,7 @@ WFPG_TEST_CASE("field store: a limit on cones leaves levels alone", "[field_stor
     box.end();
   }
   CHECK(box.counts().live == 4);
-  CHECK(box.state().pressure == wfpg::detail::field_store_state().pressure);
+  CHECK(box.state().pressure <= wfpg::detail::field_store_state().pressure);
 }
 
 WFPG_TEST_CASE("field store: fields that may see what moved are cast anew, the others refreshed",

@@ -50,7 +50,7 @@ void refreshing_slots(benchmark::State& state) {
   const wfpg::buffer<std::uint32_t, exec_policy> words(exec, std::size_t(slot_count) * cells),
       list(exec, slot_count);
   const wfpg::buffer<wfpg::detail::cone_hit, exec_policy> found(exec, std::size_t(slot_count) * cells);
-  const wfpg::buffer<wfpg::detail::learnt_mean, exec_policy> learnt(exec, found.size());
+  const wfpg::buffer<wfpg::detail::rough_mean, exec_policy> learnt(exec, found.size());
   const wfpg::buffer<wfpg::ray_hit, exec_policy> hits(exec, std::size_t(slot_count) * cells);
   thrust::sequence(exec.thrust(), list.data(), list.data() + slot_count);
 

@@ -51,7 +51,7 @@ struct render_options {
   std::uint32_t slot_resolution = 24;                ///< cells a side of kept fields
   std::uint32_t recast = 8;                          ///< a refresh casts one cone in so many again
   bool learn = true;                                 ///< kept fields learn from paths
-  std::size_t field_budget = std::size_t(32) << 20;  ///< bytes of kept fields
+  std::size_t field_budget = std::size_t(24) << 20;  ///< bytes of kept fields
   std::size_t caster_buffer = std::size_t(16) << 20;  ///< bytes of cones in flight to OptiX
   std::uint32_t product_resolution = 8;               ///< blocks a side of products, 4, 8 or 16
   std::uint32_t rays_per_bin = 64;                    ///< c_ray

@@ -137,7 +137,7 @@ void add_guider_options(CLI::App& app, render_options& options) {
   app.add_option("--light-groups", options.light_groups,
                  "lights are chosen from so many groups as is learnt; 1: by power (default: 32)")
       ->check(CLI::Range(1u, 255u));
-  app.add_option("--field-budget", options.field_budget, "memory of kept fields, such as 32MiB (the default)")
+  app.add_option("--field-budget", options.field_budget, "memory of kept fields, such as 24MiB (the default)")
       ->transform(CLI::AsSizeValue(false));
   app.add_option("--caster-buffer", options.caster_buffer,
                  "memory of cones in flight to OptiX (default: 16MiB)")

@@ -33,7 +33,7 @@ namespace wfpg {
 struct kept_field_options {
   std::uint32_t resolution = 24;  ///< cells along a field's side, in [2, 128]
   std::uint32_t recast = 8;       ///< R: a refresh casts one cone in so many again, at least 1
-  std::size_t budget_bytes = std::size_t(32) << 20;  ///< of the slots; one takes about 12 F² bytes, or 8
+  std::size_t budget_bytes = std::size_t(24) << 20;  ///< of the slots; one takes about 10 F² bytes, or 8
   bool learn = true;          ///< from paths: where path_recorder_view::scatter() is called, or by itself
   float cone_samples = 1.0f;  ///< what a cell's cone counts for beside so many paths, positive and finite
   std::uint64_t max_wave_cones =
@@ -149,7 +149,7 @@ class field_store {
   static std::size_t bytes_a_slot(std::uint32_t resolution, bool learns = true) {
     const std::size_t cells = std::size_t(resolution) * resolution;
     const std::size_t a_cell =
-        sizeof(detail::cone_hit) + sizeof(std::uint32_t) + (learns ? sizeof(detail::learnt_mean) : 0);
+        sizeof(detail::cone_hit) + sizeof(std::uint32_t) + (learns ? sizeof(detail::rough_mean) : 0);
     return a_cell * cells + sizeof(detail::field_slot) + sizeof(resident_field) +
            words_a_slot * sizeof(std::uint32_t);
   }
@@ -208,10 +208,10 @@ class field_store {
   bool in_wave_ = false;           // also after one whose caster threw
   detail::bin_marks<Exec> marks_;
   buffer<detail::field_slot, Exec> slots_;
-  buffer<resident_field, Exec> fields_;       // a slot
-  buffer<std::uint32_t, Exec> words_;         // a slot: its distribution
-  buffer<detail::cone_hit, Exec> hits_;       // a slot: its cells
-  buffer<detail::learnt_mean, Exec> learnt_;  // the same, where fields learn
+  buffer<resident_field, Exec> fields_;      // a slot
+  buffer<std::uint32_t, Exec> words_;        // a slot: its distribution
+  buffer<detail::cone_hit, Exec> hits_;      // a slot: its cells
+  buffer<detail::rough_mean, Exec> learnt_;  // the same, where fields learn
   detail::value_queue<Exec> queue_;
   buffer<std::uint64_t, Exec> table_;
   buffer<std::uint8_t, Exec> settled_;

@@ -65,7 +65,6 @@ struct bear_fields {
     state->born += born;
     state->refused_births += refused;
     state->delayed_births += asked - refused - born;
-    state->refused_since_mark += refused;
   }
 };
 

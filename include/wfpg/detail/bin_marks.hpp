@@ -65,14 +65,18 @@ struct sum_counts {
 /// the marked nodes' fields to fit the room that there is. A surface has four times the rays one level up, so
 /// that nodes marked by half of c_ray and more hold, in ratio, about c_ray.
 struct mark_threshold {
+  static constexpr std::uint32_t pressure_unit = 64;
+
   std::uint32_t rays_per_bin;
   std::uint32_t samples;
-  std::uint64_t room;             // bins
-  const std::uint32_t* pressure;  // bins of average size that the room is asked for, on the device
+  std::uint64_t room;  // bins
+  const std::uint32_t*
+      pressure;  // how many times as many rays a bin is to have as fit the room, on the device
 
   WFPG_HD std::uint64_t operator()(std::uint32_t rays) const {
     const std::uint64_t wanted = (std::uint64_t(rays_per_bin) * samples + 1) / 2;
-    const std::uint64_t affordable = room > 0 ? std::uint64_t(rays) * *pressure / room : wanted;
+    const std::uint64_t affordable =
+        room > 0 ? std::uint64_t(rays) * *pressure / (room * pressure_unit) : wanted;
     return min<std::uint64_t>(max(wanted, affordable), bin_marks_view::most);
   }
 };

@@ -76,12 +76,12 @@ struct field_wave_counts {
 
 /// What the host never has to read in a sample.
 struct field_store_state {
-  std::uint32_t pressure = 2;        ///< see mark_threshold; doubled when births were refused
+  std::uint32_t pressure = 2 * mark_threshold::pressure_unit;
   std::uint32_t free = 0;            ///< slots in the list of free ones, made at the beginning of a sample
   std::uint32_t taken = 0;           ///< of that list
   std::uint32_t refused_births = 0;  ///< in this sample, for want of a free slot
   std::uint32_t delayed_births = 0;  ///< in this sample, for the limit on cones
-  std::uint32_t refused_since_mark = 0;
+  std::uint32_t used = 0;            ///< fields of the bins that there are, where these are chosen anew
   // Since the beginning:
   std::uint64_t born = 0, refreshed = 0;
 };

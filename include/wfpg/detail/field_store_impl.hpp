@@ -16,12 +16,38 @@ struct forget_wave {
   }
 };
 
-/// Where births were refused, bins are to be larger from the next marking on.
-struct adapt_pressure {
+/// Counts the fields that rays had after a sample.
+struct count_used {
+  array_view<const field_slot> slots;
+  std::uint32_t after;
   field_store_state* state;
+  WFPG_HD void operator()(std::size_t i) const {
+    if (slots[i].key != no_key && slots[i].last_used > after) atomic_add(&state->used, 1);
+  }
+};
+
+/// Bins become smaller or larger so that their fields fill the slots but for an eighth, which is for fields
+/// that are asked for seldom. After some samples fields have learnt what new ones would have to learn again:
+/// from then on bins only grow, and where births are refused.
+struct adapt_pressure {
+  static constexpr std::uint32_t settled = 16;  // sample
+  static constexpr std::uint32_t least = mark_threshold::pressure_unit / 4;
+  static constexpr std::uint32_t most = mark_threshold::pressure_unit << 15;
+
+  field_store_state* state;
+  std::uint64_t slots;
+  std::uint32_t sample;
+
   WFPG_HD void operator()(std::size_t) const {
-    if (state->refused_since_mark > 0) state->pressure = min(2 * state->pressure, 1u << 16);
-    state->refused_since_mark = 0;
+    const std::uint64_t asked = std::uint64_t(state->used) + state->refused_births + state->delayed_births;
+    const std::uint64_t now = state->pressure;
+    std::uint64_t next = now;
+    if (sample <= settled)
+      next = clamp(now * asked / max<std::uint64_t>(slots - slots / 8, 1), now / 2, 2 * now);
+    else if (state->refused_births > 0)
+      next = now + now / 4;
+    state->pressure = static_cast<std::uint32_t>(clamp<std::uint64_t>(next, least, most));
+    state->used = 0;
   }
 };
 
@@ -106,7 +132,10 @@ void field_store<Exec>::end_sample(const Exec& exec) {
   const bool is_power_of_two = (sample_ & (sample_ - 1)) == 0;
   if (sample_ == 0 || !is_power_of_two) return;
   expect_builds(turns);
-  exec.for_each(1, detail::adapt_pressure{state_.data()});
+  if (sample_ > 1) {  // in the first, bins are as large as they may be
+    exec.for_each(capacity_, detail::count_used{slots_.view(), sample_ / 2, state_.data()});
+    exec.for_each(1, detail::adapt_pressure{state_.data(), capacity_, sample_});
+  }
   marks_.mark(exec, counted_samples_, capacity_, &state_.data()->pressure);
 }
 

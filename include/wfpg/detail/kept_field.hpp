@@ -30,7 +30,7 @@ struct kept_fields_view {
   resident_field* fields;
   std::uint32_t* words;
   cone_hit* hits;
-  learnt_mean* learnt;  // null: fields do not learn
+  rough_mean* learnt;  // null: fields do not learn
   float cone_samples;
   std::uint32_t resolution;
   std::uint32_t recast;
@@ -98,7 +98,7 @@ struct kept_field_builder {
     const float seen = kept.hits[cell].radiance(wave.cache);
     if (!kept.learnt) return seen;
     if (whole) kept.learnt[cell] = {};
-    return kept.learnt[cell].mixed_with(seen, kept.cone_samples);
+    return mixed_with(kept.learnt[cell], seen, kept.cone_samples);
   }
 
   WFPG_HD void count(bool whole) const {

@@ -29,7 +29,8 @@ struct saved_slot {
   std::uint32_t index = 0;
   field_slot slot;
   resident_field field;
-  std::vector<std::uint32_t> words, hits, learnt;  // learnt: empty where fields do not learn
+  std::vector<std::uint32_t> words, hits;
+  std::vector<std::uint16_t> learnt;  // empty where fields do not learn
 };
 
 /// Whether words are a summed-area table with weight.
@@ -90,7 +91,6 @@ struct store_state {
     bytes.put(state.pressure);
     bytes.put(state.refused_births);
     bytes.put(state.delayed_births);
-    bytes.put(state.refused_since_mark);
     bytes.put(state.born);
     bytes.put(state.refreshed);
     bytes.put(std::uint32_t(store.learns()));
@@ -107,8 +107,8 @@ struct store_state {
     state.pressure = bytes.get<std::uint32_t>();
     state.refused_births = bytes.get<std::uint32_t>();
     state.delayed_births = bytes.get<std::uint32_t>();
-    state.refused_since_mark = bytes.get<std::uint32_t>();
-    bytes.require(state.pressure >= 2 && state.pressure <= 1u << 16, "has a pressure out of range");
+    bytes.require(state.pressure >= adapt_pressure::least && state.pressure <= adapt_pressure::most,
+                  "has a pressure out of range");
     state.born = bytes.get<std::uint64_t>();
     state.refreshed = bytes.get<std::uint64_t>();
     const bool learnt = bytes.get<std::uint32_t>() != 0;
@@ -132,12 +132,12 @@ struct store_state {
   }
 
  private:
-  static_assert(sizeof(cone_hit) == 4 && sizeof(learnt_mean) == 4, "files hold them as words");
+  static_assert(sizeof(cone_hit) == 4 && sizeof(rough_mean) == 2, "files hold them as words");
 
-  template <class Exec, class T>
+  template <class Word, class Exec, class T>
   static void put_cells(const Exec& exec, const buffer<T, Exec>& of_all, std::size_t cells, std::size_t slot,
                         section_writer& bytes) {
-    std::vector<std::uint32_t> words(cells);
+    std::vector<Word> words(cells);
     exec.copy_to_host(words.data(), of_all.data() + slot * cells, cells * sizeof(T));
     bytes.put_all(words);
   }
@@ -154,9 +154,9 @@ struct store_state {
     bytes.put(field.normal);
     bytes.put(field.fraction);
     if (!(field.fraction > 0.0f)) return;
-    put_cells(exec, store.words_, store.cells_a_field(), i, bytes);
-    put_cells(exec, store.hits_, store.cells_a_field(), i, bytes);
-    if (store.learns()) put_cells(exec, store.learnt_, store.cells_a_field(), i, bytes);
+    put_cells<std::uint32_t>(exec, store.words_, store.cells_a_field(), i, bytes);
+    put_cells<std::uint32_t>(exec, store.hits_, store.cells_a_field(), i, bytes);
+    if (store.learns()) put_cells<std::uint16_t>(exec, store.learnt_, store.cells_a_field(), i, bytes);
   }
 
   /// The next slot in use, `first` or one after it.
@@ -178,7 +178,7 @@ struct store_state {
     const std::size_t cells = store.cells_a_field();
     s.words = bytes.get_all<std::uint32_t>(cells);
     s.hits = bytes.get_all<std::uint32_t>(cells);
-    if (learnt) s.learnt = bytes.get_all<std::uint32_t>(cells);
+    if (learnt) s.learnt = bytes.get_all<std::uint16_t>(cells);
     check_cells(bytes, s, store.options_.resolution, store.tree_.node_count());
     return s;
   }
@@ -203,11 +203,6 @@ struct store_state {
       std::memcpy(static_cast<void*>(&hit), &word, sizeof word);
       bytes.require(hit.is_sound(nodes), "has a cone that hit no node");
     }
-    for (const std::uint32_t word : s.learnt) {
-      learnt_mean mean;
-      std::memcpy(static_cast<void*>(&mean), &word, sizeof word);
-      bytes.require(mean.is_up_to(1.0e30f), "has learnt radiance out of range");  // values are no more
-    }
   }
 
   template <class Exec>
@@ -217,9 +212,9 @@ struct store_state {
     exec.copy_from_host(store.words_.data() + first, s.words.data(), bytes);
     exec.copy_from_host(store.hits_.data() + first, s.hits.data(), bytes);
     if (!store.learns()) return;
-    const std::vector<std::uint32_t> nothing(s.words.size(), 0);
+    const std::vector<std::uint16_t> nothing(s.words.size(), 0);
     exec.copy_from_host(store.learnt_.data() + first, s.learnt.empty() ? nothing.data() : s.learnt.data(),
-                        bytes);
+                        nothing.size() * sizeof(std::uint16_t));
   }
 };
 

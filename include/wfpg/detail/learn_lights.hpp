@@ -107,7 +107,7 @@ struct choose_light_groups {
 
   WFPG_HD float estimate(std::size_t row, std::size_t above, std::uint32_t g, float scale) const {
     if (!(scale > 0.0f)) return prior(above, g);
-    return means[row * rows.groups + g].mixed_with(scale * prior(above, g), parent_weight);
+    return mixed_with(means[row * rows.groups + g], scale * prior(above, g), parent_weight);
   }
   /// `above`: the parent's row.
   WFPG_HD float prior(std::size_t above, std::uint32_t g) const {

@@ -3,7 +3,7 @@
 // surface in, what a mirror shows, an emitter smaller than a voxel. That fields learn is wfpg's own; that
 // they are means of radiance by direction is as in Mueller et al., "Practical Path Guiding" (2017).
 //
-// Memory: 4 bytes a cell; in a sample 16 a cell and 8 a value.
+// Memory: 2 bytes a cell; in a sample 16 a cell and 8 a value.
 #pragma once
 
 #include <wfpg/detail/field_slots.hpp>
@@ -74,9 +74,9 @@ namespace detail {
 struct fold_learnt {
   array_view<field_slot> slots;
   std::uint32_t sample;
-  std::uint32_t cells;  // of a field
+  std::uint32_t cells;  // of a field; all together fewer than 2³²
   value_queue_view queue;
-  learnt_mean* means;
+  rough_mean* means;
 
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t slot) const {
@@ -86,7 +86,7 @@ struct fold_learnt {
       const std::size_t cell = first + static_cast<std::size_t>(i);
       double sum;
       const std::uint32_t n = queue.take(cell, sum);
-      if (n > 0) means[cell].add(sum, n);
+      if (n > 0) means[cell].add(sum, n, hash32(sample, static_cast<std::uint32_t>(cell)));
     });
   }
 };
