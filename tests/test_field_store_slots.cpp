@@ -212,6 +212,62 @@ WFPG_TEST_CASE(
   CHECK(box.counts().live == 2);
 }
 
+/// A sample of waves of rays from all walls, denser the nearer to a corner: no two nodes get as many.
+template <class Exec>
+void sample_of_waves(kept_box<Exec>& box, std::uint64_t waves) {
+  box.begin();
+  for (std::uint64_t wave = 0; wave < waves; ++wave) {
+    const std::uint64_t seed = 100 * box.sample + wave;
+    random_numbers random(seed);
+    std::vector<test_surface> rays;
+    for (const test_surface& s : wall_surfaces(4000, seed))
+      if (rays.size() < kept_box<Exec>::max_rays && random.unit() < 0.1f / (0.1f + glm::length(s.position)))
+        rays.push_back(s);
+    box.prepare(rays);
+  }
+  box.end();
+}
+
+WFPG_TEST_CASE("field store: bins are as small as there are slots for, and stay once fields have learnt",
+               "[field_store]") {
+  for (const std::size_t slots : {110u, 180u}) {
+    kept_box<Exec> box(slots_of(4, slots));
+    INFO(slots << " slots");
+    while (box.sample < 16) sample_of_waves(box, 8);
+    const std::uint32_t settled = box.state().pressure;
+    while (box.sample < 33) sample_of_waves(box, 2);
+    const double live = box.counts().live / static_cast<double>(slots);
+    CHECK(live > 0.8);
+    CHECK(live <= 1.0);
+    CHECK(box.state().pressure == settled);
+  }
+}
+
+TEST_CASE("field store: how many times as many rays as fit the room bins are to have", "[field_store]") {
+  using wfpg::detail::adapt_pressure;
+  const auto next = [](std::uint32_t sample, std::uint32_t slots, std::uint32_t used, std::uint32_t refused,
+                       std::uint32_t pressure) {
+    wfpg::detail::field_store_state state;
+    state.pressure = pressure;
+    state.used = used;
+    state.refused_births = refused;
+    adapt_pressure{&state, slots, sample}(0);
+    CHECK(state.used == 0);
+    return state.pressure;
+  };
+  CHECK(next(8, 800, 700, 0, 128) == 128);  // an eighth is free
+  CHECK(next(2, 800, 525, 0, 128) == 96);
+  CHECK(next(8, 800, 800, 75, 128) == 160);
+  CHECK(next(4, 800, 100, 0, 128) == 64);
+  CHECK(next(4, 800, 800, 5000, 128) == 256);
+  CHECK(next(16, 800, 100, 0, 128) == 128);  // fields have learnt
+  CHECK(next(16, 800, 800, 75, 128) == 160);
+  CHECK(next(256, 800, 800, 5000, 128) == 256);
+  CHECK(next(4, 0, 0, 0, 128) == 64);
+  CHECK(next(4, 800, 0, 0, adapt_pressure::least) == adapt_pressure::least);
+  CHECK(next(64, 800, 800, 1, adapt_pressure::most) == adapt_pressure::most);
+}
+
 WFPG_TEST_CASE("field store: levels are chosen anew after samples 1, 2, 4, 8, ...", "[field_store]") {
   kept_box<Exec> box(slots_of(4, 100));
   const auto few = rays_at(floor_place(0), up, 2), many = rays_at(floor_place(0), up, 1000);

@@ -86,7 +86,9 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
     const std::uint32_t at = index(position);
     if (at == none) return {};
     const std::uint32_t above = transmits ? normals_.size() : normals_.index(glm::normalize(normal));
-    return {records_ + at, rows_ + at, cosines_, above};
+    const detail::record_rows& known = rows_[at];
+    return {records_ + at, cosines_ + above,
+            known.normal == above ? known : detail::record_rows(records_[at], floor_, cosines_, above)};
   }
 
   /// The record of a place, in the policy's memory; null where there is no surface.
@@ -125,6 +127,7 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
   const irradiance_record* records_ = nullptr;
   const detail::record_rows* rows_ = nullptr;  // a record: above its voxels' normal
   const voxel_tag* tags_ = nullptr;
+  float floor_ = 0.0f;
   float fraction_ = 0.0f;
 };
 

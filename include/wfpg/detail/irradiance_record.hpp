@@ -148,13 +148,11 @@ struct tabulate_cell_cosines {
   }
 };
 
-/// Weights of a record's rows above one normal, by its number in a table of cosines. All zero: those of a
-/// record without light.
+/// Weights of a record's rows above one normal. All zero: those of a record without light.
 struct alignas(16) record_rows {
-  std::uint32_t total = 0;  ///< of the weights
-  std::uint32_t base = 0;   ///< of each direction, before its cosine; the same above all normals
-  std::uint32_t normal = 0;
   std::uint32_t weights[irradiance_record::rows] = {};
+  std::uint32_t base = 0;    ///< of each direction, before its cosine
+  std::uint32_t normal = 0;  ///< whose cosines these are, by its number in a table
 
   static constexpr std::uint32_t counter_scale = 1024;
 
@@ -163,14 +161,14 @@ struct alignas(16) record_rows {
   WFPG_HD record_rows(const irradiance_record& record, float floor, const cell_cosines* table,
                       std::uint32_t normal)
       : base(base_of(record, floor)), normal(normal) {
-    for (std::uint32_t row = 0; row < irradiance_record::rows; ++row) {
-      weights[row] = weight(record, table[normal], base, row);
-      total += weights[row];
-    }
+    const cell_cosines& cosines = table[normal];
+    for (std::uint32_t row = 0; row < irradiance_record::rows; ++row)
+      weights[row] = cosines.dot(record.words[row], row) * counter_scale + base * cosines.sum(row);
   }
-  WFPG_HD static std::uint32_t weight(const irradiance_record& record, const cell_cosines& cosines,
-                                      std::uint32_t base, std::uint32_t row) {
-    return cosines.dot(record.words[row], row) * counter_scale + base * cosines.sum(row);
+  WFPG_HD std::uint32_t total() const {
+    std::uint32_t result = 0;
+    for (const std::uint32_t weight : weights) result += weight;
+    return result;
   }
 
  private:
@@ -191,18 +189,10 @@ struct alignas(16) record_rows {
 class record_distribution {
  public:
   record_distribution() = default;
-  /// The record times cosines, the `normal`-th of a table. `rows` are the record's, above that normal or
-  /// another one.
-  WFPG_HD record_distribution(const irradiance_record* record, const record_rows* rows,
-                              const cell_cosines* table, std::uint32_t normal)
-      : record_(record), cosines_(table + normal), base_(rows->base) {
-    if (rows->normal == normal) {
-      rows_ = rows;
-      total_ = rows->total;
-      return;
-    }
-    for (std::uint32_t row = 0; row < irradiance_record::rows; ++row) total_ += row_weight(row);
-  }
+  /// The record times cosines, those that the rows' weights are made with.
+  WFPG_HD record_distribution(const irradiance_record* record, const cell_cosines* cosines,
+                              const record_rows& rows)
+      : record_(record), cosines_(cosines), rows_(rows), total_(rows.total()) {}
 
   WFPG_HD bool empty() const { return total_ == 0; }
   /// It knows of no lobe but the diffuse one.
@@ -212,9 +202,7 @@ class record_distribution {
   WFPG_HD vec3 sample(vec2 u, float& density) const {
     const auto scaled = static_cast<std::uint64_t>(u.x * 0x1p24f) * total_;
     auto target = static_cast<std::uint32_t>(scaled >> 24);
-    const auto row =
-        rows_ ? find<irradiance_record::rows>(target, [&](std::uint32_t r) { return rows_->weights[r]; })
-              : find<irradiance_record::rows>(target, [&](std::uint32_t r) { return row_weight(r); });
+    const auto row = find<irradiance_record::rows>(target, [&](std::uint32_t r) { return rows_.weights[r]; });
     const auto group =
         find<cell_cosines::groups>(target, [&](std::uint32_t g) { return group_weight(row, g); });
     const auto cell_in_group = [&](std::uint32_t k) {
@@ -235,14 +223,11 @@ class record_distribution {
   static constexpr std::uint32_t cells_a_group = irradiance_record::columns / cell_cosines::groups;
 
   WFPG_HD std::uint32_t weight(std::uint32_t cell) const {
-    return (record_->counter(cell) * record_rows::counter_scale + base_) * (*cosines_)(cell);
-  }
-  WFPG_HD std::uint32_t row_weight(std::uint32_t row) const {
-    return record_rows::weight(*record_, *cosines_, base_, row);
+    return (record_->counter(cell) * record_rows::counter_scale + rows_.base) * (*cosines_)(cell);
   }
   WFPG_HD std::uint32_t group_weight(std::uint32_t row, std::uint32_t group) const {
     return cosines_->dot(record_->words[row], row, group) * record_rows::counter_scale +
-           base_ * cosines_->sum(row, group);
+           rows_.base * cosines_->sum(row, group);
   }
   /// Which of n weights a target lies in; what is before it is taken off. Precondition: it lies in one.
   template <std::uint32_t n, class Weight>
@@ -264,8 +249,8 @@ class record_distribution {
 
   const irradiance_record* record_ = nullptr;
   const cell_cosines* cosines_ = nullptr;
-  const record_rows* rows_ = nullptr;  // above the same normal; null: there are none
-  std::uint32_t base_ = 0, total_ = 0;
+  record_rows rows_;
+  std::uint32_t total_ = 0;
 };
 
 /// Radiances of a record's cells to its counters.

@@ -104,7 +104,7 @@ struct sum_rows {
     const vec3 normal = unpack_voxel_normal(normals[i]);
     const record_rows ahead(records[i], floor, cosines, lattice.index(normal));
     const record_rows behind(records[i], floor, cosines, lattice.index(-normal));
-    rows[i] = ahead.total < behind.total ? behind : ahead;
+    rows[i] = ahead.total() < behind.total() ? behind : ahead;
   }
 };
 
@@ -166,6 +166,7 @@ irradiance_records<Exec, Smooth>::irradiance_records(const Exec& exec, const Exe
   view_.records_ = records_.data();
   view_.rows_ = rows_.data();
   view_.tags_ = tags_.data();
+  view_.floor_ = options_.floor;
   statistics_.records = static_cast<std::uint32_t>(records_.size());
   statistics_.objects = tree.leaf_count();
 }
