@@ -251,6 +251,7 @@ TEST_CASE("field store: how many times as many rays as fit the room bins are to 
     state.pressure = pressure;
     state.used = used;
     state.refused_births = refused;
+    state.waiting = refused;
     adapt_pressure{&state, slots, sample}(0);
     CHECK(state.used == 0);
     return state.pressure;
@@ -263,8 +264,10 @@ TEST_CASE("field store: how many times as many rays as fit the room bins are to 
   CHECK(next(16, 800, 100, 0, 128) == 128);  // fields have learnt
   CHECK(next(16, 800, 800, 75, 128) == 160);
   CHECK(next(256, 800, 800, 5000, 128) == 256);
-  CHECK(next(4, 0, 0, 0, 128) == 64);
-  CHECK(next(4, 800, 0, 0, adapt_pressure::least) == adapt_pressure::least);
+  CHECK(next(16, 800, 100, 5, 128) == 128);
+  CHECK(next(4, 800, 0, 0, 128) == 128);  // nothing was guided
+  CHECK(next(4, 0, 0, 9, 128) == 256);
+  CHECK(next(4, 800, 1, 0, adapt_pressure::least) == adapt_pressure::least);
   CHECK(next(64, 800, 800, 1, adapt_pressure::most) == adapt_pressure::most);
 }
 

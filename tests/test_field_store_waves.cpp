@@ -103,16 +103,33 @@ WFPG_TEST_CASE("field store: a limit on cones is shared evenly, however large th
 }
 
 WFPG_TEST_CASE("field store: a limit on cones makes no bins larger", "[field_store]") {
-  kept_field_options options = slots_of(4, 2000);
+  kept_field_options options = slots_of(4, 160);
   options.max_wave_cones = 16;
   kept_box<Exec> box(options);
+  std::uint32_t delayed = 0;
   for (int sample = 0; sample < 4; ++sample) {
     box.begin();
-    box.prepare(floor_rays(16));
+    for (int wave = 0; wave < 8; ++wave) box.prepare(wall_surfaces(600, 1));
+    delayed += box.state().delayed_births;
+    box.end();
+    CHECK(box.state().pressure <= wfpg::detail::field_store_state().pressure);
+  }
+  CHECK(box.counts().live == 4 * 8);
+  CHECK(delayed > 160 * 4);
+}
+
+WFPG_TEST_CASE("field store: samples that only count rays leave bins to those that guide", "[field_store]") {
+  kept_box<Exec> box(slots_of(4, 160));
+  const auto surfaces = wall_surfaces(600, 1);
+  const wfpg::buffer<test_surface, Exec> stored(box.exec(), surfaces);
+  const wfpg::detail::wave_rays<stored_surfaces> rays{{const_view<test_surface>(stored)},
+                                                      wfpg::guiding_mode::oriented};
+  while (box.sample < 8) {
+    box.begin();
+    box.store.count(box.exec(), surfaces.size(), rays);
     box.end();
   }
-  CHECK(box.counts().live == 4);
-  CHECK(box.state().pressure <= wfpg::detail::field_store_state().pressure);
+  CHECK(box.state().pressure == wfpg::detail::field_store_state().pressure);
 }
 
 WFPG_TEST_CASE("field store: fields that may see what moved are cast anew, the others refreshed",

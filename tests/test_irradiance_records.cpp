@@ -228,6 +228,45 @@ WFPG_TEST_CASE("irradiance records: tags of a box with a wall across it and a la
   CHECK(found.rays == (1u << 18) + 2048);
 }
 
+struct has_record {
+  wfpg::irradiance_records_view view;
+  WFPG_HD bool operator()(vec3 p) const { return view.record(p) != nullptr; }
+};
+
+WFPG_TEST_CASE("irradiance records: of places in nodes that hold surface, or in a voxel beside one",
+               "[records]") {
+  const Exec exec;
+  const lit_mesh<Exec> mesh(exec, ceiling_lamp(0.1f, 0.4f, 0.3f, 0.7f, 3.0f), true);
+  for (const std::uint32_t level : {2u, 3u, 4u}) {
+    irradiance_records_options options = records_options();
+    options.record_level = level;
+    const records_guider<Exec> guider(exec, mesh.scene(), options);
+    const std::vector<vec3> places = voxel_centres(guider.guide().octree().view().grid());
+    const auto tags = evaluate(exec, places, tag_at{guider.guide().view()});
+    const auto found = evaluate(exec, places, has_record{guider.guide().view()});
+    const int side = 16, node = side >> level;
+    const auto surface = [&](int lower_x, int lower_y, int lower_z, int size) {
+      for (int z = std::max(lower_z, 0); z < std::min(lower_z + size, side); ++z)
+        for (int y = std::max(lower_y, 0); y < std::min(lower_y + size, side); ++y)
+          for (int x = std::max(lower_x, 0); x < std::min(lower_x + size, side); ++x)
+            if (tags[static_cast<std::size_t>((z * side + y) * side + x)] != voxel_tag::empty) return true;
+      return false;
+    };
+    int wrong = 0, with = 0;
+    for (int i = 0; i < side * side * side; ++i) {
+      const int x = i % side, y = i / side % side, z = i / (side * side);
+      const bool expected =
+          surface(x / node * node, y / node * node, z / node * node, node) || surface(x - 1, y - 1, z - 1, 3);
+      wrong += found[static_cast<std::size_t>(i)] != expected ? 1 : 0;
+      with += expected ? 1 : 0;
+    }
+    INFO("level " << level);
+    CHECK(wrong == 0);
+    CHECK(with > 1000);
+    CHECK(with < side * side * side);
+  }
+}
+
 WFPG_TEST_CASE("irradiance records: built once, before the first guided direction, and when light moved",
                "[records]") {
   const Exec exec;

@@ -66,7 +66,8 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
  public:
   irradiance_records_view() = default;
 
-  /// Whether a surface is guided: it lies in a node that has a record. Without it is its BSDF's.
+  /// Whether a surface is guided: it lies in a node that has a record, or in a voxel beside one. Without it
+  /// is its BSDF's.
   template <class Bsdf>
   WFPG_HD bool guides(const surface<Bsdf>& s) const {
     return fraction_ > 0.0f && detail::can_be_guided(s) && record(s.position) != nullptr;
@@ -91,7 +92,7 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
             known.normal == above ? known : detail::record_rows(records_[at], floor_, cosines_, above)};
   }
 
-  /// The record of a place, in the policy's memory; null where there is no surface.
+  /// The record of a place, in the policy's memory; null far from all surface.
   WFPG_HD const irradiance_record* record(vec3 position) const {
     const std::uint32_t at = index(position);
     return at == none ? nullptr : records_ + at;

@@ -150,7 +150,8 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(d::sum_counts{tree, {}});
   launch(d::fill_top{});
   launch(d::fill_steps{});
-  launch(d::adapt_pressure{state});
+  launch(d::count_used{{}, 0, state});
+  launch(d::adapt_pressure{state, 0, 0});
 
   // Choices of lights.
   launch(d::fold_light_values{});

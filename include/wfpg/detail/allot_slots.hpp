@@ -64,6 +64,7 @@ struct bear_fields {
     state->taken += born;
     state->born += born;
     state->refused_births += refused;
+    state->waiting = max(state->waiting, asked - born);
     state->delayed_births += asked - refused - born;
   }
 };
@@ -165,7 +166,7 @@ struct index_slots {
     const std::size_t n = slots.slots.size();
     if (i == 0) {
       state->free = n > 0 ? free_through[n - 1] : 0;
-      state->refused_births = state->delayed_births = 0;
+      state->refused_births = state->delayed_births = state->waiting = 0;
       state->taken = 0;
     }
     if (i >= n) return;

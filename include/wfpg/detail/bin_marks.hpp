@@ -70,8 +70,8 @@ struct mark_threshold {
   std::uint32_t rays_per_bin;
   std::uint32_t samples;
   std::uint64_t room;  // bins
-  const std::uint32_t*
-      pressure;  // how many times as many rays a bin is to have as fit the room, on the device
+  // How many times as many rays a bin is to have as fit the room; on the device.
+  const std::uint32_t* pressure;
 
   WFPG_HD std::uint64_t operator()(std::uint32_t rays) const {
     const std::uint64_t wanted = (std::uint64_t(rays_per_bin) * samples + 1) / 2;

@@ -81,6 +81,7 @@ struct field_store_state {
   std::uint32_t taken = 0;           ///< of that list
   std::uint32_t refused_births = 0;  ///< in this sample, for want of a free slot
   std::uint32_t delayed_births = 0;  ///< in this sample, for the limit on cones
+  std::uint32_t waiting = 0;         ///< fields that one wave of this sample asked for in vain, at most
   std::uint32_t used = 0;            ///< fields of the bins that there are, where these are chosen anew
   // Since the beginning:
   std::uint64_t born = 0, refreshed = 0;

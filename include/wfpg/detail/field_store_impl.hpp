@@ -30,7 +30,7 @@ struct count_used {
 /// that are asked for seldom. After some samples fields have learnt what new ones would have to learn again:
 /// from then on bins only grow, where births are refused. There is always a sample after the last change to
 /// smaller ones to find out: where all nodes have as many rays, a little less pressure makes four times the
-/// bins.
+/// bins. Samples that ask for no field say nothing.
 struct adapt_pressure {
   static constexpr std::uint32_t settled = 16;  // sample
   static constexpr std::uint32_t least = mark_threshold::pressure_unit / 4;
@@ -41,12 +41,13 @@ struct adapt_pressure {
   std::uint32_t sample;
 
   WFPG_HD void operator()(std::size_t) const {
-    const std::uint64_t asked = std::uint64_t(state->used) + state->refused_births + state->delayed_births;
-    const std::uint64_t now = state->pressure;
-    if (sample < settled || state->refused_births > 0) {
+    const std::uint64_t asked = std::uint64_t(state->used) + state->waiting, now = state->pressure;
+    const bool shrinks = sample < settled;
+    if (asked > 0 && (shrinks || state->refused_births > 0)) {
       const std::uint64_t next = now * asked / max<std::uint64_t>(slots - slots / 8, 1);
+      const std::uint64_t low = shrinks ? now / 2 : now;
       state->pressure = static_cast<std::uint32_t>(
-          clamp(clamp(next, now / 2, 2 * now), std::uint64_t(least), std::uint64_t(most)));
+          clamp(clamp(next, low, 2 * now), std::uint64_t(least), std::uint64_t(most)));
     }
     state->used = 0;
   }

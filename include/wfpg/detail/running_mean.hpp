@@ -35,9 +35,9 @@ class learnt_mean {
   std::uint32_t word_ = 0;
 };
 
-/// The same in 2 bytes: of the mean 5 bits below the leading one, from 2⁻⁶³ up to 2⁶⁴, and one of 16 counts.
-/// What lies between two that there are becomes either at random, so that rounding has no effect on
-/// expectations however often it happens.
+/// The same in 2 bytes: of the mean 5 bits below the leading one, from about 2⁻⁶⁴ up to 2⁶⁴, and one of 16
+/// counts. What lies between two that there are becomes either at random, so that in that range rounding does
+/// not shift means, however often it happens.
 class rough_mean {
  public:
   static constexpr std::uint32_t most = 192;  ///< values; from then on old ones fade
