@@ -17,7 +17,7 @@ DEFAULT = "wfpg"
 
 # What stands in plots, wfpg-render's arguments for a value, the values, the default, and arguments that go with all.
 OPTIONS = (
-    ("kept.budget_bytes, MiB", "--field-budget {}MiB", (1, 4, 16, 32, 64), 32, ""),
+    ("kept.budget_bytes, MiB", "--field-budget {}MiB", (1, 4, 16, 24, 32, 64), 24, ""),
     ("kept.resolution", "--slot-resolution {}", (12, 16, 24, 32), 24, ""),
     ("octree_resolution", "--octree-resolution {}", (32, 64, 128, 256), 128, ""),
     ("rays_per_bin", "--rays-per-bin {}", (16, 64, 256, 1024), 64, ""),
