@@ -150,12 +150,19 @@ class path_recorder_view {
 
 /// In its place where a guide records no paths: the same calls, which cost nothing.
 struct no_path_recorder {
+  /// None.
   WFPG_HD std::size_t paths() const { return 0; }
+  /// None.
   WFPG_HD std::uint32_t max_depth() const { return 0; }
+  /// Forgotten.
   WFPG_HD void vertex(std::size_t, std::uint32_t, vec3, vec3, vec3) const {}
+  /// Forgotten.
   WFPG_HD void scatter(std::size_t, std::uint32_t, const sampled_direction&) const {}
+  /// Forgotten.
   WFPG_HD void escape(std::size_t, std::uint32_t, vec3) const {}
+  /// Forgotten.
   WFPG_HD void radiance(std::size_t, std::uint32_t, vec3) const {}
+  /// Forgotten.
   WFPG_HD void emission(std::size_t, std::uint32_t, vec3) const {}
 
   /// For kernels that are written for the other: one that forgets everything.
