@@ -62,6 +62,10 @@ class sparse_voxel_octree_view {
   WFPG_HD bool is_leaf(node_id node) const { return node >= first_leaf(); }
   /// The first node of a level, 0 <= level <= depth() + 1; one past the last of the level before it.
   WFPG_HD node_id level_begin(std::uint32_t level) const { return level_begin_[level]; }
+  /// Nodes of a level, 0 <= level <= depth().
+  WFPG_HD std::uint32_t level_size(std::uint32_t level) const {
+    return level_begin_[level + 1] - level_begin_[level];
+  }
 
   /// The level of a node. O(depth).
   WFPG_HD std::uint32_t level_of(node_id node) const {
@@ -181,8 +185,7 @@ class sparse_voxel_octree_view {
   /// Whose step of a level descend() found.
   WFPG_HD node_id node_of_step(std::uint32_t at, std::uint32_t level) const {
     if (level == depth_) return at;
-    for (std::uint32_t above = top_level_; above < level; above += 2)
-      at -= level_begin_[above + 1] - level_begin_[above];
+    for (std::uint32_t above = top_level_; above < level; above += 2) at -= level_size(above);
     return level_begin_[level] + at;
   }
   WFPG_HD std::uint32_t octant_of(node_id node, node_id up) const {
@@ -276,9 +279,6 @@ class sparse_voxel_octree {
   void allocate(const Exec& exec);
   void build_descents(const Exec& exec, const buffer<morton_code, Exec>& leaf_codes,
                       const buffer<std::uint32_t, Exec>& first_leaf_of);
-  std::uint32_t level_size(std::uint32_t level) const {
-    return view_.level_begin_[level + 1] - view_.level_begin_[level];
-  }
 
   buffer<node_id, Exec> parents_;
   buffer<node_id, Exec> first_children_;

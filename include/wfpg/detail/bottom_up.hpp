@@ -25,7 +25,7 @@ struct visit_levels {
   WFPG_HD void operator()(Block& block, std::size_t) const {
     for (std::uint32_t level = end; level-- > least;) {
       const node_id first = tree.level_begin(level);
-      block.for_each(static_cast<int>(tree.level_begin(level + 1) - first),
+      block.for_each(static_cast<int>(tree.level_size(level)),
                      [&](int i) { f(first + static_cast<node_id>(i)); });
       block.sync();
     }
@@ -38,9 +38,8 @@ void for_each_bottom_up(const Exec& exec, const sparse_voxel_octree_view& tree, 
                         const F& f) {
   constexpr std::uint32_t few = 512;
   std::uint32_t end = tree.depth();
-  for (; end > least && tree.level_begin(end) - tree.level_begin(end - 1) > few; --end)
-    exec.for_each(tree.level_begin(end) - tree.level_begin(end - 1),
-                  visit_level<F>{f, tree.level_begin(end - 1)});
+  for (; end > least && tree.level_size(end - 1) > few; --end)
+    exec.for_each(tree.level_size(end - 1), visit_level<F>{f, tree.level_begin(end - 1)});
   if (end > least && !tree.empty()) exec.for_each_block(1, 0, visit_levels<F>{f, tree, least, end});
 }
 

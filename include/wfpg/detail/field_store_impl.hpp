@@ -16,13 +16,13 @@ struct forget_wave {
   }
 };
 
-/// Counts the fields that rays had after a sample.
+/// Counts the fields that rays had after a sample; free slots were never used.
 struct count_used {
   array_view<const field_slot> slots;
   std::uint32_t after;
   field_store_state* state;
   WFPG_HD void operator()(std::size_t i) const {
-    if (slots[i].key != no_key && slots[i].last_used > after) atomic_add(&state->used, 1);
+    if (slots[i].last_used > after) atomic_add(&state->used, 1);
   }
 };
 

@@ -148,8 +148,7 @@ irradiance_records<Exec, Smooth>::irradiance_records(const Exec& exec, const Exe
   const sparse_voxel_octree_view tree = octree_.view();
   view_.tree_ = tree;
   view_.level_ = detail::min(options_.record_level, tree.depth());
-  records_ = buffer<irradiance_record, Exec>(
-      exec, tree.level_begin(view_.level_ + 1) - tree.level_begin(view_.level_));
+  records_ = buffer<irradiance_record, Exec>(exec, tree.level_size(view_.level_));
   rows_ = buffer<detail::record_rows, Exec>(exec, records_.size());
   detail::build_voxel_normals(working, octree_, fragments, normals_.view(), swapped_.view());
   const float voxel = tree.grid().voxel_size();

@@ -261,7 +261,7 @@ void sparse_voxel_octree<Exec>::allocate(const Exec& exec) {
   std::uint32_t& top = view_.top_level_ = view_.depth_ % 2;
   while (top + 2 < view_.depth_ && (4ull << 3 * (top + 2)) <= view_.node_count()) top += 2;
   std::uint32_t steps = 0;
-  for (std::uint32_t level = top; level < view_.depth_; level += 2) steps += level_size(level);
+  for (std::uint32_t level = top; level < view_.depth_; level += 2) steps += view_.level_size(level);
   top_ = buffer<std::uint32_t, Exec>(exec, std::size_t(1) << 3 * top);
   steps_ = buffer<detail::two_levels, Exec>(exec, steps);
   view_.top_ = top_.data();
@@ -274,11 +274,12 @@ void sparse_voxel_octree<Exec>::build_descents(const Exec& exec, const buffer<mo
                                                const buffer<std::uint32_t, Exec>& first_leaf_of) {
   const std::uint32_t top = view_.top_level_;
   ::thrust::fill_n(exec.thrust(), top_.data(), top_.size(), invalid_node);
-  exec.for_each(level_size(top), detail::fill_top{leaf_codes.view(), first_leaf_of.data(),
-                                                  view_.level_begin_[top], top, view_.depth_, top_.data()});
+  exec.for_each(view_.level_size(top),
+                detail::fill_top{leaf_codes.view(), first_leaf_of.data(), view_.level_begin_[top], top,
+                                 view_.depth_, top_.data()});
   std::uint32_t begin = 0;
   for (std::uint32_t level = top; level < view_.depth_; level += 2) {
-    const std::uint32_t end = begin + level_size(level);
+    const std::uint32_t end = begin + view_.level_size(level);
     exec.for_each(end - begin, detail::fill_steps{view_, level, end, steps_.data() + begin});
     begin = end;
   }
