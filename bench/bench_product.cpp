@@ -39,7 +39,8 @@ vec2 random_vec2(std::uint64_t stream, std::uint64_t i) {
 // A field over the hemisphere above `up`, bright in a few places, and rays that meet surfaces of one material
 // and many normals: branches taken for one ray say little about the next.
 struct workload {
-  std::vector<std::uint32_t> sums = std::vector<std::uint32_t>(field_resolution * field_resolution);
+  std::vector<std::uint32_t> sums =
+      std::vector<std::uint32_t>(wfpg::grid_distribution::words(field_resolution));
   std::vector<wfpg::product_point> hemisphere = std::vector<wfpg::product_point>(block_count);
   std::vector<wfpg::product_point> sphere = std::vector<wfpg::product_point>(block_count);
   wfpg::directional_field field;

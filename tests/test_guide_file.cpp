@@ -340,12 +340,14 @@ TEST_CASE("what is in a guide file is checked, whatever its checksums say", "[gu
   refused("fields", slot + 32, 4, 0x40000000u, "has a fraction out of range");
   refused("fields", slot + 32, 4, 0, "has a field without cells");
   refused("fields", cells, 4, 0xffffffffu, "has a field that is no distribution");
-  refused("fields", cells + 64, 4, 2 * nodes, "has a cone that hit no node");
+  refused("fields", cells + 64, 4, 0xffffffffu,
+          "has a field that is no distribution");  // the first row's sum
+  refused("fields", cells + 80, 4, 2 * nodes, "has a cone that hit no node");
   const std::string lit = saved(trained_with_lights(one_policy()));
   CHECK(fault(with_number(lit, "lights", 0, 4, 0xffffff01u), options_with_lights())
             .find("section lights has learnt light out of range") != std::string::npos);
   const std::string fields = payload_of(bytes, "fields");
-  const std::size_t one = 36 + 2 * 64 + 32;
+  const std::size_t one = 36 + 80 + 64 + 32;
   std::string twice = fields.substr(0, slot) + fields.substr(slot, one) + fields.substr(slot, one);
   CHECK(fault(with_payload(bytes, "fields", twice), options).find("slots out of order") != std::string::npos);
   set_number(twice, slot + one, 4, number_in(twice, slot, 4) + 1);

@@ -185,7 +185,7 @@ made_fields make_fields(const lit_box<Exec>& box, const std::vector<test_surface
   const wfpg::detail::bin_fields<stored_surfaces> fields{bins,       stored, box.cache.view(), {}, mode,
                                                          resolution, 42};
   const std::size_t n = wfpg::read_element(exec, bins.count);
-  const wfpg::buffer<std::uint32_t, Exec> words(exec, n * resolution * resolution);
+  const wfpg::buffer<std::uint32_t, Exec> words(exec, n * wfpg::grid_distribution::words(resolution));
   const wfpg::buffer<wfpg::resident_field, Exec> resident(exec, n);
   const wfpg::buffer<std::uint32_t, Exec> field_of_ray(
       exec, std::vector<std::uint32_t>(wave.size(), wfpg::no_field));
@@ -230,7 +230,8 @@ WFPG_TEST_CASE("radiance field: every ray gets a field, above its own horizon wh
       const wfpg::resident_field& f = made.fields[made.field_of_ray[ray]];
       hemispheres += f.hemisphere();
       CHECK(f.hemisphere() == (mode == guiding_mode::oriented && !wave[ray].bsdf.transmits()));
-      const wfpg::grid_distribution grid(made.words.data() + made.field_of_ray[ray] * 8 * 8, 8);
+      const wfpg::grid_distribution grid(
+          made.words.data() + made.field_of_ray[ray] * wfpg::grid_distribution::words(8), 8);
       if (!f.hemisphere()) continue;
       const directional_field field(grid, f.normal);
       for (std::uint32_t i = 0; i < 20; ++i) {

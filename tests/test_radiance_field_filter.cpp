@@ -31,9 +31,7 @@ template <class Exec>
 std::vector<double> finished(const std::vector<float>& values, std::uint32_t resolution, bool hemisphere,
                              const wfpg::field_options& options) {
   const Exec exec;
-  std::vector<std::uint32_t> host;
-  for (float value : values) host.push_back(wfpg::detail::float_bits(value));
-  const wfpg::buffer<std::uint32_t, Exec> words(exec, host);
+  const wfpg::buffer<std::uint32_t, Exec> words(exec, words_of(values, resolution));
   exec.for_each_block(1, wfpg::detail::field_scratch_bytes(resolution, Exec::warps_per_block),
                       finish_cells{words.data(), int(resolution), hemisphere, options});
   const std::vector<std::uint32_t> weights = cell_weights(exec, {words.data(), resolution});

@@ -119,8 +119,8 @@ struct learnt_scene::state {
     const wfpg::bins_view found = binner.bin(
         exec, hits.size(), wfpg::detail::wave_rays<hit_surfaces>{hit_surfaces{hits.data()}, told.mode});
     bins.assign(found.ray_keys.data(), found.ray_keys.data() + hits.size());
-    const std::size_t resolution = guider.field_resolution(0);
-    field_bytes = resolution * resolution * sizeof(std::uint32_t) + sizeof(wfpg::resident_field);
+    field_bytes = wfpg::grid_distribution::words(guider.field_resolution(0)) * sizeof(std::uint32_t) +
+                  sizeof(wfpg::resident_field);
   }
 
   exec_policy exec;

@@ -148,10 +148,9 @@ class field_store {
   /// Bytes of the budget that one slot takes at a resolution.
   static std::size_t bytes_a_slot(std::uint32_t resolution, bool learns = true) {
     const std::size_t cells = std::size_t(resolution) * resolution;
-    const std::size_t a_cell =
-        sizeof(detail::cone_hit) + sizeof(std::uint32_t) + (learns ? sizeof(detail::rough_mean) : 0);
+    const std::size_t a_cell = sizeof(detail::cone_hit) + (learns ? sizeof(detail::rough_mean) : 0);
     return a_cell * cells + sizeof(detail::field_slot) + sizeof(resident_field) +
-           words_a_slot * sizeof(std::uint32_t);
+           (grid_distribution::words(resolution) + words_a_slot) * sizeof(std::uint32_t);
   }
 
  private:
@@ -174,6 +173,7 @@ class field_store {
   bool learns() const { return learnt_.size() > 0; }
   bool limits_builds() const { return options_.max_wave_cones != detail::build_limits::none; }
   std::uint32_t cells_a_field() const { return options_.resolution * options_.resolution; }
+  std::uint32_t words_a_field() const { return grid_distribution::words(options_.resolution); }
   // Of the wave that is made, and of the one before or after it.
   detail::field_wave_counts* counts() { return counts_.data() + waves_ % 2; }
   detail::field_wave_counts* other_counts() const { return counts_.data() + (waves_ + 1) % 2; }

@@ -22,13 +22,13 @@ struct alignas(16) resident_field {
 /// Fields in memory: what each is, and its distribution.
 struct resident_fields {
   const resident_field* fields = nullptr;  ///< a field: what it is
-  const std::uint32_t* words = nullptr;    ///< F² each
+  const std::uint32_t* words = nullptr;    ///< of the distributions, one after the other
   std::uint32_t resolution = 0;            ///< F
   product_points points;                   ///< of this wave
 
   /// fields[i] and its distribution.
   WFPG_HD directional_field field(std::uint32_t i, const resident_field& info) const {
-    const grid_distribution grid(words + std::size_t(i) * resolution * resolution, resolution);
+    const grid_distribution grid(words + std::size_t(i) * grid_distribution::words(resolution), resolution);
     return info.hemisphere() ? directional_field(grid, info.normal) : directional_field(grid);
   }
 };

@@ -70,8 +70,8 @@ class path_guider {
                          array_view<sampled_direction> directions, const Queries& queries = {});
 
   /// The same in two steps: what the renderer's kernels sample from. `w.random` is not read. Holds until the
-  /// next call. Kept fields are only refreshed for it. Transient ones are made resident, in 4 F² bytes a
-  /// bin of the wave with most bins, and half more.
+  /// next call. Kept fields are only refreshed for it. Transient ones are made resident, in 4 (F² + F) bytes
+  /// a bin of the wave with most bins, and half more.
   template <class Surfaces, class Random, class Caster>
   view_type prepare(const wave<Surfaces, Random>& w, const Caster& caster);
 

@@ -70,7 +70,7 @@ class product_field {
   WFPG_HD vec3 sample(vec2 u, float& density) const {
     if (resolution_ == 0) return field_.sample(u, density);
     const auto drawn = detail::find_in_sums([this](std::uint32_t i) { return weights_[i]; },
-                                            resolution_ * resolution_, 0, u.x);
+                                            resolution_ * resolution_, 0, total(), u.x);
     std::uint32_t weight;
     const vec2 uv =
         field_.grid().sample(block(drawn.index), {detail::min(drawn.fraction, 1.0f - 0x1p-24f), u.y}, weight);

@@ -4,7 +4,7 @@
 // scratch while their bin's rays are served, or in memory that the caller gives; the work on cells does not
 // know which.
 //
-// Cost: F² cones and O(F²) a bin; 4 F² bytes of scratch a block and a few rows for the filter: at 128² and 16
+// Cost: F² cones and O(F²) a bin; 4 (F² + F) bytes of scratch a block and a few rows for the filter: at 128² and 16
 // warps 81 KiB, which small devices have and large ones twice.
 #pragma once
 
@@ -161,7 +161,7 @@ WFPG_HD vec3 off_surface(const surface<Bsdf>& s, const sparse_voxel_octree_view&
 ///   Surfaces  (std::uint32_t ray) -> surface<Bsdf>
 ///   Hits      (std::size_t bin, std::uint32_t i, const ray&, float solid_angle) -> ray_hit, of the i-th
 ///             cone in their order
-///   Sink      words(block&, bin) -> std::uint32_t*, room for F²;
+///   Sink      words(block&, bin) -> std::uint32_t*, room for a distribution;
 ///             finish(block&, bin, directional_field), by the whole block;
 ///             scratch_bytes(): what that takes
 template <class Surfaces>

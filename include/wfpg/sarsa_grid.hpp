@@ -53,8 +53,8 @@ class sarsa_grid_view : public mixture_view<sarsa_grid_view> {
   /// the radiance alone.
   WFPG_HD detail::sarsa_distribution distribution(vec3 position, vec3 normal, bool transmits) const {
     const std::uint32_t cell = cells_.index(position), n = resolution_ * resolution_;
-    const detail::sarsa_cell from{sums_ + std::size_t(cell) * n, weights_ + std::size_t(cell) * n,
-                                  resolution_};
+    const detail::sarsa_cell from{sums_ + std::size_t(cell) * grid_distribution::words(resolution_),
+                                  weights_ + std::size_t(cell) * n, resolution_};
     if (transmits || sampler_ == sarsa_sampler::sphere_inversion) return detail::sarsa_distribution(from);
     const std::uint32_t lattice = normals_.index(glm::normalize(normal));
     return {from,

@@ -47,6 +47,14 @@ inline std::vector<double> cell_probabilities(const std::vector<float>& values, 
   return result;
 }
 
+/// What a distribution is built from: cell values, and room for it.
+inline std::vector<std::uint32_t> words_of(const std::vector<float>& values, std::uint32_t resolution) {
+  std::vector<std::uint32_t> words;
+  for (float value : values) words.push_back(wfpg::detail::float_bits(value));
+  words.resize(wfpg::grid_distribution::words(resolution));
+  return words;
+}
+
 struct build_grid {
   std::uint32_t* words;
   std::uint32_t resolution;
@@ -63,7 +71,7 @@ class built_field {
  public:
   built_field(const Exec& exec, const std::vector<float>& values, std::uint32_t resolution,
               float floor = 0.0f)
-      : words_(exec, words_of(values)), resolution_(resolution) {
+      : words_(exec, words_of(values, resolution)), resolution_(resolution) {
     exec.for_each_block(1, 0, build_grid{words_.data(), resolution, floor});
   }
 
@@ -71,12 +79,6 @@ class built_field {
   std::vector<std::uint32_t> words(const Exec& exec) const { return words_.to_host(exec); }
 
  private:
-  static std::vector<std::uint32_t> words_of(const std::vector<float>& values) {
-    std::vector<std::uint32_t> words;
-    for (float value : values) words.push_back(wfpg::detail::float_bits(value));
-    return words;
-  }
-
   wfpg::buffer<std::uint32_t, Exec> words_;
   std::uint32_t resolution_;
 };

@@ -73,7 +73,7 @@ struct kept_field_builder {
   WFPG_HD void finish(Block& block, std::uint32_t slot, const field_cells& cells, bool whole) const {
     const auto size = static_cast<int>(kept.resolution);
     const std::size_t first = std::size_t(slot) * kept.resolution * kept.resolution;
-    const cell_words words{kept.words + first};
+    const cell_words words{kept.words + std::size_t(slot) * grid_distribution::words(kept.resolution)};
     block.for_each(size * size, [&](int cell) {
       const float radiance = radiance_of(first + static_cast<std::size_t>(cell), whole);
       words.set(cell, radiance * cells.central_cosine(static_cast<std::uint32_t>(cell)));

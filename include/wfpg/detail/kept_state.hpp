@@ -33,7 +33,7 @@ struct saved_slot {
   std::vector<std::uint16_t> learnt;  // empty where fields do not learn
 };
 
-/// Whether words are a summed-area table with weight.
+/// Whether words are a summed-area table with weight, and the sums of its rows.
 inline bool is_distribution(const std::vector<std::uint32_t>& words, std::size_t resolution) {
   for (std::size_t y = 0; y < resolution; ++y) {
     std::uint32_t row = 0;  // of the cells so far
@@ -43,6 +43,7 @@ inline bool is_distribution(const std::vector<std::uint32_t>& words, std::size_t
       if (here < above || here - above < row) return false;
       row = here - above;
     }
+    if (words[resolution * resolution + y] != words[y * resolution + resolution - 1]) return false;
   }
   return words.back() > 0;
 }
@@ -154,7 +155,7 @@ struct store_state {
     bytes.put(field.normal);
     bytes.put(field.fraction);
     if (!(field.fraction > 0.0f)) return;
-    put_cells<std::uint32_t>(exec, store.words_, store.cells_a_field(), i, bytes);
+    put_cells<std::uint32_t>(exec, store.words_, store.words_a_field(), i, bytes);
     put_cells<std::uint32_t>(exec, store.hits_, store.cells_a_field(), i, bytes);
     if (store.learns()) put_cells<std::uint16_t>(exec, store.learnt_, store.cells_a_field(), i, bytes);
   }
@@ -176,7 +177,7 @@ struct store_state {
     check(bytes, s, store.tree_.node_count(), store.sample_);
     if (!(s.field.fraction > 0.0f)) return s;
     const std::size_t cells = store.cells_a_field();
-    s.words = bytes.get_all<std::uint32_t>(cells);
+    s.words = bytes.get_all<std::uint32_t>(store.words_a_field());
     s.hits = bytes.get_all<std::uint32_t>(cells);
     if (learnt) s.learnt = bytes.get_all<std::uint16_t>(cells);
     check_cells(bytes, s, store.options_.resolution, store.tree_.node_count());
@@ -208,13 +209,17 @@ struct store_state {
   template <class Exec>
   static void upload(const Exec& exec, const saved_slot& s, field_store<Exec>& store) {
     if (s.words.empty()) return;
-    const std::size_t first = s.index * s.words.size(), bytes = s.words.size() * sizeof(std::uint32_t);
-    exec.copy_from_host(store.words_.data() + first, s.words.data(), bytes);
-    exec.copy_from_host(store.hits_.data() + first, s.hits.data(), bytes);
+    put_back(exec, s, s.words, store.words_);
+    put_back(exec, s, s.hits, store.hits_);
     if (!store.learns()) return;
-    const std::vector<std::uint16_t> nothing(s.words.size(), 0);
-    exec.copy_from_host(store.learnt_.data() + first, s.learnt.empty() ? nothing.data() : s.learnt.data(),
-                        nothing.size() * sizeof(std::uint16_t));
+    const std::vector<std::uint16_t> nothing(s.hits.size(), 0);
+    put_back(exec, s, s.learnt.empty() ? nothing : s.learnt, store.learnt_);
+  }
+  template <class Exec, class Word, class T>
+  static void put_back(const Exec& exec, const saved_slot& s, const std::vector<Word>& words,
+                       buffer<T, Exec>& of_all) {
+    static_assert(sizeof(Word) == sizeof(T));
+    exec.copy_from_host(of_all.data() + s.index * words.size(), words.data(), words.size() * sizeof(T));
   }
 };
 

@@ -199,7 +199,7 @@ guide_view octree_guide<Exec>::make_resident(const guide_sample<Exec>& at, const
   const auto fields = bin_wave(at, w);
   const auto timed = at.clock.time(detail::stage::fields);
   const std::size_t bins = read_element(at.exec, fields.bins.count);
-  const std::size_t words = bins * fields.resolution * fields.resolution;
+  const std::size_t words = bins * grid_distribution::words(fields.resolution);
   // Half more than is needed: the next waves have a few bins more or less, and are not to allocate.
   if (resident_fields_.size() < bins) reallocate(at.exec, resident_fields_, bins + bins / 2);
   if (resident_words_.size() < words) reallocate(at.exec, resident_words_, words + words / 2);

@@ -49,7 +49,8 @@ sarsa_grid<Exec>::sarsa_grid(const Exec& exec, const Exec& working, const bounds
   means_ = buffer<detail::direction_mean, Exec>(exec, directions());
   radiance_ = buffer<float, Exec>(exec, directions());
   weights_ = buffer<std::uint32_t, Exec>(exec, directions());
-  sums_ = buffer<std::uint32_t, Exec>(exec, directions());
+  sums_ = buffer<std::uint32_t, Exec>(
+      exec, std::size_t(view_.cells_.size()) * grid_distribution::words(view_.resolution_));
   cosines_ = buffer<std::uint8_t, Exec>(exec, std::size_t(normals) * n);
   opposites_ = buffer<std::uint32_t, Exec>(exec, n);
   if (options_.sampler != sarsa_sampler::sphere_inversion)

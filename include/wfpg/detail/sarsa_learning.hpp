@@ -165,7 +165,7 @@ struct publish_cell {
     const float known = block.sum(n, [&](int i) { return from[i].count > 0 ? 1.0f : 0.0f; });
     const float sum = block.sum(n, [&](int i) { return from[i].radiance; });
     const float mean = known > 0.0f ? sum / known : 0.0f;
-    const cell_words words{sums + first};
+    const cell_words words{sums + cell * grid_distribution::words(resolution)};
     block.for_each(n, [&](int i) {
       radiance[first + static_cast<std::size_t>(i)] = from[i].radiance;
       words.set(i, from[i].count > 0 ? from[i].radiance : mean);

@@ -131,11 +131,13 @@ struct transient_sink {
   std::uint32_t resolution;
   product_points points;
 
-  std::size_t scratch_bytes() const { return sizeof(std::uint32_t) * resolution * resolution + 16; }
+  std::size_t scratch_bytes() const {
+    return sizeof(std::uint32_t) * grid_distribution::words(resolution) + 16;
+  }
 
   template <class Block>
   WFPG_HD std::uint32_t* words(Block& block, std::size_t) const {
-    return block.template scratch<std::uint32_t>(std::size_t(resolution) * resolution);
+    return block.template scratch<std::uint32_t>(grid_distribution::words(resolution));
   }
   template <class Block>
   WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field) const {
@@ -167,7 +169,7 @@ struct resident_sink {
 
   template <class Block>
   WFPG_HD std::uint32_t* words(Block&, std::size_t bin) const {
-    return storage + bin * resolution * resolution;
+    return storage + bin * grid_distribution::words(resolution);
   }
   template <class Block>
   WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field) const {
