@@ -2,9 +2,10 @@
 """Measures what single options do, each at some values with all others at their defaults, by wfpg-quality, for
 bench/tuning_plot.py.
 
-usage: bench/tuning.py DIRECTORY_OF_PROGRAMS OUT.json FOLDER
+usage: bench/tuning.py DIRECTORY_OF_PROGRAMS OUT.json FOLDER [DEVICE]
 
-Pictures, references and what else wfpg-quality writes go to FOLDER; interrupted, it goes on where it was.
+Pictures, references and what else wfpg-quality writes go to FOLDER; interrupted, it goes on where it was. DEVICE is
+cpu or cuda, of which the errors are the same but for noise.
 """
 import json
 import os
@@ -12,7 +13,7 @@ import subprocess
 import sys
 
 SCENES = ("ajar", "cornell-enclosed --nee off")
-SETTINGS = "--size 96x96 --spp 64 --seeds 2 --reference-spp 2048 --device cpu".split()
+SETTINGS = "--size 96x96 --spp 64 --seeds 2 --reference-spp 2048".split()
 DEFAULT = "wfpg"
 
 # What stands in plots, wfpg-render's arguments for a value, the values, the default, and arguments that go with all.
@@ -21,11 +22,12 @@ OPTIONS = (
     ("kept.resolution", "--slot-resolution {}", (12, 16, 24, 32), 24, ""),
     ("octree_resolution", "--octree-resolution {}", (32, 64, 128, 256), 128, ""),
     ("rays_per_bin", "--rays-per-bin {}", (16, 64, 256, 1024), 64, ""),
-    ("kept.recast", "--recast {}", (1, 4, 8, 16, 32), 8, ""),
+    ("kept.recast", "--recast {}", (1, 4, 8, 16, 32, 64), 32, ""),
     ("guide_fraction", "--guide-fraction {}", (0.3, 0.5, 0.7, 0.9), 0.7, ""),
     ("product_resolution", "--method wfpg-product --product-resolution {}", (0, 4, 8), 0, ""),
     # Pictures as small as these have no more deposits than 16 a leaf where the octree is fine.
     ("deposits_per_leaf, octree 32", "--deposits-per-leaf {}", (1, 4, 16), 16, "--octree-resolution 32"),
+    ("kept.recast, learn off", "--recast {}", (8, 32), 32, "--learn off"),
     ("kept.learn", "--learn {}", ("off", "on"), "on", ""),
 )
 
@@ -63,8 +65,9 @@ def summaries(results):
     return found
 
 
-def main(programs, out, folder):
-    command = ["--scenes", *SCENES, *SETTINGS, *methods()]
+def main(programs, out, folder, device="cpu"):
+    settings = [*SETTINGS, "--device", device]
+    command = ["--scenes", *SCENES, *settings, *methods()]
     subprocess.run([os.path.join(programs, "wfpg-quality"), *command, "--cache", os.path.join(folder, "cache"),
                     "--output", folder], check=True)
     with open(os.path.join(folder, "results.json")) as file:
@@ -78,7 +81,7 @@ def main(programs, out, folder):
             points.append({"value": value, "arguments": arguments, "is_default": value == default,
                            "scenes": {scene: lines[name_of(arguments)] for scene, lines in found.items()}})
     written = {
-        "settings": " ".join(SETTINGS),
+        "settings": " ".join(settings),
         **{key: results[key] for key in ("version", "program", "machine")},
         "references": {s["scene"]: s["reference"]["noise"]["mse_reinhard"] for s in results["scenes"]},
         "path_tracing": {scene: lines["pt"]["error"] for scene, lines in found.items()},
@@ -90,6 +93,6 @@ def main(programs, out, folder):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 4:
+    if not 4 <= len(sys.argv) <= 5:
         sys.exit(__doc__.strip())
     main(*sys.argv[1:])

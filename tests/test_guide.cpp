@@ -78,8 +78,8 @@ uniform_guider<Exec> guider_in_sample(const Exec& exec, const box_mesh<Exec>& me
 
 template <class Exec>
 std::vector<sampled_direction> draw(const Exec& exec, uniform_guider<Exec>& guider,
-                                    const std::vector<test_surface>& surfaces) {
-  const wave_of_surfaces<Exec> wave(exec, surfaces);
+                                    const std::vector<test_surface>& surfaces, std::uint32_t depth = 0) {
+  const wave_of_surfaces<Exec> wave(exec, surfaces, depth);
   const wfpg::buffer<sampled_direction, Exec> directions(exec, surfaces.size());
   guider.sample_directions(wave.get(), box_caster(), directions.view());
   return directions.to_host(exec);
@@ -120,6 +120,29 @@ WFPG_TEST_CASE("a guide's share of directions is guide_fraction, after the sampl
   }
   CHECK(std::abs(guided / 4096.0 - 0.3) < 4.0 * std::sqrt(0.3 * 0.7 / 4096.0));
   CHECK(std::abs(below / guided - 0.5) < 4.0 * 0.5 / std::sqrt(guided));
+}
+
+WFPG_TEST_CASE("what is deeper than guided_depths is its BSDF's, densities too", "[guide]") {
+  const Exec exec;
+  const box_mesh<Exec> mesh(exec);
+  const auto surfaces = wall_surfaces(4096, 3);
+  wfpg::sampling_options options;
+  options.max_paths = surfaces.size();
+  options.unguided_samples = 0;
+  options.guided_depths = 2;
+  uniform_guider<Exec> guider(exec, mesh.view(), options);
+  guider.begin_sample();
+  for (std::uint32_t depth = 0; depth < 4; ++depth) {
+    int guided = 0;
+    const auto drawn = draw(exec, guider, surfaces, depth);
+    for (std::size_t i = 0; i < drawn.size(); ++i) {
+      guided += drawn[i].technique == sampling_technique::guide;
+      if (depth < 2 || drawn[i].technique != sampling_technique::bsdf) continue;
+      REQUIRE(drawn[i].pdf == surfaces[i].bsdf.pdf(surfaces[i].outgoing, drawn[i].direction));
+    }
+    INFO("depth " << depth);
+    CHECK((guided > 0) == (depth < 2));
+  }
 }
 
 WFPG_TEST_CASE("a guide's view has the densities of its directions, and answers queries with them",

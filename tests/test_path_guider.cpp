@@ -54,6 +54,7 @@ const std::vector<bad_option>& bad_options() {
       {"kept.recast", [](guider_options& o) { o.kept.recast = 0; }},
       {"kept.idle_samples", [](guider_options& o) { o.kept.idle_samples = 0; }},
       {"kept.budget_bytes", [](guider_options& o) { o.kept.budget_bytes = ~std::size_t(0); }},
+      {"guided_depths", [](guider_options& o) { o.guided_depths = 0; }},
       {"max_depth", [](guider_options& o) { o.max_depth = 0; }},
       {"max_depth", [](guider_options& o) { o.max_depth = 5000; }},
       {"max_paths", [](guider_options& o) { o.max_paths = std::size_t(1) << 40; }},
@@ -425,17 +426,18 @@ WFPG_TEST_CASE("path guider: what moved is cast anew, light that moved is not", 
   const auto toward_patch = [&] {
     return evaluate(box.exec, pdf_of_first_ray{box.guider.prepare(wave.get(), box_caster{}), to_patch});
   };
+  const std::uint64_t refreshed = 256 / box.guider.options().kept.recast;
   CHECK(cones_of_sample(box, surfaces) == 256);
-  CHECK(cones_of_sample(box, surfaces) == 256 / 8);
+  CHECK(cones_of_sample(box, surfaces) == refreshed);
   box.guider.invalidate({{0.4f, -3.0f, 0.4f}, {0.6f, -2.8f, 0.6f}});
-  CHECK(cones_of_sample(box, surfaces) == 256 / 8);
+  CHECK(cones_of_sample(box, surfaces) == refreshed);
   box.guider.invalidate({{0.4f, 0.4f, 0.4f}, {0.6f, 0.6f, 0.6f}});
   CHECK(cones_of_sample(box, surfaces) == 256);
   box.guider.invalidate_all();
   CHECK(cones_of_sample(box, surfaces) == 256);
   CHECK(toward_patch() > 1.0f);
   box.guider.forget_light();
-  CHECK(cones_of_sample(box, surfaces) == 256 / 8);
+  CHECK(cones_of_sample(box, surfaces) == refreshed);
   CHECK(toward_patch() == Approx(0.5f / wfpg::detail::pi));  // all dark: uniform over the hemisphere
 }
 

@@ -176,6 +176,7 @@ TEST_CASE("a rendering does not go on as another one", "[renderer][state]") {
   refused("--min-bin-level 2, not 3", [](render_options& o) { o.min_bin_level = 3; });
   refused("--deposits-per-leaf 16, not 8", [](render_options& o) { o.deposits_per_leaf = 8; });
   refused("--guide-fraction 0, not 0.25", [](render_options& o) { o.guide_fraction = 0.25f; });
+  refused("--guided-depths 4294967295, not 2", [](render_options& o) { o.guided_depths = 2; });
   refused("--slot-resolution 8, not 16", [](render_options& o) { o.slot_resolution = 16; });
   refused("--recast 4, not 8", [](render_options& o) { o.recast = 8; });
   refused("--learn on, not off", [](render_options& o) { o.learn = false; });

@@ -47,13 +47,15 @@ struct keep_nothing {
   std::uint32_t* totals;
   template <class Block>
   WFPG_HD std::uint32_t* words(Block& block, std::size_t) const {
-    return block.template scratch<std::uint32_t>(cells);
+    return block.template scratch<std::uint32_t>(wfpg::grid_distribution::words(field_size));
   }
   template <class Block>
   WFPG_HD void finish(Block& block, std::size_t bin, const wfpg::directional_field& field) const {
     block.for_each(1, [&](int) { totals[bin] = field.grid().total(); });
   }
-  static std::size_t scratch_bytes() { return sizeof(std::uint32_t) * cells + 16; }
+  static std::size_t scratch_bytes() {
+    return sizeof(std::uint32_t) * wfpg::grid_distribution::words(field_size) + 16;
+  }
 };
 
 /// 2,048 fields of 128² over a wave, their cones already cast.

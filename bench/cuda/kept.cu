@@ -47,7 +47,8 @@ void refreshing_slots(benchmark::State& state) {
   const wfpg::array_view<const room_point> given(points.view());
   const wfpg::buffer<wfpg::detail::field_slot, exec_policy> slots(exec, slot_count);
   const wfpg::buffer<wfpg::resident_field, exec_policy> fields(exec, slot_count);
-  const wfpg::buffer<std::uint32_t, exec_policy> words(exec, std::size_t(slot_count) * cells),
+  const wfpg::buffer<std::uint32_t, exec_policy> words(
+      exec, std::size_t(slot_count) * wfpg::grid_distribution::words(slot_size)),
       list(exec, slot_count);
   const wfpg::buffer<wfpg::detail::cone_hit, exec_policy> found(exec, std::size_t(slot_count) * cells);
   const wfpg::buffer<wfpg::detail::rough_mean, exec_policy> learnt(exec, found.size());

@@ -49,7 +49,7 @@ struct render_options {
   std::uint32_t octree_resolution = 128;             ///< voxels a side, a power of two
   std::uint32_t field_resolution = 32;               ///< cells a side of transient fields at the first vertex
   std::uint32_t slot_resolution = 24;                ///< cells a side of kept fields
-  std::uint32_t recast = 8;                          ///< a refresh casts one cone in so many again
+  std::uint32_t recast = 32;                         ///< a refresh casts one cone in so many again
   bool learn = true;                                 ///< kept fields learn from paths
   std::size_t field_budget = std::size_t(24) << 20;  ///< bytes of kept fields
   std::size_t caster_buffer = std::size_t(16) << 20;  ///< bytes of cones in flight to OptiX
@@ -58,6 +58,7 @@ struct render_options {
   std::uint32_t min_bin_level = 3;                    ///< l_min, from the root
   std::uint32_t deposits_per_leaf = 16;               ///< that are recorded in a sample; 0: all
   float guide_fraction = 0.0f;                        ///< in [0, 1]; 0: the mode's own, 0.5 of Open PGL's
+  std::uint32_t guided_depths = 0xffffffffu;          ///< of a path, from its first vertex on, at least 1
   std::uint32_t light_groups = 32;           ///< that guided paths learn to choose lights from, in [1, 255]
   std::uint32_t samples_per_leaf = 32000;    ///< after which Open PGL's field splits a leaf, 8 to 2^30
   wfpg::sarsa_grid_options sarsa;            ///< its own; what every guide is told follows from the others

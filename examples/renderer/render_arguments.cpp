@@ -130,7 +130,7 @@ void add_guider_options(CLI::App& app, render_options& options) {
   app.add_option("--field-resolution", options.field_resolution,
                  "cells a side of transient fields at the first vertex (default: 32)");
   app.add_option("--slot-resolution", options.slot_resolution, "cells a side of kept fields (default: 24)");
-  app.add_option("--recast", options.recast, "a refresh casts one cone in so many again (default: 8)")
+  app.add_option("--recast", options.recast, "a refresh casts one cone in so many again (default: 32)")
       ->check(CLI::Range(1, 1 << 20));
   add_choice<bool>(app, "--learn", options.learn, {{"on", true}, {"off", false}},
                    "kept fields learn from paths, beside their cones (default: on)");
@@ -152,6 +152,9 @@ void add_guider_options(CLI::App& app, render_options& options) {
   app.add_option("--guide-fraction", options.guide_fraction,
                  "samples drawn from fields (default: the mode's)")
       ->check(CLI::Range(0.0, 1.0));
+  app.add_option("--guided-depths", options.guided_depths,
+                 "so many vertices of a path are guided, the first ones (default: all)")
+      ->check(CLI::PositiveNumber);
   app.add_option("--samples-per-leaf", options.samples_per_leaf,
                  "after which Open PGL splits a leaf of its field (default: 32000)")
       ->check(CLI::Range(8, 1 << 30));
@@ -166,6 +169,8 @@ void check_render_options(const CLI::App& app, const render_options& options) {
     throw CLI::RequiresError("--samples-per-leaf", "--method openpgl-vmm or openpgl-dqt");
   if (app.count("--caster-buffer") > 0 && options.where != device::optix)
     throw CLI::RequiresError("--caster-buffer", "--device optix");
+  if (app.count("--guided-depths") > 0 && is_openpgl(options.method))
+    throw CLI::RequiresError("--guided-depths", "one of wfpg's own methods");
   if (app.count("--cones") > 0 && !is_wfpg(options.method))
     throw CLI::RequiresError("--cones", "--method wfpg or wfpg-product");
   for (const char* const name : sarsa_option_names)

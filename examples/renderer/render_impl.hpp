@@ -97,6 +97,7 @@ void take_samples(path_tracer<Exec, Caster>& tracer, Guider& guider, const pinho
 inline wfpg::sampling_options sampling_options_of(const render_options& options) {
   wfpg::sampling_options guided;
   guided.guide_fraction = options.guide_fraction;
+  guided.guided_depths = options.guided_depths;
   guided.unguided_samples = wfpg::unguided_samples(combination_of(options));
   guided.seed = options.seed;
   guided.max_paths = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);

@@ -39,7 +39,8 @@ void add_guider_values(const render_options& o, named_values& values) {
                                {"--rays-per-bin", to_string(o.rays_per_bin)},
                                {"--min-bin-level", to_string(o.min_bin_level)},
                                {"--deposits-per-leaf", to_string(o.deposits_per_leaf)},
-                               {"--guide-fraction", fraction}});
+                               {"--guide-fraction", fraction},
+                               {"--guided-depths", to_string(o.guided_depths)}});
   if (o.lifetime == fields::kept)
     values.insert(values.end(), {{"--slot-resolution", to_string(o.slot_resolution)},
                                  {"--recast", to_string(o.recast)},

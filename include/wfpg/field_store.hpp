@@ -32,7 +32,7 @@ namespace wfpg {
 /// How fields are kept.
 struct kept_field_options {
   std::uint32_t resolution = 24;  ///< cells along a field's side, in [2, 128]
-  std::uint32_t recast = 8;       ///< R: a refresh casts one cone in so many again, at least 1
+  std::uint32_t recast = 32;      ///< R: a refresh casts one cone in so many again, at least 1
   std::size_t budget_bytes = std::size_t(24) << 20;  ///< of the slots; one takes about 10 F² bytes, or 8
   bool learn = true;          ///< from paths: where path_recorder_view::scatter() is called, or by itself
   float cone_samples = 1.0f;  ///< what a cell's cone counts for beside so many paths, positive and finite

@@ -45,10 +45,10 @@ namespace wfpg {
 /// The sample that a guide is called in. Valid during the call.
 template <class Exec>
 struct guide_sample {
-  const Exec& exec;            ///< runs its loops; its memory keeps what is given back
-  std::uint32_t number;        ///< of the sample, from 1; 0 before the first
-  std::uint64_t seed;          ///< of the sample
-  bool guided;                 ///< false: directions are to be their BSDFs', and paths are only recorded
+  const Exec& exec;      ///< runs its loops; its memory keeps what is given back
+  std::uint32_t number;  ///< of the sample, from 1; 0 before the first
+  std::uint64_t seed;    ///< of the sample
+  bool guided;  ///< false: directions are to be their BSDFs'; in the first samples, and beyond guided_depths
   detail::stage_clock& clock;  ///< for stages of the guide's own; prepare, learn and update are timed
 };
 

@@ -145,6 +145,9 @@ class path_guider {
   std::uint64_t seed_of(std::uint32_t sample) const { return detail::hash(options_.seed, sample); }
   guide_sample<Exec> at(std::uint32_t sample) { return {exec_, sample, seed_of(sample), guided(), clock_}; }
   guide_sample<Exec> now() { return at(samples_); }
+  guide_sample<Exec> now(std::uint32_t depth) {
+    return {exec_, samples_, seed_of(samples_), guided() && depth < options_.guided_depths, clock_};
+  }
 
   options_type options_;
   detail::stage_clock clock_;
@@ -217,7 +220,7 @@ void path_guider<Exec, Guide>::sample_directions(const wave<Surfaces, Random>& w
 
   const detail::serve_ray<Surfaces, Random, Queries> serve{w.surfaces, w.random, queries, directions};
   if constexpr (Guide::serves_waves)
-    guide_.serve(now(), w, caster, serve);
+    guide_.serve(now(w.depth), w, caster, serve);
   else {
     const view_type view = prepare(w, caster);
     const auto timed = clock_.time(detail::stage::serve);
@@ -231,7 +234,7 @@ typename path_guider<Exec, Guide>::view_type path_guider<Exec, Guide>::prepare(
     const wave<Surfaces, Random>& w, const Caster& caster) {
   check(w, caster);
   const auto timed = clock_.time(detail::stage::fields);
-  return guide_.prepare(now(), w, caster);
+  return guide_.prepare(now(w.depth), w, caster);
 }
 
 template <class Exec, class Guide>

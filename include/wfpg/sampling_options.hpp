@@ -13,6 +13,8 @@ namespace wfpg {
 struct sampling_options {
   /// Share of guided samples, in [0, 1]; 0: the guide's own.
   float guide_fraction = 0.0f;
+  /// Depths that are guided, from 0 on, at least 1; deeper rays are their BSDFs'. By default all.
+  std::uint32_t guided_depths = 0xffffffffu;
   /// Guide toward emitters themselves. Beside next-event estimation they count with their MIS weight, and
   /// false leaves them to it: better where fields do not learn.
   bool include_emission = true;
@@ -32,6 +34,7 @@ namespace detail {
 inline void require_valid(const sampling_options& o) {
   require(o.guide_fraction >= 0.0f && o.guide_fraction <= 1.0f, "guide_fraction", o.guide_fraction,
           "in [0, 1]");
+  require(o.guided_depths >= 1, "guided_depths", o.guided_depths, "at least 1");
   require(o.max_depth >= 1 && o.max_depth <= 1024, "max_depth", o.max_depth, "in [1, 1024]");
   require(o.max_paths < 0xffffffffull, "max_paths", o.max_paths, "less than 2^32 - 1");
   require(o.max_rays < 0xffffffffull, "max_rays", o.max_rays, "less than 2^32 - 1");
