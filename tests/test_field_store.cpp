@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -104,6 +105,23 @@ TEST_CASE("field store: as many refreshes as one in how many cast every cell onc
         CHECK(std::all_of(times.begin(), end_of_runs, [](int n) { return n == 1; }));
         CHECK(std::all_of(end_of_runs, times.end(), [](int n) { return n >= 1; }));  // of a shorter run
       }
+    }
+}
+
+TEST_CASE("field store: the cones of a refresh are spread over rows and columns", "[field_store]") {
+  constexpr std::uint32_t resolution = 24;
+  for (std::uint32_t recast : {2u, 4u, 8u, 16u, 32u})
+    for (std::uint32_t refresh = 0; refresh < recast; ++refresh) {
+      const std::uint32_t cones = wfpg::detail::refresh_cones(resolution, recast);
+      std::set<std::uint32_t> rows, columns;
+      for (std::uint32_t cone = 0; cone < cones; ++cone) {
+        const std::uint32_t cell = wfpg::detail::refreshed_cell(cone, refresh, resolution, recast);
+        rows.insert(cell / resolution);
+        columns.insert(cell % resolution);
+      }
+      INFO("one in " << recast << ", refresh " << refresh);
+      CHECK(5 * rows.size() >= 2 * std::min(cones, resolution));
+      CHECK(5 * columns.size() >= 2 * std::min(cones, resolution));
     }
 }
 

@@ -122,7 +122,27 @@ WFPG_TEST_CASE("a guide's share of directions is guide_fraction, after the sampl
   CHECK(std::abs(below / guided - 0.5) < 4.0 * 0.5 / std::sqrt(guided));
 }
 
-WFPG_TEST_CASE("what is deeper than guided_depths is its BSDF's, densities too", "[guide]") {
+WFPG_TEST_CASE("what is deeper than guided_depths is its BSDF's, by the octree's guide too", "[guide]") {
+  const auto surfaces = wall_surfaces(700, 3);
+  for (wfpg::guiding_mode mode : {wfpg::guiding_mode::oriented, wfpg::guiding_mode::plain})
+    for (wfpg::field_lifetime lifetime : lifetimes)
+      for (std::uint32_t products : {0u, 4u}) {
+        wfpg::guider_options options = box_options(mode, lifetime);
+        options.product_resolution = products;
+        options.guided_depths = 2;
+        guided_box<Exec> box(options);
+        box.learn();
+        for (std::uint32_t depth : {0u, 1u, 2u, 5u}) {
+          int guided = 0;
+          for (const sampled_direction& d : box.sample(surfaces, box_caster{}, 1, depth))
+            guided += d.technique == sampling_technique::guide;
+          INFO(name_of(lifetime) << ", P " << products << ", depth " << depth);
+          CHECK((guided > 0) == (depth < 2));
+        }
+      }
+}
+
+WFPG_TEST_CASE("what is deeper than guided_depths has the density of its BSDF", "[guide]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   const auto surfaces = wall_surfaces(4096, 3);
@@ -135,10 +155,11 @@ WFPG_TEST_CASE("what is deeper than guided_depths is its BSDF's, densities too",
   for (std::uint32_t depth = 0; depth < 4; ++depth) {
     int guided = 0;
     const auto drawn = draw(exec, guider, surfaces, depth);
+    const std::vector<float> densities = bsdf_densities(exec, surfaces, drawn);
     for (std::size_t i = 0; i < drawn.size(); ++i) {
       guided += drawn[i].technique == sampling_technique::guide;
       if (depth < 2 || drawn[i].technique != sampling_technique::bsdf) continue;
-      REQUIRE(drawn[i].pdf == surfaces[i].bsdf.pdf(surfaces[i].outgoing, drawn[i].direction));
+      REQUIRE(drawn[i].pdf == Approx(densities[i]).epsilon(1e-5));
     }
     INFO("depth " << depth);
     CHECK((guided > 0) == (depth < 2));

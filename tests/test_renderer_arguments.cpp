@@ -1,4 +1,5 @@
 // What command lines share: a scene with its environment, and what is warned of.
+#include "builtin_scenes.hpp"
 #include "image_io.hpp"
 #include "render_arguments.hpp"
 #include "support/catch.hpp"
@@ -9,6 +10,7 @@
 
 #include <sstream>
 #include <string>
+#include <vector>
 
 namespace {
 
@@ -65,4 +67,33 @@ TEST_CASE("the vertex that roulette begins at is an option", "[renderer][argumen
   CHECK(depth_of("") == 3);
   CHECK(depth_of("--roulette-depth 8") == 8);
   CHECK_THROWS_AS(depth_of("--roulette-depth 0"), CLI::ValidationError);
+}
+
+TEST_CASE("the first vertices alone are guided where that is asked for", "[renderer][arguments]") {
+  const auto parsed = [](const std::string& arguments) {
+    render::render_options options;
+    options.width = options.height = 16;
+    options.spp = 4;
+    CLI::App app;
+    render::add_method_options(app, options);
+    render::add_guider_options(app, options);
+    app.parse(arguments);
+    render::check_render_options(app, options);
+    return options;
+  };
+  const auto fields_made = [&](const std::string& arguments) {
+    const render::scene world = render::make_builtin_scene("cornell-box");
+    std::vector<bool> made;
+    for (const render::bin_report& depth : render::render(world, parsed(arguments), {}).report.bins)
+      made.push_back(depth.count > 0.0);
+    made.resize(3);
+    return made;
+  };
+  const std::string transient = "--method wfpg --fields transient";
+  CHECK(fields_made(transient) == std::vector<bool>{true, true, true});
+  CHECK(fields_made(transient + " --guided-depths 1") == std::vector<bool>{true, false, false});
+  CHECK(fields_made(transient + " --guided-depths 2") == std::vector<bool>{true, true, false});
+  CHECK_THROWS_AS(parsed("--guided-depths 0"), CLI::ValidationError);
+  for (const char* const method : {"pt", "openpgl-vmm"})
+    CHECK_THROWS_AS(parsed(std::string("--guided-depths 1 --method ") + method), CLI::RequiresError);
 }

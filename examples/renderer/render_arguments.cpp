@@ -169,8 +169,9 @@ void check_render_options(const CLI::App& app, const render_options& options) {
     throw CLI::RequiresError("--samples-per-leaf", "--method openpgl-vmm or openpgl-dqt");
   if (app.count("--caster-buffer") > 0 && options.where != device::optix)
     throw CLI::RequiresError("--caster-buffer", "--device optix");
-  if (app.count("--guided-depths") > 0 && is_openpgl(options.method))
-    throw CLI::RequiresError("--guided-depths", "one of wfpg's own methods");
+  if (app.count("--guided-depths") > 0 &&
+      (options.method == sampling_method::pt || is_openpgl(options.method)))
+    throw CLI::RequiresError("--guided-depths", "--method wfpg, wfpg-product, sarsa or records");
   if (app.count("--cones") > 0 && !is_wfpg(options.method))
     throw CLI::RequiresError("--cones", "--method wfpg or wfpg-product");
   for (const char* const name : sarsa_option_names)

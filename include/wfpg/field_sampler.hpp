@@ -1,11 +1,8 @@
 // Piecewise-constant sampling of a square grid of cells, and of directions through the octahedral map (paper,
-// section 3.5; thesis, section 4.4.2). A distribution is integer weights in a summed-area table (Crow 1984):
-// the sum of any rectangle of cells is four of its entries, so the grid is sampled as a whole and in parts
-// alike. Sums of integers are exact in any order, so a sampler and its density agree to the bit on every
-// policy and warp width.
-//
-// The sums of whole rows are there once more, next to each other: the first search reads one cache line or
-// two, not one for each step.
+// section 3.5; thesis, section 4.4.2). A distribution is integer weights as sums: of each row's cells up to
+// each, and of rows up to each. A row is found among the second, which lie in a cache line or two, a cell in
+// its row; a cell's weight is the difference of neighbours. Sums of integers are exact in any order, so a
+// sampler and its density agree to the bit on every policy and warp width.
 //
 // Memory: 4 (F² + F) bytes for F² cells. Sampling: two searches, O(log F). Density: O(1).
 #pragma once
@@ -49,6 +46,20 @@ WFPG_HD sums_position find_in_sums(const Sums& sums, std::uint32_t n, std::uint3
   return {low, width, (static_cast<float>(target - before) + rest) / static_cast<float>(width)};
 }
 
+/// The same among few, of which widths(i) are known and not their sums.
+template <class Widths>
+WFPG_HD sums_position find_in_widths(const Widths& widths, std::uint32_t total, float u) {
+  const auto scaled = static_cast<std::uint64_t>(u * 0x1p24f) * total;
+  const std::uint32_t target = min(static_cast<std::uint32_t>(scaled >> 24), total - 1u);
+  std::uint32_t i = 0, before = 0, width = widths(0);
+  while (target - before >= width) {
+    before += width;
+    width = widths(++i);
+  }
+  const float rest = static_cast<float>(scaled & 0xffffffu) * 0x1p-24f;
+  return {i, width, (static_cast<float>(target - before) + rest) / static_cast<float>(width)};
+}
+
 /// A place inside a cell off its faces by more than rounding moves a point to a direction and back, so that a
 /// density finds the cell that was drawn.
 WFPG_HD inline float inside_cell(float fraction) {
@@ -68,8 +79,8 @@ struct cell_block {
 class grid_distribution {
  public:
   grid_distribution() = default;
-  /// `sums`: words(F) of them. First F², row by row: entry (x, y) is the sum of the cells of columns 0 to x
-  /// and rows 0 to y. Then F: entry y is the sum of rows 0 to y.
+  /// `sums`: words(F) of them. First F², row by row: entry (x, y) is the sum of row y's cells 0 to x. Then F:
+  /// entry y is the sum of rows 0 to y.
   WFPG_HD grid_distribution(const std::uint32_t* sums, std::uint32_t resolution)
       : sums_(sums), resolution_(resolution) {}
 
@@ -82,17 +93,18 @@ class grid_distribution {
   WFPG_HD std::uint32_t resolution() const { return resolution_; }
   /// The sum of all cells. Precondition: not a default one.
   WFPG_HD std::uint32_t total() const { return rows()[resolution_ - 1]; }
-  /// The sum of a block's cells.
+  /// The sum of a block's cells. O(side).
   WFPG_HD std::uint32_t weight(const cell_block& b) const {
-    return before(b.x + b.side, b.y + b.side) - before(b.x, b.y + b.side) - before(b.x + b.side, b.y) +
-           before(b.x, b.y);
+    std::uint32_t sum = 0;
+    for (std::uint32_t y = b.y; y < b.y + b.side; ++y) sum += weight_in_row(b, y);
+    return sum;
   }
   /// The weight of one cell.
-  WFPG_HD std::uint32_t weight(std::uint32_t x, std::uint32_t y) const { return weight(cell_block{x, y, 1}); }
-  /// The sum of columns 0 to x and rows 0 to y.
-  WFPG_HD std::uint32_t sum_through(std::uint32_t x, std::uint32_t y) const {
-    return sums_[y * resolution_ + x];
+  WFPG_HD std::uint32_t weight(std::uint32_t x, std::uint32_t y) const {
+    return through(x, y) - before(x, y);
   }
+  /// The sum of row y's cells 0 to x.
+  WFPG_HD std::uint32_t through(std::uint32_t x, std::uint32_t y) const { return sums_[y * resolution_ + x]; }
 
   /// A point of [0,1)² from u in [0,1)². Monotone in each coordinate inside a row: stratified u stay
   /// stratified.
@@ -109,14 +121,11 @@ class grid_distribution {
     density = density_of(weight);
     return point;
   }
-  /// A point of a block, as its cells' weights have it, and the weight of the cell that it lies in.
-  /// Precondition: the block has weight.
-  WFPG_HD vec2 sample(const cell_block& b, vec2 u, std::uint32_t& weight) const {
-    const std::uint32_t last = b.x + b.side;
-    const auto through = [&](std::uint32_t y) { return before(last, y) - before(b.x, y); };
-    const std::uint32_t above = through(b.y);
-    const auto row = detail::find_in_sums([&](std::uint32_t i) { return through(b.y + i + 1); }, b.side,
-                                          above, through(b.y + b.side) - above, u.y);
+  /// A point of a block, as its cells' weights have it, and the weight of the cell that it lies in. O(side).
+  /// `whole`: the block's weight, which is positive.
+  WFPG_HD vec2 sample(const cell_block& b, std::uint32_t whole, vec2 u, std::uint32_t& weight) const {
+    const auto row =
+        detail::find_in_widths([&](std::uint32_t i) { return weight_in_row(b, b.y + i); }, whole, u.y);
     return sample_in_row(b, row, u.x, weight);
   }
 
@@ -132,28 +141,28 @@ class grid_distribution {
  private:
   WFPG_HD const std::uint32_t* rows() const { return sums_ + resolution_ * resolution_; }
 
-  /// In the part of a row that lies in a block; its own sums are the differences to the row before it.
+  /// In the part of a row that lies in a block.
   WFPG_HD vec2 sample_in_row(const cell_block& b, const detail::sums_position& row, float u,
                              std::uint32_t& weight) const {
     const std::uint32_t y = b.y + row.index;
-    const std::uint32_t* const sums = sums_ + y * resolution_ + b.x;
-    const std::uint32_t back = y > 0 ? resolution_ : 0u, mask = y > 0 ? ~0u : 0u;
-    const auto column =
-        detail::find_in_sums([&](std::uint32_t i) { return sums[i] - (*(sums + i - back) & mask); }, b.side,
-                             before(b.x, y + 1) - before(b.x, y), row.width, u);
+    const auto column = detail::find_in_sums([&](std::uint32_t i) { return through(b.x + i, y); }, b.side,
+                                             before(b.x, y), row.width, u);
     weight = column.width;
     return vec2{static_cast<float>(b.x + column.index) + detail::inside_cell(column.fraction),
                 static_cast<float>(y) + detail::inside_cell(row.fraction)} /
            static_cast<float>(resolution_);
+  }
+  WFPG_HD std::uint32_t weight_in_row(const cell_block& b, std::uint32_t y) const {
+    return through(b.x + b.side - 1, y) - before(b.x, y);
   }
   /// In a cell.
   WFPG_HD float density_of(std::uint32_t weight) const {
     const auto cells = static_cast<float>(resolution_ * resolution_);
     return static_cast<float>(weight) / static_cast<float>(total()) * cells;
   }
-  /// The sum of the cells of the first x columns and y rows.
+  /// The sum of row y's first x cells.
   WFPG_HD std::uint32_t before(std::uint32_t x, std::uint32_t y) const {
-    return x > 0 && y > 0 ? sums_[(y - 1) * resolution_ + x - 1] : 0u;
+    return x > 0 ? through(x - 1, y) : 0u;
   }
 
   const std::uint32_t* sums_ = nullptr;
@@ -264,16 +273,9 @@ WFPG_HD grid_distribution build_distribution(const Block& block, const cell_word
     warp.inclusive_scan(resolution, row, [&](int x) { return row[x]; });
   });
   block.sync();
-  constexpr int width = Block::warp::width;
-  block.for_each_warp((resolution + width - 1) / width, [&](const auto& warp, int strip) {
-    const int first = strip * width, columns = min(width, resolution - first);
-    auto sums = warp.map([](int) { return 0u; });
-    for (int y = 0; y < resolution; ++y)
-      warp.for_lanes_below(columns, [&](int lane) {
-        std::uint32_t& cell = cells.words[y * resolution + first + lane];
-        cell = sums[lane] += cell;
-        if (first + lane == resolution - 1) cells.words[n + y] = cell;
-      });
+  block.for_each_warp(1, [&](const auto& warp, int) {
+    warp.inclusive_scan(resolution, cells.words + n,
+                        [&](int y) { return cells.words[(y + 1) * resolution - 1]; });
   });
   block.sync();
   return {cells.words, static_cast<std::uint32_t>(resolution)};

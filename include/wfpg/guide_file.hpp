@@ -15,8 +15,8 @@
 //            (4 each), level of the node that they belong to (1 each)
 //   fields   pressure, births refused, delayed (4 each), born, refreshed (8 each), whether fields learn (4)
 //            and a slot in use: its number, key, last use, last build, builds (4 each), normal and fraction
-//            (4 floats), and where the fraction is positive its cells: summed-area table, hits (4 a cell
-//            each), what was learnt (2 a cell)
+//            (4 floats), and where the fraction is positive its cells: sums of its distribution (4 a cell
+//            and row), hits (4 a cell), what was learnt (2 a cell)
 // and of groups of lights
 //   lights   what was learnt: a node of the level that learns, each of its faces, a group: 4
 // All else that a guider has follows from these. About 45 bytes a leaf and 10 F² a field; see

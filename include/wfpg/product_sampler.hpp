@@ -1,15 +1,16 @@
 // Product sampling: a ray draws from a field times its own BSDF, in two levels (paper, section 3.6; thesis,
 // section 4.5, Algorithms 6 and 7; after Conty Estevez & Lecocq 2018, "Fast Product Importance Sampling of
-// Environment Maps"). The F x F cells of a field form P x P blocks, whose sums its summed-area table has. The
-// blocks are multiplied by the BSDF, evaluated at a point or two in each, and summed; a direction is drawn
+// Environment Maps"). The F x F cells of a field form P x P blocks. Their sums
+// are multiplied by the BSDF, evaluated at a point or two in each, and summed; a direction is drawn
 // from a block and then from the cells inside it. The density is that of what was evaluated, exactly:
 // probability of the block times that of the cell inside it, over the cell's solid angle. The paper gives a
 // ray's product to a warp; one thread a ray is several times faster on a GPU, since what a BSDF computes from
 // the outgoing direction is computed once, all lanes read the same point, and no lane waits while one ray is
 // served.
 //
-// Memory: 4 P² bytes a ray in work, and nothing a field. Cost: P² evaluations of the BSDF a ray, and one more
-// for each that is black; a direction takes O(log P + log F), a density O(1).
+// Memory: 4 P² bytes a ray in work, and where a thread block serves a field's rays as many for the blocks'
+// sums. Cost: P² evaluations of the BSDF a ray, and one more for each that is black; P F reads of the field
+// where there are no such sums; a direction takes O(log P + F / P), a density O(1), or O(F / P) without sums.
 #pragma once
 
 #include <wfpg/bsdf.hpp>
@@ -50,11 +51,13 @@ class product_field {
   product_field() = default;
   /// The field as it is.
   WFPG_HD explicit product_field(const directional_field& field) : field_(field) {}
-  /// `weights`: inclusive sums of the P² products, row by row, below 2³²; they and the field outlive this.
+  /// `weights`: inclusive sums of the P² products, row by row, below 2³². `sums`: of the field's cells, a
+  /// block; null: they are summed when they are asked for. All outlive this.
   WFPG_HD product_field(const directional_field& field, std::uint32_t resolution,
-                        const std::uint32_t* weights)
+                        const std::uint32_t* weights, const std::uint32_t* sums = nullptr)
       : field_(field),
         weights_(weights),
+        sums_(sums),
         resolution_(resolution),
         side_(field.grid().resolution() / resolution) {}
 
@@ -72,9 +75,10 @@ class product_field {
     const auto drawn = detail::find_in_sums([this](std::uint32_t i) { return weights_[i]; },
                                             resolution_ * resolution_, 0, total(), u.x);
     std::uint32_t weight;
-    const vec2 uv =
-        field_.grid().sample(block(drawn.index), {detail::min(drawn.fraction, 1.0f - 0x1p-24f), u.y}, weight);
-    density = cell_pdf(weight, drawn.index);
+    const std::uint32_t whole = sum_of(drawn.index);
+    const vec2 uv = field_.grid().sample(block(drawn.index), whole,
+                                         {detail::min(drawn.fraction, 1.0f - 0x1p-24f), u.y}, weight);
+    density = cell_pdf(weight, whole, drawn.index);
     return field_.direction(uv);
   }
 
@@ -84,7 +88,8 @@ class product_field {
     vec2 uv;
     if (!field_.locate(d, uv)) return 0.0f;
     const std::uint32_t x = field_.grid().cell_along(uv.x), y = field_.grid().cell_along(uv.y);
-    return cell_pdf(field_.grid().weight(x, y), y / side_ * resolution_ + x / side_);
+    const std::uint32_t i = y / side_ * resolution_ + x / side_;
+    return cell_pdf(field_.grid().weight(x, y), sum_of(i), i);
   }
 
  private:
@@ -93,20 +98,23 @@ class product_field {
     return {i % resolution_ * side_, i / resolution_ * side_, side_};
   }
 
-  /// In a cell of block i.
-  WFPG_HD float cell_pdf(std::uint32_t weight, std::uint32_t i) const {
+  WFPG_HD std::uint32_t sum_of(std::uint32_t i) const {
+    return sums_ ? sums_[i] : field_.grid().weight(block(i));
+  }
+
+  /// In a cell of block i, whose sum is `whole`.
+  WFPG_HD float cell_pdf(std::uint32_t weight, std::uint32_t whole, std::uint32_t i) const {
     const std::uint32_t product = weights_[i] - (i > 0 ? weights_[i - 1] : 0u);
     if (product == 0) return 0.0f;
-    const auto inside = static_cast<float>(weight);
-    const auto whole = static_cast<float>(field_.grid().weight(block(i)));
-    return static_cast<float>(product) * inside /
-           (static_cast<float>(total()) * whole * field_.cell_solid_angle());
+    return static_cast<float>(product) * static_cast<float>(weight) /
+           (static_cast<float>(total()) * static_cast<float>(whole) * field_.cell_solid_angle());
   }
 
   directional_field field_;
   const std::uint32_t* weights_ = nullptr;
-  std::uint32_t resolution_ = 0;  // P; 0: no product
-  std::uint32_t side_ = 0;        // of a block, in cells
+  const std::uint32_t* sums_ = nullptr;  // a block; null: not made
+  std::uint32_t resolution_ = 0;         // P; 0: no product
+  std::uint32_t side_ = 0;               // of a block, in cells
 };
 
 namespace detail {
@@ -204,25 +212,37 @@ WFPG_HD bool has_product(const directional_field& field, const surface<Bsdf>& s,
            s.bsdf.glossy(s.outgoing).share == 0.0f;
 }
 
-/// Multiplies a field by a surface's BSDF; `words` holds P², which the product reads as long as it lives.
-/// Weights are integers, scaled by the largest of them: exact in every sum. Of a delta BSDF nothing is left.
+/// The sums of a field's P x P blocks, each of its rows read once.
+WFPG_HD inline void sum_blocks(const grid_distribution& grid, std::uint32_t p, std::uint32_t* sums) {
+  const std::uint32_t side = grid.resolution() / p;
+  for (std::uint32_t i = 0; i < p * p; ++i) sums[i] = 0;
+  for (std::uint32_t y = 0; y < grid.resolution(); ++y) {
+    std::uint32_t* const row = sums + y / side * p;
+    std::uint32_t before = 0;
+    for (std::uint32_t x = 0; x < p; ++x) {
+      const std::uint32_t through = grid.through((x + 1) * side - 1, y);
+      row[x] += through - before;
+      before = through;
+    }
+  }
+}
+
+/// Multiplies a field by a surface's BSDF; `words` holds P², which the product reads as long as it lives;
+/// `sums` as product_field has them. Weights are integers, scaled by the largest of them: exact in every sum.
+/// Of a delta BSDF nothing is left.
 template <class Bsdf>
 WFPG_HD product_field multiply(const directional_field& field, const product_points& points,
-                               const surface<Bsdf>& s, std::uint32_t* words) {
+                               const surface<Bsdf>& s, std::uint32_t* words,
+                               const std::uint32_t* sums = nullptr) {
   if (s.bsdf.is_delta()) return {};
   const vec3 up = facing_normal(s);
   if (has_product(field, s, up)) return product_field(field);
-  const std::uint32_t p = points.resolution, side = field.grid().resolution() / p;
+  const std::uint32_t p = points.resolution;
   const product_point* const local = field.hemisphere() ? points.hemisphere : points.sphere;
-  // The table's entries at the blocks' far corners, each read once; then blocks from the last to the first,
-  // so that those still needed are there.
-  for (std::uint32_t i = 0; i < p * p; ++i)
-    words[i] = field.grid().sum_through((i % p + 1) * side - 1, (i / p + 1) * side - 1);
+  if (!sums) sum_blocks(field.grid(), p, words);
   float brightest = 0.0f;
-  for (std::uint32_t i = p * p; i-- > 0;) {
-    const std::uint32_t left = i % p > 0 ? words[i - 1] : 0, above = i >= p ? words[i - p] : 0;
-    const std::uint32_t corner = i % p > 0 && i >= p ? words[i - p - 1] : 0;
-    const std::uint32_t sum = words[i] - left - above + corner;
+  for (std::uint32_t i = 0; i < p * p; ++i) {
+    const std::uint32_t sum = sums ? sums[i] : words[i];
     const float product = sum > 0 ? static_cast<float>(sum) * block_factor(s, up, field, local[i]) : 0.0f;
     words[i] = float_bits(product);
     brightest = max(brightest, product);
@@ -235,7 +255,7 @@ WFPG_HD product_field multiply(const directional_field& field, const product_poi
     if (product > 0.0f) through += max(static_cast<std::uint32_t>(product * scale), 1u);
     words[i] = through;
   }
-  return {field, p, words};
+  return {field, p, words, sums};
 }
 
 }  // namespace detail

@@ -4,8 +4,8 @@
 // scratch while their bin's rays are served, or in memory that the caller gives; the work on cells does not
 // know which.
 //
-// Cost: F² cones and O(F²) a bin; 4 (F² + F) bytes of scratch a block and a few rows for the filter: at 128² and 16
-// warps 81 KiB, which small devices have and large ones twice.
+// Cost: F² cones and O(F²) a bin; 4 (F² + F) bytes of scratch a block and a few rows for the filter: at 128²
+// and 16 warps 81 KiB, which small devices have and large ones twice.
 #pragma once
 
 #include <wfpg/bsdf.hpp>

@@ -14,13 +14,13 @@ WFPG_HD constexpr std::uint32_t refresh_cones(std::uint32_t resolution, std::uin
 }
 
 /// The cell of a refresh's cone: one in each run of `recast` cells, another each time, and shifted from run
-/// to run by the golden ratio so that rows are covered evenly. After `recast` refreshes every cell has been
-/// cast.
+/// to run by about the golden ratio, odd where `recast` is even, so that rows and columns are covered evenly.
+/// After `recast` refreshes every cell has been cast.
 WFPG_HD constexpr std::uint32_t refreshed_cell(std::uint32_t cone, std::uint32_t refresh,
                                                std::uint32_t resolution, std::uint32_t recast) {
   const std::uint32_t begin = cone * recast;
   const std::uint32_t length = min(recast, resolution * resolution - begin);
-  const std::uint32_t shift = (5 * recast + 4) / 8;
+  const std::uint32_t shift = (5 * recast + 4) / 8 | (recast % 2 == 0 ? 1u : 0u);
   return begin + (refresh + shift * (cone % recast)) % length;
 }
 

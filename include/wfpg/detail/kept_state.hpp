@@ -33,17 +33,16 @@ struct saved_slot {
   std::vector<std::uint16_t> learnt;  // empty where fields do not learn
 };
 
-/// Whether words are a summed-area table with weight, and the sums of its rows.
+/// Whether words are the sums of a distribution with weight.
 inline bool is_distribution(const std::vector<std::uint32_t>& words, std::size_t resolution) {
+  std::uint32_t above = 0;  // of all rows so far
   for (std::size_t y = 0; y < resolution; ++y) {
-    std::uint32_t row = 0;  // of the cells so far
-    for (std::size_t x = 0; x < resolution; ++x) {
-      const std::uint32_t here = words[y * resolution + x],
-                          above = y > 0 ? words[(y - 1) * resolution + x] : 0;
-      if (here < above || here - above < row) return false;
-      row = here - above;
-    }
-    if (words[resolution * resolution + y] != words[y * resolution + resolution - 1]) return false;
+    const auto row = words.begin() + static_cast<std::ptrdiff_t>(y * resolution),
+               end = row + static_cast<std::ptrdiff_t>(resolution);
+    if (!std::is_sorted(row, end)) return false;
+    const std::uint32_t through = words[resolution * resolution + y];
+    if (through < above || through - above != *(end - 1)) return false;
+    above = through;
   }
   return words.back() > 0;
 }

@@ -157,7 +157,8 @@ guide_view octree_guide<Exec>::keep_wave(const guide_sample<Exec>& at, const wav
                                          const Caster& caster) {
   const auto timed = at.clock.time(detail::stage::fields);
   if (!at.guided) {
-    store_.count(at.exec, w.ray_count, detail::wave_rays<Surfaces>{w.surfaces, options_.mode});
+    if (w.depth < options_.guided_depths)  // bins are for rays that are to have fields
+      store_.count(at.exec, w.ray_count, detail::wave_rays<Surfaces>{w.surfaces, options_.mode});
     return {};
   }
   const kept_field_wave<Surfaces> wave{w.ray_count,

@@ -29,7 +29,7 @@ struct sarsa_normaliser {
   std::uint64_t peak = 0;
 };
 
-/// B x B directions of a cell: weights that sum to about 2³¹, as they are and as a summed-area table.
+/// B x B directions of a cell: weights that sum to about 2³¹, as they are and as a distribution's sums.
 struct sarsa_cell {
   const std::uint32_t* sums = nullptr;
   const std::uint32_t* weights = nullptr;

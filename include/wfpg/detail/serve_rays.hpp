@@ -132,7 +132,8 @@ struct transient_sink {
   product_points points;
 
   std::size_t scratch_bytes() const {
-    return sizeof(std::uint32_t) * grid_distribution::words(resolution) + 16;
+    const std::uint32_t words = grid_distribution::words(resolution) + points.resolution * points.resolution;
+    return sizeof(std::uint32_t) * words + 32;
   }
 
   template <class Block>
@@ -143,6 +144,7 @@ struct transient_sink {
   WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field) const {
     const float share = fraction(bins.size(bin));
     const std::uint32_t* const rays = bins.permutation.data() + bins.begin(bin);
+    const std::uint32_t* const sums = sum_blocks_of(block, field.grid());
     block.for_each(static_cast<int>(bins.size(bin)), [&](int i) {
       if (points.resolution == 0) {
         serve(rays[i], [&](const auto&) { return guide_mixture{field, share}; });
@@ -150,9 +152,23 @@ struct transient_sink {
       }
       std::uint32_t words[max_product_words];
       serve(rays[i], [&](const auto& s) -> product_mixture {
-        return {multiply(field, points, s, words), share};
+        return {multiply(field, points, s, words, sums), share};
       });
     });
+  }
+
+ private:
+  /// For all of the bin's rays, in scratch memory.
+  template <class Block>
+  WFPG_HD const std::uint32_t* sum_blocks_of(Block& block, const grid_distribution& grid) const {
+    const std::uint32_t p = points.resolution, side = p > 0 ? grid.resolution() / p : 0;
+    std::uint32_t* const sums = block.template scratch<std::uint32_t>(std::size_t(p) * p);
+    block.for_each(static_cast<int>(p * p), [&](int i) {
+      const auto k = static_cast<std::uint32_t>(i);
+      sums[i] = grid.weight({k % p * side, k / p * side, side});
+    });
+    block.sync();
+    return sums;
   }
 };
 
