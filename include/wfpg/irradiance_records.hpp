@@ -8,11 +8,11 @@
 //   wfpg::path_guider<Exec, wfpg::irradiance_records<Exec>> guider(exec, scene, options);
 //
 // Records are built with the first wave that is guided, by the caster that comes with it, and again with the
-// first wave after forget_light(), invalidate() or invalidate_all(): for lights that moved, the host changes
-// `emitters` where they lie. Rays from emitters are cast, and tag the voxels that they meet; voxels lit by
-// way of smooth surfaces, caustics, count as lit where the host says how light goes on there. All other light
-// is that which voxels are known to send, so what is lit indirectly is dark. Where light leaves the octree,
-// rays from beyond the scene ask the caster for the environment.
+// first guided one after forget_light(), invalidate() or invalidate_all(): for lights that moved, the host
+// changes `emitters` where they lie. Rays from emitters are cast, and tag the voxels that they meet; voxels
+// lit by way of smooth surfaces, caustics, count as lit where the host says how light goes on there. All
+// other light is that which voxels are known to send, so what is lit indirectly is dark. Where light leaves
+// the octree, rays from beyond the scene ask the caster for the environment.
 //
 // Memory: 64 bytes a record and 48 for sums of it, 82 KiB for cosines; of the octree and its tags 11 a leaf,
 // 12 an inner node. While it builds 40 a leaf, 24 a node, 44 a ray in flight (2^16 of them), 512 a record
@@ -158,7 +158,7 @@ class irradiance_records : public guide_base {
   irradiance_records_view prepare(const guide_sample<Exec>& at, const wave<Surfaces, Random>& w,
                                   const Caster& caster);
 
-  /// Emitters changed: records are built anew with the next wave.
+  /// Emitters changed: records are built anew with the next guided wave.
   void forget_light(const Exec&) { is_built_ = false; }
   /// Geometry moved; the octree stays as it is. The same.
   void invalidate(const Exec&, const bounds3&) { is_built_ = false; }

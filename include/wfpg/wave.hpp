@@ -25,7 +25,7 @@ struct wave {
 template <class Surfaces, class Random>
 wave(std::uint32_t, std::size_t, Surfaces, Random) -> wave<Surfaces, Random>;
 
-/// What guiding did for the waves of one depth: sums over the guided samples so far.
+/// What guiding did for the waves of one depth: sums over the guided samples so far; 0 beyond guided_depths.
 struct depth_statistics {
   std::uint64_t bins = 0;  ///< whose fields were made; of kept fields, made or refreshed
   std::uint64_t rays = 0;  ///< in bins
