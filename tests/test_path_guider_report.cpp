@@ -211,7 +211,7 @@ WFPG_TEST_CASE("path guider: statistics count fields that are made or refreshed,
   const auto second = box.guider.statistics();
   CHECK(second.guided_samples == 2);
   CHECK(second.depths[1].bins == first.kept.born);
-  CHECK(second.depths[1].cones == first.kept.born * 256 / 8);
+  CHECK(second.depths[1].cones == first.kept.born * 256 / box.guider.options().kept.recast);
   CHECK(second.depths[1].rays == 600);
   CHECK(second.depths[0].cones == first.depths[0].cones);
   CHECK(second.depths.back().rays == 600);
