@@ -38,8 +38,8 @@ struct cast_all {
   }
 };
 
-/// 4,096 due slots of 24² cells, a cone in eight cast again, four times the default's; the floor reads what cells have hit and writes
-/// their distributions.
+/// 4,096 due slots of 24² cells, a cone in eight cast again, four times the default's; the floor reads what
+/// cells have hit and writes their distributions.
 void refreshing_slots(benchmark::State& state) {
   const exec_policy exec;
   const guide_of_room guide(exec, 128);

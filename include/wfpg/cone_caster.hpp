@@ -15,8 +15,8 @@
 // Cones answer as misses do, with the radiance that they gathered, since it comes from no one distance.
 // Transient fields are made of that as of any caster's. Kept fields remember it as it is: they do not see the
 // cache change until the cell is cast again, once in kept.recast refreshes: 8 or less suit them better than
-// the default. A host that calls path_guider::forget_light() calls invalidate_all() too. What they gain beside
-// the other ways is in docs/algorithm.md.
+// the default. A host that calls path_guider::forget_light() calls invalidate_all() too. What they gain
+// beside the other ways is in docs/algorithm.md.
 #pragma once
 
 #include <wfpg/buffer.hpp>
