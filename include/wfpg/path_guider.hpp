@@ -224,7 +224,10 @@ void path_guider<Exec, Guide>::sample_directions(const wave<Surfaces, Random>& w
   else {
     const view_type view = prepare(w, caster);
     const auto timed = clock_.time(detail::stage::serve);
-    exec_.for_each(w.ray_count, detail::serve_guide_view<decltype(serve), view_type>{serve, view});
+    if (now(w.depth).guided)
+      exec_.for_each(w.ray_count, detail::serve_guide_view<decltype(serve), view_type>{serve, view});
+    else
+      exec_.for_each(w.ray_count, detail::serve_unbinned<decltype(serve)>{serve, {}});
   }
 }
 

@@ -144,7 +144,9 @@ void octree_guide<Exec>::serve(const guide_sample<Exec>& at, const wave<Surfaces
   if (!keeps_fields()) return serve_transient(at, w, caster, serve);
   const guide_view view = keep_wave(at, w, caster);
   const auto timed = at.clock.time(detail::stage::serve);
-  if (view.product_resolution() == 0)
+  if (!at.guided)
+    at.exec.for_each(w.ray_count, detail::serve_unbinned<Serve>{serve, {}});
+  else if (view.product_resolution() == 0)
     at.exec.for_each(w.ray_count, detail::serve_view<Serve>{serve, view});
   else
     at.exec.for_each(w.ray_count, detail::serve_products<Serve>{serve, view});
