@@ -2,40 +2,16 @@
 // where directions come from.
 #pragma once
 
+#include <wfpg/detail/serve_rays.hpp>
 #include <wfpg/light_guide.hpp>
 #include <wfpg/mis.hpp>
 #include <wfpg/path_recorder.hpp>
 #include <wfpg/wave.hpp>
 
-#include <cstdint>
-#include <type_traits>
-
 namespace render {
 
-/// Draws a direction for each ray from its BSDF, with the numbers that a guider would use for that: a
-/// guider's unguided sample is the same. Says with what density it draws the ray's query direction.
-template <class Surfaces, class Random, class Queries>
-struct sample_bsdfs {
-  Surfaces surfaces;
-  Random random;
-  Queries queries;
-  wfpg::array_view<wfpg::sampled_direction> directions;
-
-  WFPG_HD void operator()(std::size_t i) const {
-    const auto ray = static_cast<std::uint32_t>(i);
-    const auto surface = surfaces(ray);
-    const wfpg::guide_mixture bsdf_alone;
-    directions[i] = {};
-    if (surface.active) directions[i] = bsdf_alone.sample(surface, 0.0f, random(ray, 1));
-    if constexpr (!std::is_same_v<Queries, wfpg::no_queries>) {
-      const wfpg::vec3 direction = queries.query(ray);
-      const bool asked = surface.active && direction != wfpg::vec3(0.0f);
-      queries.densities[i] = asked ? bsdf_alone.pdf(surface, direction) : 0.0f;
-    }
-  }
-};
-
-/// A guider that does not guide.
+/// A guider that does not guide: each ray's direction is its BSDF's, by the pass that a guider's unguided
+/// waves have.
 template <class Exec>
 class unguided {
  public:
@@ -50,8 +26,9 @@ class unguided {
   void sample_directions(const Wave& wave, const Caster&,
                          wfpg::array_view<wfpg::sampled_direction> directions,
                          const Queries& queries = {}) const {
-    exec_.for_each(wave.ray_count, sample_bsdfs<decltype(wave.surfaces), decltype(wave.random), Queries>{
-                                       wave.surfaces, wave.random, queries, directions});
+    using serve = wfpg::detail::serve_ray<decltype(wave.surfaces), decltype(wave.random), Queries>;
+    exec_.for_each(wave.ray_count, wfpg::detail::serve_unbinned<serve>{
+                                       {wave.surfaces, wave.random, queries, directions}, {}});
   }
 
  private:
