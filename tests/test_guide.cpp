@@ -45,6 +45,18 @@ struct without_memory : uniform_guide<Exec> {
   void memory() const {}
 };
 
+/// One that has fewer paths recorded once means have settled, and tells how many were.
+template <class Exec>
+struct with_fewer_paths : uniform_guide<Exec> {
+  using uniform_guide<Exec>::uniform_guide;
+  std::size_t recorded = 0;
+
+  wfpg::recording_needs recording() const { return {1, false, 3}; }
+  void learn(const wfpg::guide_sample<Exec>&, const wfpg::path_recorder<Exec>& paths) {
+    recorded = paths.recorded();
+  }
+};
+
 /// One that has no use for paths.
 template <class Exec>
 struct without_paths : uniform_guide<Exec> {
@@ -63,6 +75,38 @@ WFPG_TEST_CASE("a guide is what has options, a mesh, a view, and learns", "[guid
   CHECK(!wfpg::is_guide_view_v<without_pdf>);
   CHECK(!wfpg::is_guide_v<without_view<Exec>, Exec>);
   CHECK(!wfpg::is_guide_v<without_memory<Exec>, Exec>);
+}
+
+WFPG_TEST_CASE("fewer paths are recorded after 32 samples, where a guide says so", "[guide]") {
+  const Exec exec;
+  const box_mesh<Exec> mesh(exec);
+  wfpg::sampling_options options;
+  options.max_paths = 1024;
+  wfpg::path_guider<Exec, with_fewer_paths<Exec>> guider(exec, mesh.view(), options);
+  for (std::uint32_t sample = 1; sample <= 34; ++sample) {
+    guider.begin_sample();
+    guider.end_sample();
+    CHECK(guider.guide().recorded == (sample <= 32 ? 512 : 128));
+  }
+}
+
+TEST_CASE("as many paths are recorded as have the vertices that are wanted, or up to twice", "[guide]") {
+  const auto needs = [](std::size_t paths, std::uint64_t wanted) {
+    wfpg::sampling_options options;
+    options.max_paths = paths;
+    options.max_depth = 4;
+    return wfpg::detail::recorded_share(options, wanted).needs(true);
+  };
+  const auto is = [](const wfpg::recording_needs& n, std::uint32_t share, std::uint32_t settled) {
+    return n.directions && n.share_shift == share && n.settled_share_shift == settled;
+  };
+  CHECK(is(needs(1000, 0), 0, 0));  // none in particular: all
+  CHECK(is(needs(1000, 16000), 0, 0));
+  CHECK(is(needs(1000, 8000), 0, 1));  // a quarter is 2000 of 4000
+  CHECK(is(needs(1000, 4000), 0, 2));
+  CHECK(is(needs(1000, 2004), 0, 2));
+  CHECK(is(needs(1000, 2000), 1, 3));
+  CHECK(is(needs(1000000, 2000), 10, 12));
 }
 
 /// A guider that has begun its n-th sample.

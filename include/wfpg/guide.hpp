@@ -56,6 +56,8 @@ struct guide_sample {
 struct recording_needs {
   std::uint32_t share_shift = 0;  ///< of 2^share_shift paths one
   bool directions = false;        ///< what scatter() and escape() tell, too
+  /// The same once means have settled, after 32 samples; below share_shift: as before.
+  std::uint32_t settled_share_shift = 0;
 };
 
 /// What guides have that do not say otherwise: a guide derives from it, and hides what it does by itself.

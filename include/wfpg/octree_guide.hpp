@@ -75,7 +75,7 @@ class octree_guide : public guide_base {
   /// Whether there is no octree.
   bool empty() const { return octree_.view().empty(); }
   /// Of many paths a part; directions where fields learn.
-  recording_needs recording() const { return {recorded().shift(), keeps_fields() && options_.kept.learn}; }
+  recording_needs recording() const { return recorded().needs(keeps_fields() && options_.kept.learn); }
 
   /// Before the waves of a sample.
   void begin_sample(const guide_sample<Exec>& at);

@@ -102,7 +102,7 @@ class sarsa_grid : public guide_base {
   sarsa_grid(const Exec& exec, const Exec& working, const bounds3& bounds, const sarsa_grid_options& options);
 
   /// Directions, and of many paths a part.
-  recording_needs recording() const { return {recorded().shift(), true}; }
+  recording_needs recording() const { return recorded().needs(true); }
 
   /// Before the waves of a sample.
   void begin_sample(const guide_sample<Exec>&) { numbered_ = 0; }

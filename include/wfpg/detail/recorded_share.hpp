@@ -3,6 +3,7 @@
 
 #include <wfpg/detail/recorded_runs.hpp>
 #include <wfpg/detail/value_queue.hpp>
+#include <wfpg/guide.hpp>
 #include <wfpg/sampling_options.hpp>
 
 #include <string>
@@ -13,17 +14,16 @@ namespace wfpg::detail {
 /// recorded where none are wanted in particular.
 class recorded_share {
  public:
-  recorded_share(const sampling_options& o, std::uint64_t wanted) : paths_(o.max_paths), depth_(o.max_depth) {
-    const std::uint64_t all = std::uint64_t(paths_) * depth_;
-    while (wanted > 0 && all >> (shift_ + 1) >= wanted) ++shift_;
-  }
+  recorded_share(const sampling_options& o, std::uint64_t wanted)
+      : paths_(o.max_paths), depth_(o.max_depth), wanted_(wanted) {}
 
-  std::uint32_t shift() const { return shift_; }
+  /// A quarter of the vertices is enough once means have settled.
+  recording_needs needs(bool directions) const { return {shift(wanted_), directions, shift(wanted_ / 4)}; }
 
   /// Of a sample, at most. Throws std::invalid_argument, which says to set `options`, where a queue holds
   /// fewer.
   std::size_t vertices(const char* options) const {
-    const std::size_t count = recorded_runs{shift_}.size(paths_) * depth_;
+    const std::size_t count = recorded_runs{shift(wanted_)}.size(paths_) * depth_;
     const std::string remedy = std::string("at most 2^31: set ") + options;
     require(count <= most_queued, "max_paths times max_depth, the vertices that are recorded,", count,
             remedy.c_str());
@@ -31,9 +31,16 @@ class recorded_share {
   }
 
  private:
+  std::uint32_t shift(std::uint64_t wanted) const {
+    const std::uint64_t all = std::uint64_t(paths_) * depth_;
+    std::uint32_t result = 0;
+    while (wanted > 0 && all >> (result + 1) >= wanted) ++result;
+    return result;
+  }
+
   std::size_t paths_;
   std::uint32_t depth_;
-  std::uint32_t shift_ = 0;
+  std::uint64_t wanted_;
 };
 
 }  // namespace wfpg::detail
