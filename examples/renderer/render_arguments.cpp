@@ -90,8 +90,10 @@ void add_method_options(CLI::App& app, render_options& options) {
   add_choice<cones>(app, "--cones", options.through, cones_names(),
                     "cones of fields find light by rays through the scene (default), by rays through the "
                     "octree, or as cones through it");
-  add_choice<wfpg::sample_combination>(app, "--combine", options.combine, combination_names(),
-                                       "how samples add up (default: pt-linear; constant for pt)");
+  add_choice<wfpg::sample_combination>(
+      app, "--combine", options.combine, combination_names(),
+      "how samples add up (default: pt-linear; constant for pt, for records and with "
+      "--load-guide)");
 }
 
 void add_device_option(CLI::App& app, render_options& options) {

@@ -23,7 +23,8 @@ class out_of_memory : public std::runtime_error {
   std::size_t bytes_;
 };
 
-/// A call of a device's runtime failed. The message names code, text and call.
+/// A call of a device's runtime failed: CUDA's are cuda_error, of exec/cuda.hpp; those of a host's own caster
+/// may be this. The message names code, text and call.
 class device_error : public std::runtime_error {
  public:
   /// The runtime's code and text, and the name of the call.

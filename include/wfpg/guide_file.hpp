@@ -19,7 +19,7 @@
 //            and row), hits (4 a cell), what was learnt (2 a cell)
 // and of groups of lights
 //   lights   what was learnt: a node of the level that learns, each of its faces, a group: 4
-// All else that a guider has follows from these. About 45 bytes a leaf and 10 F² a field; see
+// All else that a guider has follows from these. About 40 bytes a leaf and 10 F² a field; see
 // detail/guide_state.hpp and kept_state.hpp for what is checked.
 #pragma once
 

@@ -71,7 +71,7 @@ class path_guider {
 
   /// The same in two steps: what the renderer's kernels sample from. `w.random` is not read. Holds until the
   /// next call. Kept fields are only refreshed for it. Transient ones are made resident, in 4 (F² + F) bytes
-  /// a bin of the wave with most bins, and half more.
+  /// a bin of the wave with most bins, and half more; it waits for the number of bins.
   template <class Surfaces, class Random, class Caster>
   view_type prepare(const wave<Surfaces, Random>& w, const Caster& caster);
 
@@ -117,9 +117,9 @@ class path_guider {
   /// Whether the sample that has begun is guided.
   bool guided() const { return samples_ > options_.unguided_samples && !guide_.empty(); }
 
-  /// Wait for the work before them.
+  /// What it has done so far. Waits for the work before it.
   guider_statistics statistics() const;
-  /// What it holds, by part. Waits for the work before it.
+  /// What it holds, by part. Does not wait.
   memory_report memory() const;
 
  private:

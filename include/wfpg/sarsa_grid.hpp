@@ -11,8 +11,9 @@
 // directions; of others the glossy part is left to the BSDF (mis.hpp). Surfaces that transmit draw from the
 // radiance alone. Until the first step ends nothing guides.
 //
-// Memory: 20 bytes a cell's direction and 16 of a cell and normal; in a sample 16 a direction, 8 a value and
-// the recorder's vertices. A step's end: O(cells · normals · directions).
+// Memory: 20 bytes a cell's direction and 16 of a cell and normal; in a sample 16 a direction, 8 a value, the
+// recorder's vertices, and of expected SARSA 4 a path and depth. A step's end: O(cells · normals ·
+// directions).
 #pragma once
 
 #include <wfpg/buffer.hpp>

@@ -243,7 +243,7 @@ class sparse_voxel_octree {
 
   /// Builds the octree whose leaves are the fragments' voxels, and sorts the fragments by Morton code (the
   /// cache is built from them next). Throws out_of_memory, std::invalid_argument where there are 2³² - 1
-  /// nodes or more.
+  /// nodes or more, or leaves times levels are.
   sparse_voxel_octree(const Exec& exec, voxel_fragments<Exec>& fragments);
 
   /// What kernels see; valid while the octree lives.

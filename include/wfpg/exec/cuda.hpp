@@ -20,24 +20,19 @@
 #include <memory>
 #include <mutex>
 #include <new>
-#include <stdexcept>
-#include <string>
 #include <type_traits>
 
 namespace wfpg {
 
 /// A call of the CUDA runtime failed; an error that an earlier kernel of the host left behind is reported by
 /// the first call after it.
-class cuda_error : public std::runtime_error {
+class cuda_error : public device_error {
  public:
   /// The name of the call, and what it returned.
   cuda_error(const char* call, cudaError_t code)
-      : std::runtime_error(std::string(call) + ": " + cudaGetErrorString(code)), code_(code) {}
+      : device_error(static_cast<int>(code), cudaGetErrorString(code), call) {}
   /// What the call returned.
-  cudaError_t code() const { return code_; }
-
- private:
-  cudaError_t code_;
+  cudaError_t code() const noexcept { return static_cast<cudaError_t>(device_error::code()); }
 };
 
 namespace detail {
