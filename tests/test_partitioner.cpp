@@ -125,9 +125,9 @@ WFPG_TEST_CASE("a partition beyond the capacity is refused and leaves the partit
   CHECK_THROWS_AS((wfpg::partitioner<Exec>(exec, 0xffffffffu)), std::invalid_argument);
 }
 
-WFPG_TEST_CASE("a partitioner takes 20 bytes an index", "[partitioner]") {
+WFPG_TEST_CASE("a partitioner takes 16 bytes an index", "[partitioner]") {
   const Exec exec;
-  CHECK(wfpg::partitioner<Exec>(exec, 100000).bytes() <= 20u * 100000u + 64u);
+  CHECK(wfpg::partitioner<Exec>(exec, 100000).bytes() <= 16u * 100000u + 64u);
 }
 
 }  // namespace

@@ -1,8 +1,8 @@
 // Sort-based N-way partition (thesis, section 3.4.3): indices grouped by a 32-bit key, the groups' offsets
 // and their number, all left on the device. The spatial binner and a renderer's material sort use it.
 //
-// Cost: one stable sort of (key, index) pairs and one scan; 16 bytes an index of capacity, and
-// about 8 more while it sorts.
+// Cost: one stable sort of (key, index) pairs and one scan; 16 bytes an index of capacity, and about 8
+// more while it sorts.
 #pragma once
 
 #include <wfpg/buffer.hpp>
