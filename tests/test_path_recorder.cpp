@@ -312,7 +312,7 @@ WFPG_TEST_CASE("a sample may record fewer paths than the others", "[path_recorde
   constexpr std::size_t paths = 3000;
   recording<Exec> r(paths, 1, true, 2);
   const std::size_t most = r.recorder.recorded(), bytes = r.recorder.bytes();
-  r.recorder.begin_sample(r.scene.exec, 7, 2);
+  r.recorder.begin_sample(r.scene.exec, 7, 4);
   CHECK(r.recorder.recorded() == wfpg::detail::recorded_runs{4, 7}.size(paths));
   CHECK(r.recorder.recorded() < most / 3);
   CHECK(r.recorder.bytes() == bytes);
@@ -331,6 +331,8 @@ WFPG_TEST_CASE("a sample may record fewer paths than the others", "[path_recorde
   }
   CHECK(r.leaving(0) == Approx(sum / count));
   r.recorder.begin_sample(r.scene.exec, 8);
+  CHECK(r.recorder.recorded() == most);
+  r.recorder.begin_sample(r.scene.exec, 9, 1);  // never more than it was made for
   CHECK(r.recorder.recorded() == most);
 }
 

@@ -56,7 +56,7 @@ struct guide_sample {
 struct recording_needs {
   std::uint32_t share_shift = 0;  ///< of 2^share_shift paths one
   bool directions = false;        ///< what scatter() and escape() tell, too
-  /// The same once means have settled, after 32 samples; below share_shift: as before.
+  /// share_shift once means have settled, after 32 samples; where it is below that, nothing changes then.
   std::uint32_t settled_share_shift = 0;
 };
 

@@ -176,10 +176,8 @@ path_guider<Exec, Guide>& path_guider<Exec, Guide>::operator=(path_guider&& othe
 template <class Exec, class Guide>
 void path_guider<Exec, Guide>::begin_sample() {
   const std::uint32_t sample = samples_ + 1;
-  const recording_needs needs = guide_.recording();
-  const bool settled = sample > 32 && needs.settled_share_shift > needs.share_shift;
-  const std::uint32_t fewer = settled ? needs.settled_share_shift - needs.share_shift : 0;
-  recorder_.begin_sample(exec_, static_cast<std::uint32_t>(seed_of(sample)), fewer);
+  const std::uint32_t share_shift = sample > 32 ? guide_.recording().settled_share_shift : 0;
+  recorder_.begin_sample(exec_, static_cast<std::uint32_t>(seed_of(sample)), share_shift);
   guide_.begin_sample(at(sample));
   samples_ = sample;  // last: a call that threw is made again for the same sample
 }

@@ -303,10 +303,11 @@ class path_recorder {
   /// Paths that this sample records, at most.
   std::size_t recorded() const { return view_.recorded_; }
 
-  /// Forgets all paths. Views from then on record the paths of a sample of this seed; 2^`fewer` times fewer.
-  void begin_sample(const Exec& exec, std::uint32_t seed, std::uint32_t fewer = 0) {
+  /// Forgets all paths. Views from then on record the paths of a sample of this seed: of 2^`share_shift`
+  /// paths one, where that is fewer than the recorder was made for.
+  void begin_sample(const Exec& exec, std::uint32_t seed, std::uint32_t share_shift = 0) {
     view_.runs_.seed = seed;
-    record(share_shift_ + fewer);
+    record(detail::max(share_shift_, share_shift));
     clear(exec);
   }
   /// Forgets all paths.

@@ -3,8 +3,8 @@
 // marked ancestor. In oriented mode a bin is split further by the dominant signed axis of its surfaces'
 // normals.
 //
-// Cost: O(rays · depth + nodes) and one partition; 4 bytes a node, 20 a ray of capacity, and
-// about 8 more while it sorts.
+// Cost: O(rays · depth + nodes) and one partition; 4 bytes a node, 20 a ray of capacity, and about 8
+// more while it sorts.
 #pragma once
 
 #include <wfpg/buffer.hpp>

@@ -265,9 +265,10 @@ TEST_CASE("a launch that failed before is reported by the next call", "[cuda]") 
   try {
     exec.for_each(1, set_word{word.data()});
     FAIL("nothing was thrown");
-  } catch (const wfpg::device_error& error) {
-    CHECK(error.code() == static_cast<int>(left_behind));
+  } catch (const wfpg::cuda_error& error) {
+    CHECK(error.code() == left_behind);
     CHECK(std::string(error.what()).find("wfpg: kernel launch: ") == 0);
+    CHECK(static_cast<const wfpg::device_error&>(error).code() == static_cast<int>(left_behind));
   }
   exec.for_each(1, set_word{word.data()});
   CHECK(wfpg::read_element(exec, word.data()) == 7);
