@@ -70,13 +70,18 @@ def print_sample_times(scenes):
             )
 
 
-def errors_at(scene, samples):
-    """By method: the mean over seeds of its errors after so many samples, less the reference's noise, and of seconds."""
+def errors_at(scene, budget):
+    """By method: the mean over seeds of its errors at a budget, less the reference's noise, and of seconds."""
     sums = {}
-    for run in scene["runs"]:
-        for point in run["points"]:
-            if point["samples"] == samples:
+    for run in scene.get("runs", []):
+        for point in run.get("points", []):
+            if f"{point['samples']} samples" == budget:
                 sums.setdefault(run["method"], []).append(point)
+    if not sums:  # some results keep what is below alone
+        return {
+            m["method"]: {**{e: m["errors"][e]["mean"] for e in MEASURES}, "seconds": m["seconds"]["mean"]}
+            for summary in scene["summary"] if summary["budget"] == budget for m in summary["methods"]
+        }
     return {
         method: {
             **{e: sum(p["error"][e] for p in points) / len(points) - scene["reference"]["noise"][e] for e in MEASURES},
@@ -86,15 +91,21 @@ def errors_at(scene, samples):
     }
 
 
+def methods_and_budget(scene):
+    """Its methods, and how far they went."""
+    last = scene["summary"][-1]
+    return tuple(m["method"] for m in last["methods"]), last["budget"]
+
+
 def print_gains(scenes):
-    """A table for each number of samples at which all methods of all scenes have a picture, from 64 on."""
+    """Tables of scenes with the same methods and budget: at that, and after 64, 256, 1024 and 4096 samples on the way."""
     names = [scene["scene"].split("/")[-1].split(" ")[0].removesuffix(".glb") for scene in scenes]
-    methods = [m["method"] for m in scenes[0]["summary"][-1]["methods"]]
-    for samples in (64, 256, 1024, 4096):
-        at = [errors_at(scene, samples) for scene in scenes]
+    methods, last = methods_and_budget(scenes[0])
+    for budget in dict.fromkeys([f"{n} samples" for n in (64, 256, 1024, 4096)] + [last]):
+        at = [errors_at(scene, budget) for scene in scenes]
         if not all(set(methods) <= set(errors) for errors in at):
             continue
-        print(f"| {samples} samples: gain (relative MSE; equal time) |", " | ".join(names), "|")
+        print(f"| {budget}: gain (relative MSE; equal time) |", " | ".join(names), "|")
         print("| --- " * (1 + len(names)) + "|")
         for method in methods:
             cells = []
@@ -131,7 +142,13 @@ def main(paths):
     if "benchmarks" in first:
         print_stages(first["benchmarks"])
     elif "baseline" in first:
-        print_gains([scene for result in results for scene in result["scenes"]])
+        groups = {}
+        for result in results:
+            for scene in result["scenes"]:
+                groups.setdefault(methods_and_budget(scene), []).append(scene)
+        for scenes in groups.values():
+            print_gains(scenes)
+            print()
     elif "compilers" in first:
         print_compilers(first["compilers"])
     elif "settled_samples" in first:

@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <cstdint>
+#include <iomanip>
+#include <iostream>
 #include <vector>
 
 namespace {
@@ -49,6 +51,52 @@ WFPG_TEST_CASE("sarsa grid: SARSA comes to a furnace's radiance from below, step
     trace_in_furnace(exec, guider, 30);
     CHECK(mean_radiance(exec, guider) == Approx(furnace_radiance).epsilon(0.05));
   }
+}
+
+/// Where the error of what is known of the furnace is looked at, in samples.
+constexpr std::uint32_t looked_at[] = {8, 16, 32, 64, 128, 256};
+
+/// Prints a row of docs/guides.md, and returns the errors, in per cent.
+template <class Exec>
+std::vector<double> print_furnace_errors(const Exec& exec, sarsa_grid_options options) {
+  options.max_depth = 48;
+  options.guide_fraction = 0.7f;
+  const box_mesh<Exec> mesh(exec);
+  sarsa_guider<Exec> guider(exec, mesh.view(), options);
+  std::cout << "| " << name_of(options.update) << " | " << options.learning_rate << " | " << options.step;
+  std::vector<double> errors;
+  for (const std::uint32_t samples : looked_at) {
+    trace_in_furnace(exec, guider, samples - guider.statistics().samples);
+    errors.push_back(100.0 * (mean_radiance(exec, guider) / double(furnace_radiance) - 1.0));
+    std::cout << " | " << std::fixed << std::setprecision(1) << errors.back() << std::defaultfloat;
+  }
+  std::cout << " |" << std::endl;
+  return errors;
+}
+
+// Hidden, since it takes a minute: its rows are a table's in docs/guides.md.
+WFPG_TEST_CASE("sarsa grid: the bias of what is known of a furnace", "[.][bias]") {
+  const Exec exec;
+  std::cout << "| update | learning rate | step | 8 samples | 16 | 32 | 64 | 128 | 256 |\n";
+  for (const sarsa_update update : sarsa_updates)
+    for (const float rate : {0.0f, 0.05f, 0.2f}) {
+      sarsa_grid_options options = sarsa_options(4096);
+      options.update = update;
+      options.learning_rate = rate;
+      const std::vector<double> errors = print_furnace_errors(exec, options);
+      if (update == sarsa_update::monte_carlo)
+        CHECK(std::abs(errors.front()) < 20.0);
+      else  // from below, and the sooner forgotten the less
+        CHECK(errors.front() < -20.0);
+      if (rate > 0.0f) CHECK(std::abs(errors.back()) < 10.0);
+    }
+  sarsa_grid_options options = sarsa_options(4096);
+  options.update = sarsa_update::sarsa;
+  options.learning_rate = 0.05f;
+  options.step = 8;
+  const std::vector<double> slow = print_furnace_errors(exec, options);
+  CHECK(slow.front() < -60.0);
+  CHECK(slow.back() > -20.0);
 }
 
 /// Of paths whose guide has learnt from others before: numbers are not used twice.
