@@ -1,5 +1,5 @@
 // What the compiler is, asked once for the whole library: annotations of functions that run on a device, and
-// an instruction that only some processors have. Includes nothing of the library.
+// instructions that only some processors have. Includes nothing of the library.
 #pragma once
 
 #include <cstdint>
@@ -34,6 +34,14 @@ WFPG_HD inline std::uint32_t popcount(std::uint64_t bits) {
   bits = (bits & 0x3333333333333333u) + (bits >> 2 & 0x3333333333333333u);
   bits = (bits + (bits >> 4)) & 0x0f0f0f0f0f0f0f0fu;
   return static_cast<std::uint32_t>(bits * 0x0101010101010101u >> 56);
+#endif
+}
+
+/// Asks for a line of memory that the thread will write soon. A device has other threads to go on with: there
+/// it does nothing.
+WFPG_HD inline void prefetch([[maybe_unused]] const void* address) {
+#if !defined(__CUDA_ARCH__)
+  __builtin_prefetch(address, 1);
 #endif
 }
 

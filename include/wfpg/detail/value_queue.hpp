@@ -75,6 +75,7 @@ class value_queue_view {
   /// A non-negative finite value for a key. Precondition: the entry fits.
   WFPG_HD void write(std::uint32_t entry, std::uint32_t key, float value) const {
     queue_[entry] = std::uint64_t(float_bits(value + 0.0f)) << 32 | key;  // + 0: no negative zero
+    prefetch(pending_ + key);                                             // for count()
   }
   /// Precondition: the entry fits.
   WFPG_HD void drop(std::uint32_t entry) const { queue_[entry] = dropped; }
@@ -88,6 +89,9 @@ class value_queue_view {
 
   /// Adds an entry to its key's sum, once all are counted.
   WFPG_HD void add(std::uint32_t entry) const {
+    constexpr std::uint32_t ahead = 16;  // as many lines as a processor may wait for
+    if (entry + ahead < min(*queued_, capacity_) && queue_[entry + ahead] != dropped)
+      prefetch(pending_ + key_of(queue_[entry + ahead]));
     if (queue_[entry] == dropped) return;
     pending_values& to = pending_[key_of(queue_[entry])];
     atomic_add(&to.sum, exact_sum(to.largest, to.count).term(bits_of_value(queue_[entry])));
