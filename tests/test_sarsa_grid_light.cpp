@@ -16,21 +16,25 @@ using wfpg::sarsa_grid_options;
 using wfpg::sarsa_sampler;
 using wfpg::sarsa_update;
 
-template <class Exec>
-sarsa_guider<Exec> furnace_guider(const Exec& exec, sarsa_update update, float learning_rate) {
+sarsa_grid_options furnace_options(sarsa_update update, float learning_rate) {
   sarsa_grid_options options = sarsa_options(2048);
   options.update = update;
   options.learning_rate = learning_rate;
   options.resolution = 2;
   options.direction_resolution = 4;
   options.max_depth = 48;  // one path of 45000 gets there
+  return options;
+}
+
+template <class Exec>
+sarsa_guider<Exec> furnace_guider(const Exec& exec, const sarsa_grid_options& options) {
   const box_mesh<Exec> mesh(exec);
   return {exec, mesh.view(), options};
 }
 
 WFPG_TEST_CASE("sarsa grid: Monte Carlo converges to a furnace's radiance", "[sarsa][furnace]") {
   const Exec exec;
-  sarsa_guider<Exec> guider = furnace_guider(exec, sarsa_update::monte_carlo, 0.0f);
+  sarsa_guider<Exec> guider = furnace_guider(exec, furnace_options(sarsa_update::monte_carlo, 0.0f));
   trace_in_furnace(exec, guider, 24);
   CHECK(mean_radiance(exec, guider) == Approx(furnace_radiance).epsilon(0.02));
 }
@@ -40,7 +44,7 @@ WFPG_TEST_CASE("sarsa grid: SARSA comes to a furnace's radiance from below, step
   const Exec exec;
   for (const sarsa_update update : {sarsa_update::sarsa, sarsa_update::expected_sarsa}) {
     INFO(name_of(update));
-    sarsa_guider<Exec> guider = furnace_guider(exec, update, 0.1f);
+    sarsa_guider<Exec> guider = furnace_guider(exec, furnace_options(update, 0.1f));
     // As many bounces as there were steps: with all values new, 1 + 0.8 + 0.8² + ...
     trace_in_furnace(exec, guider, 1);
     CHECK(mean_radiance(exec, guider) == Approx(1.0f).epsilon(0.001));
@@ -58,12 +62,16 @@ constexpr std::uint32_t looked_at[] = {8, 16, 32, 64, 128, 256};
 
 /// Prints a row of docs/guides.md, and returns the errors, in per cent.
 template <class Exec>
-std::vector<double> print_furnace_errors(const Exec& exec, sarsa_grid_options options) {
-  options.max_depth = 48;
+std::vector<double> print_furnace_errors(const Exec& exec, sarsa_update update, float learning_rate,
+                                         std::uint32_t step) {
+  sarsa_grid_options options = furnace_options(update, learning_rate);
+  options.max_paths = 4096;
+  options.resolution = 4;
+  options.direction_resolution = 8;
   options.guide_fraction = 0.7f;
-  const box_mesh<Exec> mesh(exec);
-  sarsa_guider<Exec> guider(exec, mesh.view(), options);
-  std::cout << "| " << name_of(options.update) << " | " << options.learning_rate << " | " << options.step;
+  options.step = step;
+  sarsa_guider<Exec> guider = furnace_guider(exec, options);
+  std::cout << "| " << name_of(update) << " | " << learning_rate << " | " << step;
   std::vector<double> errors;
   for (const std::uint32_t samples : looked_at) {
     trace_in_furnace(exec, guider, samples - guider.statistics().samples);
@@ -80,21 +88,14 @@ WFPG_TEST_CASE("sarsa grid: the bias of what is known of a furnace", "[.][bias]"
   std::cout << "| update | learning rate | step | 8 samples | 16 | 32 | 64 | 128 | 256 |\n";
   for (const sarsa_update update : sarsa_updates)
     for (const float rate : {0.0f, 0.05f, 0.2f}) {
-      sarsa_grid_options options = sarsa_options(4096);
-      options.update = update;
-      options.learning_rate = rate;
-      const std::vector<double> errors = print_furnace_errors(exec, options);
+      const std::vector<double> errors = print_furnace_errors(exec, update, rate, 1);
       if (update == sarsa_update::monte_carlo)
         CHECK(std::abs(errors.front()) < 20.0);
       else  // from below, and the sooner forgotten the less
         CHECK(errors.front() < -20.0);
       if (rate > 0.0f) CHECK(std::abs(errors.back()) < 10.0);
     }
-  sarsa_grid_options options = sarsa_options(4096);
-  options.update = sarsa_update::sarsa;
-  options.learning_rate = 0.05f;
-  options.step = 8;
-  const std::vector<double> slow = print_furnace_errors(exec, options);
+  const std::vector<double> slow = print_furnace_errors(exec, sarsa_update::sarsa, 0.05f, 8);
   CHECK(slow.front() < -60.0);
   CHECK(slow.back() > -20.0);
 }
