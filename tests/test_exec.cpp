@@ -65,6 +65,44 @@ WFPG_TEST_CASE("for_each visits each index once", "[exec]") {
   }
 }
 
+/// Two steps: the second needs what the first left for the same index. Adds up what the first returned.
+struct take_steps {
+  count_visits visit;
+  std::uint64_t* sum;
+  std::uint32_t* begun;
+  template <class Run>
+  WFPG_HD void operator()(const Run& run) const {
+    typename Run::template varying<std::uint32_t> squares;
+    const std::uint32_t returned = run.sum([&](std::size_t index, int i) {
+      squares[i] = static_cast<std::uint32_t>(index * index);
+      return static_cast<std::uint32_t>(index % 5);
+    });
+    run.once([&] {
+      wfpg::detail::atomic_add(sum, std::uint64_t(returned));
+      if (run.first() == 0) wfpg::detail::atomic_add(begun, 1u);
+    });
+    run.for_each([&](std::size_t index, int i) {
+      if (squares[i] == static_cast<std::uint32_t>(index * index)) visit(index);
+    });
+  }
+};
+
+WFPG_TEST_CASE("runs take every index through all steps once", "[exec]") {
+  const Exec exec;
+  for (const std::size_t n : {0, 1, 31, 32, 33, 127, 128, 129, 256, 257, 100000}) {
+    INFO(n);
+    const wfpg::buffer<std::uint32_t, Exec> visits(exec, words(n + 1, 0)), begun(exec, words{0});
+    const wfpg::buffer<std::uint64_t, Exec> sum(exec, std::vector<std::uint64_t>{0});
+    exec.for_each_run(n, take_steps{{visits.data()}, sum.data(), begun.data()});
+    words expected(n + 1, 1);
+    expected[n] = 0;
+    CHECK((visits.to_host(exec) == expected));
+    const std::size_t rest = n % 5;
+    CHECK(sum.to_host(exec)[0] == n / 5 * 10 + (rest > 0 ? rest * (rest - 1) / 2 : 0));
+    CHECK(begun.to_host(exec)[0] == 1);
+  }
+}
+
 WFPG_TEST_CASE("loops take a count from the device", "[exec]") {
   const Exec exec;
   const auto visited = [&](std::uint32_t value, std::size_t capacity, bool blocks) {

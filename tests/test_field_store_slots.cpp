@@ -100,7 +100,7 @@ WFPG_TEST_CASE(
     box.begin();
     const std::size_t cones = box.cones(wave) + box.cones(wave);
     const std::uint32_t parts = box.sample <= 32 ? 8 : 4;
-    const bool has_turn = box.sample <= 32 || box.sample % 4 == 0 || (box.sample + 1) % 4 == 0;
+    const bool has_turn = box.sample <= 32 || box.sample % 8 == 0 || (box.sample + 1) % 8 == 0;
     const bool due = has_turn && box.sample > last_built && parts * (box.sample - last_built) >= box.sample;
     INFO("sample " << box.sample);
     CHECK(cones == (box.sample == 1 ? 16u : due ? 4u : 0u));
@@ -109,20 +109,20 @@ WFPG_TEST_CASE(
   CHECK(box.counts().refreshed < 30);
 }
 
-WFPG_TEST_CASE("field store: after many samples one wave in four builds, whatever its depth",
+WFPG_TEST_CASE("field store: after many samples one wave in eight builds, whatever its depth",
                "[field_store]") {
   for (std::uint32_t depth : {0u, 1u, 2u, 3u, 6u}) {
     kept_box<Exec> box(slots_of(4, 40));
-    while (box.sample < 36) box.whole_sample(floor_rays(3));
+    while (box.sample < 40) box.whole_sample(floor_rays(3));
     const auto late = rays_at({0.5f, 1.0f, 0.5f}, down, 9);
     std::uint32_t guided = 0;
-    for (int i = 0; i < 4; ++i) {
+    for (int i = 0; i < 8; ++i) {
       box.begin();
       for (std::uint32_t d = 0; d < depth; ++d) box.prepare({});
       const std::size_t cones = box.cones(late);
       guided += cones > 0 ? 1 : 0;
       INFO("depth " << depth << ", sample " << box.sample);
-      CHECK(cones == ((box.sample + depth) % 4 == 0 ? 16u : 0u));
+      CHECK(cones == ((box.sample + depth) % 8 == 0 ? 16u : 0u));
       CHECK(box.last_wave().served == (guided > 0 ? 9u : 0u));
       box.end();
     }
@@ -134,7 +134,7 @@ WFPG_TEST_CASE("field store: after many samples one wave in four builds, whateve
 WFPG_TEST_CASE("field store: what is invalidated after many samples is cast in the next wave",
                "[field_store]") {
   kept_box<Exec> box(slots_of(4, 40));
-  while (box.sample < 37) box.whole_sample(floor_rays(3));
+  while (box.sample < 41) box.whole_sample(floor_rays(3));
   for (int i = 0; i < 5; ++i) {
     box.store.invalidate_all(box.exec());
     box.begin();

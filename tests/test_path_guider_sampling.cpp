@@ -111,6 +111,39 @@ WFPG_TEST_CASE("path guider: both forms draw the same directions from the same n
   }
 }
 
+WFPG_TEST_CASE("path guider: both forms agree, and count alike, where few waves make fields any more",
+               "[path_guider]") {
+  for (guiding_mode mode : modes)
+    for (std::uint32_t products : {0u, 4u}) {
+      guider_options options = box_options(mode, field_lifetime::kept);
+      options.product_resolution = products;
+      guided_box<Exec> fused(options), prepared(options);
+      fused.learn();
+      prepared.learn();
+      const auto surfaces = mixed_surfaces(300, 4);
+      const wfpg::buffer<test_surface, Exec> stored(fused.exec, surfaces);
+      for (int sample = 2; sample < 44; ++sample) {
+        for (std::uint32_t depth : {0u, 1u, 7u}) {
+          INFO(describe(options) << ", P " << products << ", sample " << sample << ", depth " << depth);
+          const auto expected = fused.sample(surfaces, box_caster{}, 1, depth);
+          CHECK(count_guided(expected) > 60);
+          CHECK(same_draws(sample_prepared(prepared, stored, box_caster{}, depth), expected));
+        }
+        for (guided_box<Exec>* box : {&fused, &prepared}) {
+          box->guider.end_sample();
+          box->guider.begin_sample();
+        }
+      }
+      const auto counted = fused.guider.statistics().depths, alike = prepared.guider.statistics().depths;
+      for (std::size_t depth = 0; depth < counted.size(); ++depth) {
+        CHECK(counted[depth].rays == alike[depth].rays);
+        CHECK(counted[depth].unbinned == alike[depth].unbinned);
+        CHECK(counted[depth].cones == alike[depth].cones);
+      }
+      CHECK(counted[7].rays > 42 * 150);
+    }
+}
+
 WFPG_TEST_CASE("path guider: both forms agree where nothing guides yet", "[path_guider]") {
   for (guider_options options : kinds_of_guiding()) {
     INFO(describe(options));

@@ -81,16 +81,22 @@ TEST_CASE("the first vertices alone are guided where that is asked for", "[rende
     render::check_render_options(app, options);
     return options;
   };
-  const auto fields_made = [&](const std::string& arguments) {
+  const auto fields_made = [&](const std::string& arguments, int max_depth = 8, bool nee = true) {
     const render::scene world = render::make_builtin_scene("cornell-box");
+    render::render_options options = parsed(arguments);
+    options.max_depth = max_depth;
+    options.nee = nee;
     std::vector<bool> made;
-    for (const render::bin_report& depth : render::render(world, parsed(arguments), {}).report.bins)
+    for (const render::bin_report& depth : render::render(world, options, {}).report.bins)
       made.push_back(depth.count > 0.0);
     made.resize(3);
     return made;
   };
   const std::string transient = "--method wfpg --fields transient";
   CHECK(fields_made(transient) == std::vector<bool>{true, true, true});
+  CHECK(fields_made(transient, 4) == std::vector<bool>{true, true, false});  // the last finds emitters alone
+  CHECK(fields_made(transient, 4, false) == std::vector<bool>{true, true, true});
+  CHECK(fields_made(transient, 2) == std::vector<bool>{true, false, false});
   CHECK(fields_made(transient + " --guided-depths 1") == std::vector<bool>{true, false, false});
   CHECK(fields_made(transient + " --guided-depths 2") == std::vector<bool>{true, true, false});
   CHECK_THROWS_AS(parsed("--guided-depths 0"), CLI::ValidationError);

@@ -69,7 +69,7 @@ class openpgl_field_view {
 template <class Surfaces, class Random, class Queries>
 struct sample_openpgl {
   openpgl_field_view field;
-  float fraction;
+  float fraction;  // 0: the field is not asked
   std::uint32_t depth;
   Surfaces surfaces;
   Random random;
@@ -83,7 +83,7 @@ struct sample_openpgl {
     directions[i] = {};
     openpgl_mixture mixture;
     if (surface.active) {
-      mixture = {field.at(surface), fraction};
+      if (fraction > 0.0f) mixture = {field.at(surface), fraction};
       directions[i] = mixture.sample(surface, random(ray, 0).x, random(ray, 1));
       recorder.drawn(surfaces.queue[ray], depth, surface, directions[i]);
     }
@@ -98,11 +98,12 @@ struct sample_openpgl {
 /// What an openpgl_guider is made of.
 struct openpgl_options {
   PGL_DIRECTIONAL_DISTRIBUTION_TYPE directional = PGL_DIRECTIONAL_DISTRIBUTION_PARALLAX_AWARE_VMM;
-  std::size_t samples_per_leaf = 32000;  ///< a leaf that has had more is split
-  float guide_fraction = 0.5f;           ///< of directions that are drawn from the field, in [0, 1]
-  std::size_t paths = 0;                 ///< of a sample
-  std::size_t max_depth = 1;             ///< vertices of a path
-  pgl_box3f bounds{};                    ///< holds all vertices
+  std::size_t samples_per_leaf = 32000;       ///< a leaf that has had more is split
+  float guide_fraction = 0.5f;                ///< of directions that are drawn from the field, in [0, 1]
+  std::uint32_t guided_depths = 0xffffffffu;  ///< depths whose directions are, from 0 on
+  std::size_t paths = 0;                      ///< of a sample
+  std::size_t max_depth = 1;                  ///< vertices of a path
+  pgl_box3f bounds{};                         ///< holds all vertices
 };
 
 /// A guider that trains a field of Open PGL on each sample, for the next ones: the first is not guided.
@@ -111,6 +112,7 @@ class openpgl_guider {
   openpgl_guider(const wfpg::exec::tbb& exec, const openpgl_options& options)
       : exec_(exec),
         guide_fraction_(options.guide_fraction),
+        guided_depths_(options.guided_depths),
         device_(widest_device()),
         field_(&device_, field_config(options).config),
         distributions_(&field_),
@@ -132,7 +134,7 @@ class openpgl_guider {
     clock_.measure("query", [&] {
       exec_.for_each(wave.ray_count, sample_openpgl<decltype(wave.surfaces), decltype(wave.random), Queries>{
                                          {field_, distributions_},
-                                         guide_fraction_,
+                                         wave.depth < guided_depths_ ? guide_fraction_ : 0.0f,
                                          wave.depth,
                                          wave.surfaces,
                                          wave.random,
@@ -171,6 +173,7 @@ class openpgl_guider {
 
   wfpg::exec::tbb exec_;
   float guide_fraction_;
+  std::uint32_t guided_depths_;
   openpgl::cpp::Device device_;
   openpgl::cpp::Field field_;
   openpgl_field_view::distributions distributions_;

@@ -93,11 +93,18 @@ void take_samples(path_tracer<Exec, Caster>& tracer, Guider& guider, const pinho
   result.report.spp = budget.samples();
 }
 
+/// Of a path's depths those that are guided. The last direction finds emitters alone: where next-event
+/// estimation finds them too, it is left to the BSDF.
+inline std::uint32_t guided_depths(const render_options& options) {
+  const auto last = static_cast<std::uint32_t>(options.max_depth > 2 ? options.max_depth - 2 : 1);
+  return options.nee ? std::min(options.guided_depths, last) : options.guided_depths;
+}
+
 /// What every guide is told.
 inline wfpg::sampling_options sampling_options_of(const render_options& options) {
   wfpg::sampling_options guided;
   guided.guide_fraction = options.guide_fraction;
-  guided.guided_depths = options.guided_depths;
+  guided.guided_depths = guided_depths(options);
   guided.unguided_samples = wfpg::unguided_samples(combination_of(options));
   guided.seed = options.seed;
   guided.max_paths = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);

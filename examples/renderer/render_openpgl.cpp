@@ -26,6 +26,7 @@ openpgl_options openpgl_options_of(const scene& scene, const render_options& opt
   guided.samples_per_leaf = options.samples_per_leaf;
   if (options.guide_fraction > 0.0f) guided.guide_fraction = options.guide_fraction;
   guided.paths = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  guided.guided_depths = guided_depths(options);
   guided.max_depth = static_cast<std::size_t>(options.max_depth);
   guided.bounds = bounds_of(scene);
   return guided;

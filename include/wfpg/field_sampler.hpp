@@ -178,14 +178,14 @@ class directional_field {
   WFPG_HD explicit directional_field(const grid_distribution& grid) : grid_(grid) {}
   /// Over the hemisphere above a unit normal.
   WFPG_HD directional_field(const grid_distribution& grid, vec3 normal)
-      : grid_(grid), frame_(normal), hemisphere_(true) {}
+      : grid_(grid), normal_(normal), hemisphere_(true) {}
 
   /// Whether there is nothing to draw from.
   WFPG_HD bool empty() const { return grid_.resolution() == 0; }
   /// Whether it covers a hemisphere; else the sphere.
   WFPG_HD bool hemisphere() const { return hemisphere_; }
   /// Of the hemisphere.
-  WFPG_HD vec3 normal() const { return frame_.z; }
+  WFPG_HD vec3 normal() const { return normal_; }
   /// The distribution over the square.
   WFPG_HD const grid_distribution& grid() const { return grid_; }
   /// The GGX roughness from which on a lobe is nearly as wide as a diffuse one: a field knows no BSDF.
@@ -197,7 +197,7 @@ class directional_field {
 
   /// The unit direction of a point of the square.
   WFPG_HD vec3 direction(vec2 uv) const {
-    return hemisphere_ ? frame_.to_world(square_to_hemisphere(uv)) : square_to_sphere(uv);
+    return hemisphere_ ? frame().to_world(square_to_hemisphere(uv)) : square_to_sphere(uv);
   }
 
   /// A unit direction from u in [0,1)². Precondition: not empty.
@@ -221,7 +221,7 @@ class directional_field {
       uv = sphere_to_square(d);
       return true;
     }
-    vec3 local = frame_.to_local(d);
+    vec3 local = frame().to_local(d);
     if (local.z < -1.0e-5f) return false;  // what sample() draws at the horizon may round to below it
     local.z = detail::max(local.z, 0.0f);
     uv = hemisphere_to_square(local);
@@ -231,11 +231,14 @@ class directional_field {
   /// Solid angle of all cells, steradians.
   WFPG_HD float domain() const { return hemisphere_ ? 2.0f * detail::pi : 4.0f * detail::pi; }
   /// A direction of square_to_hemisphere or square_to_sphere, in the world.
-  WFPG_HD vec3 to_world(vec3 local) const { return hemisphere_ ? frame_.to_world(local) : local; }
+  WFPG_HD vec3 to_world(vec3 local) const { return hemisphere_ ? frame().to_world(local) : local; }
 
  private:
+  // Made where it is used: the ray that holds a normal while it draws needs fewer registers.
+  WFPG_HD detail::frame frame() const { return detail::frame(normal_); }
+
   grid_distribution grid_;
-  detail::frame frame_;
+  vec3 normal_{0.0f};
   bool hemisphere_ = false;
 };
 

@@ -90,13 +90,25 @@ class field_store {
 
   /// Finds or makes the fields of a wave's rays, and refreshes those that are due; what kernels sample from,
   /// until the next call. A ray without room for its field has its nearest ancestor's, or none. After 32
-  /// samples little is left to make: then one wave in 4 does, the others use what there is. A batch
+  /// samples little is left to make: then one wave in 8 does, the others use what there is. A batch
   /// caster gets at most `caster_buffer_bytes` of cones at once, and the host reads how many fields are
   /// built. Throws std::invalid_argument beyond max_rays, or where P does not divide; what a caster throws,
   /// and then the wave's fields are built again.
   template <class Surfaces, class Caster>
   guide_view prepare(const Exec& exec, const kept_field_wave<Surfaces>& wave, const Caster& caster,
                      std::size_t caster_buffer_bytes);
+
+  /// Whether the next wave makes or refreshes fields.
+  bool builds_in_wave() const { return sample_ <= busy_until_ || (sample_ + waves_) % turns == 0; }
+  /// Finds the fields of a wave's rays as prepare() does, and draws from them in the same pass:
+  ///   Serve  (std::size_t ray, std::uint32_t field), the number of one of fields(), or no_field
+  /// Precondition: not builds_in_wave(). Throws std::invalid_argument beyond max_rays.
+  template <class Surfaces, class Serve>
+  void find_and_serve(const Exec& exec, const kept_field_wave<Surfaces>& wave, const Serve& serve);
+  /// All fields, with a wave's points for products.
+  resident_fields fields(const product_points& points) const {
+    return {fields_.data(), words_.data(), options_.resolution, points};
+  }
 
   /// Where the sample's paths tell what they found; empty where fields do not learn.
   learnt_radiance_view learnt() const {
@@ -115,7 +127,7 @@ class field_store {
   }
 
   /// Geometry moved inside `bounds`, or light in a way that hits do not tell: fields from which they may be
-  /// seen are cast anew when they are next used, or within 4 samples after 32 more. Light that changes on
+  /// seen are cast anew when they are next used, or within 8 samples after 32 more. Light that changes on
   /// surfaces needs no call.
   void invalidate(const Exec& exec, const bounds3& bounds) {
     expect_builds(32);
@@ -167,8 +179,7 @@ class field_store {
     return {wanted_.data(), static_cast<std::uint32_t>(wanted_.size() - 1)};
   }
   // Once there is little to build, waves take turns: one field keeps a GPU as long as a hundred.
-  static constexpr std::uint32_t turns = 4;
-  bool builds_in_wave() const { return sample_ <= busy_until_ || (sample_ + waves_) % turns == 0; }
+  static constexpr std::uint32_t turns = 8;
   void expect_builds(std::uint32_t samples) { busy_until_ = detail::max(busy_until_, sample_ + samples); }
   bool learns() const { return learnt_.size() > 0; }
   bool limits_builds() const { return options_.max_wave_cones != detail::build_limits::none; }
@@ -185,6 +196,14 @@ class field_store {
   }
   std::uint32_t mask() const { return static_cast<std::uint32_t>(table_.size() - 1); }
 
+  template <class Surfaces>
+  void begin_wave(const Exec& exec, const kept_field_wave<Surfaces>& wave);
+  void end_wave() {
+    ++waves_;
+    in_wave_ = false;
+  }
+  template <class Surfaces>
+  detail::find_field<detail::wave_rays<Surfaces>> finder(const kept_field_wave<Surfaces>& wave);
   template <class Surfaces>
   void find(const Exec& exec, const kept_field_wave<Surfaces>& wave);
   void bear(const Exec& exec);

@@ -26,10 +26,26 @@ struct resident_fields {
   std::uint32_t resolution = 0;            ///< F
   product_points points;                   ///< of this wave
 
+  /// What field i is; no_field guides nothing.
+  WFPG_HD resident_field info(std::uint32_t i) const { return i == no_field ? resident_field{} : fields[i]; }
   /// fields[i] and its distribution.
-  WFPG_HD directional_field field(std::uint32_t i, const resident_field& info) const {
+  WFPG_HD directional_field field(std::uint32_t i, const resident_field& what) const {
     const grid_distribution grid(words + std::size_t(i) * grid_distribution::words(resolution), resolution);
-    return info.hemisphere() ? directional_field(grid, info.normal) : directional_field(grid);
+    return what.hemisphere() ? directional_field(grid, what.normal) : directional_field(grid);
+  }
+  /// The mixture of field i and a BSDF, without products; where the field guides nothing, the BSDF alone.
+  WFPG_HD guide_mixture mixture(std::uint32_t i) const {
+    const resident_field what = info(i);
+    if (!(what.fraction > 0.0f)) return {};
+    return {field(i, what), what.fraction, i};
+  }
+  /// The mixture of its product and the BSDF: P² to 2 P² evaluations of the BSDF into `weights`, P² of them,
+  /// which it reads as long as it lives. Precondition: points.resolution > 0.
+  template <class Bsdf>
+  WFPG_HD product_mixture product(std::uint32_t i, const surface<Bsdf>& s, std::uint32_t* weights) const {
+    const resident_field what = info(i);
+    if (!(what.fraction > 0.0f)) return {};
+    return {detail::multiply(field(i, what), points, s, weights), what.fraction, i};
   }
 };
 
@@ -43,25 +59,24 @@ class guide_view {
       : field_of_ray_(field_of_ray), fields_(fields) {}
 
   /// Whether the ray has a field; without one it is its BSDF's.
-  WFPG_HD bool guides(std::uint32_t ray) const { return info(ray).fraction > 0.0f; }
+  WFPG_HD bool guides(std::uint32_t ray) const { return fields_.info(field(ray)).fraction > 0.0f; }
+  /// The ray's number among fields(), or no_field.
+  WFPG_HD std::uint32_t field(std::uint32_t ray) const {
+    return ray < field_of_ray_.size() ? field_of_ray_[ray] : no_field;
+  }
+  /// What rays draw from.
+  WFPG_HD const resident_fields& fields() const { return fields_; }
 
   /// P, or 0 without products.
   WFPG_HD std::uint32_t product_resolution() const { return fields_.points.resolution; }
 
   /// The ray's mixture of field and BSDF, without products; of a ray without field, the BSDF alone.
-  WFPG_HD guide_mixture mixture(std::uint32_t ray) const {
-    const resident_field found = info(ray);
-    if (!(found.fraction > 0.0f)) return {};
-    return {fields_.field(field_of_ray_[ray], found), found.fraction, field_of_ray_[ray]};
-  }
+  WFPG_HD guide_mixture mixture(std::uint32_t ray) const { return fields_.mixture(field(ray)); }
   /// The ray's mixture of product and BSDF: P² to 2 P² evaluations of the BSDF into `words`, P² of them,
   /// which it reads as long as it lives. Precondition: product_resolution() > 0.
   template <class Bsdf>
   WFPG_HD product_mixture product(std::uint32_t ray, const surface<Bsdf>& s, std::uint32_t* words) const {
-    const resident_field found = info(ray);
-    if (!(found.fraction > 0.0f)) return {};
-    return {detail::multiply(fields_.field(field_of_ray_[ray], found), fields_.points, s, words),
-            found.fraction, field_of_ray_[ray]};
+    return fields_.product(field(ray), s, words);
   }
 
   /// A direction and its density from the field alone. Precondition: guides(ray).
@@ -89,12 +104,6 @@ class guide_view {
   }
 
  private:
-  /// Of the ray's field; one that guides nothing where it has none.
-  WFPG_HD resident_field info(std::uint32_t ray) const {
-    if (ray >= field_of_ray_.size() || field_of_ray_[ray] == no_field) return {};
-    return fields_.fields[field_of_ray_[ray]];
-  }
-
   template <class Bsdf, class F>
   WFPG_HD auto with_mixture(std::uint32_t ray, const surface<Bsdf>& s, const F& f) const {
     if (product_resolution() == 0) return f(mixture(ray));

@@ -136,6 +136,11 @@ class octree_guide : public guide_base {
   static std::uint32_t resolution_at(const guider_options& options, std::uint32_t depth);
 
   bool keeps_fields() const { return options_.fields == field_lifetime::kept; }
+  template <class Surfaces, class Random>
+  kept_field_wave<Surfaces> kept_wave(const guide_sample<Exec>& at, const wave<Surfaces, Random>& w);
+  template <class ServeField, class Surfaces, class Random, class Caster, class Serve>
+  void serve_kept(const guide_sample<Exec>& at, const wave<Surfaces, Random>& w, const Caster& caster,
+                  const Serve& serve);
   template <class Surfaces, class Random, class Caster>
   guide_view keep_wave(const guide_sample<Exec>& at, const wave<Surfaces, Random>& w, const Caster& caster);
   template <class Surfaces, class Random, class Caster>

@@ -14,6 +14,42 @@
 
 namespace wfpg::detail {
 
+/// Indices that a thread takes through steps: all through one, then all through the next.
+class cpu_run {
+ public:
+  static constexpr int most = 32;
+  /// What steps leave to each other: a value of each index.
+  template <class T>
+  using varying = lanes<T, most>;
+
+  WFPG_HD cpu_run(std::size_t first, std::size_t last)
+      : first_(first), size_(static_cast<int>(min<std::size_t>(last - first, most))) {}
+
+  /// Of all runs one begins at 0.
+  WFPG_HD std::size_t first() const { return first_; }
+  /// f(index, i) for the i-th index of the run; i is its place among varying values.
+  template <class F>
+  WFPG_HD void for_each(const F& f) const {
+    for (int i = 0; i < size_; ++i) f(first_ + static_cast<std::size_t>(i), i);
+  }
+  /// The same, and the sum of what f returns.
+  template <class F>
+  WFPG_HD auto sum(const F& f) const {
+    std::decay_t<decltype(f(first_, 0))> total(0);
+    for_each([&](std::size_t index, int i) { total += f(index, i); });
+    return total;
+  }
+  /// f() by one of the run's threads.
+  template <class F>
+  WFPG_HD void once(const F& f) const {
+    f();
+  }
+
+ private:
+  std::size_t first_;
+  int size_;
+};
+
 /// Base of a CPU policy `Derived<W>`. Derived offers
 ///   int concurrency() const;                          threads that may work at once
 ///   void parallel(n, grain, f(first, last, worker)) const;  ranges of [0, n), 0 <= worker < concurrency()
@@ -66,6 +102,15 @@ class cpu_policy {
   template <class F>
   void for_each(exec::device_count n, const F& f) const {
     for_each(n.get(), f);
+  }
+
+  /// f(run) for runs of indices that make up [0, n), in no order; of none, one run.
+  template <class F>
+  void for_each_run(std::size_t n, const F& f) const {
+    if (n == 0) return f(cpu_run(0, 0));
+    self().parallel(n, elements_per_task, [&f](std::size_t first, std::size_t last, int) {
+      for (; first < last; first += cpu_run::most) f(cpu_run(first, last));
+    });
   }
 
   /// f(block, i) for each i in [0, n), in no order; each block has `scratch_bytes` of scratch memory.

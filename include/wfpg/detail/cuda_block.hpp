@@ -85,6 +85,35 @@ class cuda_warp {
   __device__ static int lane() { return static_cast<int>(threadIdx.x) % width; }
 };
 
+/// A warp's indices, one for each lane, those below `end`.
+class cuda_run {
+ public:
+  template <class T>
+  using varying = lane_register<T>;
+
+  __device__ cuda_run(std::size_t index, std::size_t end) : index_(index), is_within_(index < end) {}
+
+  __device__ std::size_t first() const { return index_ - threadIdx.x % cuda_warp::width; }
+  template <class F>
+  __device__ void for_each(const F& f) const {
+    if (is_within_) f(index_, 0);
+  }
+  template <class F>
+  __device__ auto sum(const F& f) const {
+    using value = std::decay_t<decltype(f(index_, 0))>;
+    const lane_register<value> own{is_within_ ? f(index_, 0) : value(0)};
+    return cuda_warp().reduce(own, [](value a, value b) { return a + b; });
+  }
+  template <class F>
+  __device__ void once(const F& f) const {
+    if (threadIdx.x % cuda_warp::width == 0) f();
+  }
+
+ private:
+  std::size_t index_;
+  bool is_within_;
+};
+
 /// A thread block of `warps` warps.
 template <int Warps>
 class cuda_block {

@@ -107,17 +107,15 @@ enum class wanted_builds : std::uint32_t {
   listed,  ///< all are built
 };
 
-/// A ray of the wave gets a slot.
+/// Notes that a ray of the wave has a slot.
 struct use_slot {
   field_slots_view slots;
-  std::uint32_t* field_of_ray;
   std::uint32_t sample;
   std::uint64_t seed;
   wanted_builds wanted;
   build_list builds;
 
   WFPG_HD void operator()(std::uint32_t slot, std::size_t ray) const {
-    field_of_ray[ray] = slot;
     if (atomic_load_cached(slots.settled + slot) != 0) return;
     field_slot& s = slots.slots[slot];
     const bool is_due = s.is_due(sample);
@@ -159,102 +157,115 @@ struct wanted_keys {
   }
 };
 
-/// Rays of a wave in runs, one a block.
-struct ray_runs {
-  static constexpr std::size_t length = 2048;
+/// What became of a wave's rays: sums of `served`, `unserved` and 0, of up to 65,535 rays at once.
+struct ray_counts {
+  static constexpr std::uint32_t served = 1;
+  static constexpr std::uint32_t unserved = 1u << 16;
 
-  std::size_t rays;
   field_wave_counts* counts;
   depth_statistics* statistics;  // null: none are wanted
 
-  std::size_t size() const { return max<std::size_t>((rays + length - 1) / length, 1); }
-
-  /// What `find` gives for the rays of run i is added to the counts: served(), unserved(), or 0.
-  template <class Block, class Find>
-  WFPG_HD void count(Block& block, std::size_t i, const Find& find) const {
-    const std::size_t first = i * length;
-    const auto n = static_cast<int>(min(length, rays - first));
-    const std::uint32_t sum =
-        block.sum(n, [&](int ray) { return find(first + static_cast<std::size_t>(ray)); });
-    block.for_each(1, [&](int) { add(sum & 0xffffu, sum >> 16); });
+  WFPG_HD void add(std::uint32_t sum) const {
+    const std::uint32_t with = sum & 0xffffu, without = sum >> 16;
+    if (with > 0) atomic_add(&counts->served, with);
+    if (without > 0) atomic_add(&counts->unserved, without);
+    if (!statistics) return;
+    if (with > 0) atomic_add(&statistics->rays, std::uint64_t(with));
+    if (without > 0) atomic_add(&statistics->unbinned, std::uint64_t(without));
   }
-  WFPG_HD static std::uint32_t served() { return 1u; }
-  WFPG_HD static std::uint32_t unserved() { return 1u << 16; }
-
   WFPG_HD void unbinned() const {
     atomic_add(&counts->unbinned, 1);
     if (statistics) atomic_add(&statistics->unbinned, std::uint64_t(1));
   }
-
- private:
-  WFPG_HD void add(std::uint32_t served, std::uint32_t unserved) const {
-    if (served > 0) atomic_add(&counts->served, served);
-    if (unserved > 0) atomic_add(&counts->unserved, unserved);
-    if (!statistics) return;
-    if (served > 0) atomic_add(&statistics->rays, std::uint64_t(served));
-    if (unserved > 0) atomic_add(&statistics->unbinned, std::uint64_t(unserved));
-  }
 };
 
-/// The slot of a ray whose own field is missing: its nearest ancestor's with one, or none.
+/// The slot of a ray whose own field is missing: its nearest ancestor's with one, or none. What finds a field
+/// tells what became of its ray.
 struct use_ancestor {
   sparse_voxel_octree_view tree;
   use_slot use;
 
-  WFPG_HD std::uint32_t operator()(std::uint32_t key, std::size_t ray) const {
-    std::uint32_t slot = no_slot;
-    for (node_id node = key / orientations; slot == no_slot && node != invalid_node; node = tree.parent(node))
-      slot = use.slots.find(node * orientations + key % orientations);
-    if (slot != no_slot) {
-      use(slot, ray);
-      return ray_runs::served();
-    }
-    use.field_of_ray[ray] = no_slot;
-    return ray_runs::unserved();
+  WFPG_HD std::uint32_t operator()(std::uint32_t key, std::size_t ray, std::uint32_t& field) const {
+    field = no_slot;
+    for (node_id node = key / orientations; field == no_slot && node != invalid_node;
+         node = tree.parent(node))
+      field = use.slots.find(node * orientations + key % orientations);
+    if (field == no_slot) return ray_counts::unserved;
+    use(field, ray);
+    return ray_counts::served;
   }
 };
 
 /// Finds rays' slots, and counts the rays where `counted`. `Rays`: (std::size_t) -> ray_to_bin.
 template <class Rays>
-struct find_fields {
-  static constexpr bool waits_for_memory = true;
-
+struct find_field {
   Rays rays;
-  ray_runs runs;
+  ray_counts counts;
   bin_marks_view marks;
   use_ancestor ancestor;
   wanted_keys wanted;
   counted_rays counted;
+
+  WFPG_HD std::uint32_t operator()(std::size_t i, std::uint32_t& field) const {
+    const use_slot& use = ancestor.use;
+    const ray_to_bin ray = rays(i);
+    const node_id leaf = ray.active ? leaf_of(ancestor.tree, ray) : invalid_node;
+    if (leaf == invalid_node) {
+      field = no_slot;
+      if (ray.active) counts.unbinned();
+      return 0;
+    }
+    if (counted.includes(i)) marks.count(leaf, counted.stride);
+    const std::uint32_t key = marks.bin(leaf) * orientations + ray.orientation;
+    field = use.slots.find(key);
+    if (field != no_slot) {
+      use(field, i);
+      return ray_counts::served;
+    }
+    if (use.wanted == wanted_builds::none) return ancestor(key, i, field);
+    field = missing_key::marked(key);
+    wanted.ask(key);
+    atomic_store(&counts.counts->missing, 1u);
+    return 0;
+  }
+};
+
+/// A wave's rays in runs, one a block.
+struct ray_runs {
+  static constexpr std::size_t length = 2048;
+
+  std::size_t rays;
+  std::uint32_t* field_of_ray;
+  ray_counts counts;
+
+  std::size_t size() const { return max<std::size_t>((rays + length - 1) / length, 1); }
+
+  /// find(ray, field) gives the rays of run i their fields.
+  template <class Block, class Find>
+  WFPG_HD void find(Block& block, std::size_t i, const Find& find) const {
+    const std::size_t first = i * length;
+    const auto n = static_cast<int>(min(length, rays - first));
+    const std::uint32_t sum = block.sum(n, [&](int k) {
+      const std::size_t ray = first + static_cast<std::size_t>(k);
+      return find(ray, field_of_ray[ray]);
+    });
+    block.for_each(1, [&](int) { counts.add(sum); });
+  }
+};
+
+/// Fields are written, to be built next.
+template <class Rays>
+struct find_fields {
+  static constexpr bool waits_for_memory = true;
+
+  find_field<Rays> find;
+  ray_runs runs;
   field_wave_counts* next;  // of the wave after this one
 
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t i) const {
     if (i == 0) block.for_each(1, [&](int) { *next = {}; });
-    runs.count(block, i, [&](std::size_t ray) { return find(ray); });
-  }
-
- private:
-  WFPG_HD std::uint32_t find(std::size_t i) const {
-    const use_slot& use = ancestor.use;
-    const ray_to_bin ray = rays(i);
-    const node_id leaf = ray.active ? leaf_of(ancestor.tree, ray) : invalid_node;
-    if (leaf == invalid_node) {
-      use.field_of_ray[i] = no_slot;
-      if (ray.active) runs.unbinned();
-      return 0;
-    }
-    if (counted.includes(i)) marks.count(leaf, counted.stride);
-    const std::uint32_t key = marks.bin(leaf) * orientations + ray.orientation;
-    const std::uint32_t slot = use.slots.find(key);
-    if (slot != no_slot) {
-      use(slot, i);
-      return ray_runs::served();
-    }
-    if (use.wanted == wanted_builds::none) return ancestor(key, i);
-    use.field_of_ray[i] = missing_key::marked(key);
-    wanted.ask(key);
-    atomic_store(&runs.counts->missing, 1u);
-    return 0;
+    runs.find(block, i, find);
   }
 };
 
@@ -265,11 +276,29 @@ struct find_missing_fields {
 
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t i) const {
-    if (runs.counts->missing == 0) return;
-    runs.count(block, i, [&](std::size_t ray) {
-      const std::uint32_t field = own_or_ancestor.use.field_of_ray[ray];
-      return missing_key::is_marked(field) ? own_or_ancestor(missing_key::key(field), ray) : 0u;
+    if (runs.counts.counts->missing == 0) return;
+    runs.find(block, i, [&](std::size_t ray, std::uint32_t& field) {
+      return missing_key::is_marked(field) ? own_or_ancestor(missing_key::key(field), ray, field) : 0u;
     });
+  }
+};
+
+/// Fields are found and drawn from at once: serve(ray, field).
+template <class Rays, class Serve>
+struct find_and_serve {
+  find_field<Rays> find;
+  Serve serve;
+  field_wave_counts* next;
+
+  template <class Run>
+  WFPG_HD void operator()(const Run& run) const {
+    typename Run::template varying<std::uint32_t> fields;
+    const std::uint32_t sum = run.sum([&](std::size_t ray, int i) { return find(ray, fields[i]); });
+    run.once([&] {
+      find.counts.add(sum);
+      if (run.first() == 0) *next = {};
+    });
+    run.for_each([&](std::size_t ray, int i) { serve(ray, fields[i]); });
   }
 };
 

@@ -157,11 +157,7 @@ guide_view field_store<Exec>::prepare(const Exec& exec, const kept_field_wave<Su
                                       const Caster& caster, std::size_t caster_buffer_bytes) {
   static_assert(is_ray_caster_v<Caster, Exec>,
                 "caster: needs ray_hit operator()(const ray&) const, or cast(exec, rays, hits) const");
-  detail::require(wave.ray_count <= field_of_ray_.size(), "ray_count", wave.ray_count, "at most max_rays");
-  detail::require_product_resolution(wave.points.resolution, "kept.resolution", options_.resolution);
-  if (in_wave_)
-    exec.for_each(detail::max<std::size_t>(capacity_, 1), detail::forget_wave{slots_.view(), counts()});
-  in_wave_ = true;
+  begin_wave(exec, wave);
   find(exec, wave);
   const detail::kept_fields_view kept{
       view(),         fields_.data(),           words_.data(),       hits_.data(),
@@ -170,33 +166,61 @@ guide_view field_store<Exec>::prepare(const Exec& exec, const kept_field_wave<Su
   if (builds_in_wave())
     build(exec, detail::kept_field_builder<kept_field_wave<Surfaces>>{wave, kept}, caster,
           caster_buffer_bytes);
-  ++waves_;
-  in_wave_ = false;
-  return {{field_of_ray_.data(), wave.ray_count},
-          {fields_.data(), words_.data(), options_.resolution, wave.points}};
+  end_wave();
+  return {{field_of_ray_.data(), wave.ray_count}, fields(wave.points)};
+}
+
+template <class Exec>
+template <class Surfaces, class Serve>
+void field_store<Exec>::find_and_serve(const Exec& exec, const kept_field_wave<Surfaces>& wave,
+                                       const Serve& serve) {
+  begin_wave(exec, wave);
+  exec.for_each_run(wave.ray_count, detail::find_and_serve<detail::wave_rays<Surfaces>, Serve>{
+                                        finder(wave), serve, other_counts()});
+  end_wave();
+}
+
+template <class Exec>
+template <class Surfaces>
+void field_store<Exec>::begin_wave(const Exec& exec, const kept_field_wave<Surfaces>& wave) {
+  detail::require(wave.ray_count <= field_of_ray_.size(), "ray_count", wave.ray_count, "at most max_rays");
+  detail::require_product_resolution(wave.points.resolution, "kept.resolution", options_.resolution);
+  if (in_wave_)
+    exec.for_each(detail::max<std::size_t>(capacity_, 1), detail::forget_wave{slots_.view(), counts()});
+  in_wave_ = true;
+}
+
+/// What finds a ray's slot.
+template <class Exec>
+template <class Surfaces>
+detail::find_field<detail::wave_rays<Surfaces>> field_store<Exec>::finder(
+    const kept_field_wave<Surfaces>& wave) {
+  using detail::wanted_builds;
+  const wanted_builds wanted_now = !builds_in_wave() ? wanted_builds::none
+                                   : limits_builds() ? wanted_builds::marked
+                                                     : wanted_builds::listed;
+  const detail::build_list builds{list_.data(), counts()};
+  const detail::use_slot use{view(), sample_, wave.seed, wanted_now, builds};
+  return {{wave.surfaces, wave.mode},
+          {counts(), wave.statistics},
+          marks_.view(),
+          {tree_, use},
+          wanted(),
+          counted()};
 }
 
 /// Gives rays their slots, new ones where there is room.
 template <class Exec>
 template <class Surfaces>
 void field_store<Exec>::find(const Exec& exec, const kept_field_wave<Surfaces>& wave) {
-  using rays_type = detail::wave_rays<Surfaces>;
-  using detail::wanted_builds;
-  const wanted_builds wanted_now = !builds_in_wave() ? wanted_builds::none
-                                   : limits_builds() ? wanted_builds::marked
-                                                     : wanted_builds::listed;
-  const detail::build_list builds{list_.data(), counts()};
-  const detail::use_slot use{view(), field_of_ray_.data(), sample_, wave.seed, wanted_now, builds};
-  const detail::ray_runs runs{wave.ray_count, counts(), wave.statistics};
-  const detail::use_ancestor ancestor{tree_, use};
-  exec.for_each_block(
-      runs.size(), 0,
-      detail::find_fields<rays_type>{
-          {wave.surfaces, wave.mode}, runs, marks_.view(), ancestor, wanted(), counted(), other_counts()});
+  const auto find = finder(wave);
+  const detail::ray_runs runs{wave.ray_count, field_of_ray_.data(), find.counts};
+  exec.for_each_block(runs.size(), 0,
+                      detail::find_fields<detail::wave_rays<Surfaces>>{find, runs, other_counts()});
   if (!builds_in_wave()) return;
   bear(exec);
-  exec.for_each_block(runs.size(), 0, detail::find_missing_fields{runs, ancestor});
-  if (limits_builds()) list(exec, wave.seed, builds);
+  exec.for_each_block(runs.size(), 0, detail::find_missing_fields{runs, find.ancestor});
+  if (limits_builds()) list(exec, wave.seed, find.ancestor.use.builds);
 }
 
 /// Gives free slots to wanted keys.

@@ -141,15 +141,28 @@ template <class Exec>
 template <class Surfaces, class Random, class Caster, class Serve>
 void octree_guide<Exec>::serve(const guide_sample<Exec>& at, const wave<Surfaces, Random>& w,
                                const Caster& caster, const Serve& serve) {
-  if (!keeps_fields()) return serve_transient(at, w, caster, serve);
-  const guide_view view = keep_wave(at, w, caster);
-  const auto timed = at.clock.time(detail::stage::serve);
-  if (!at.guided)
-    at.exec.for_each(w.ray_count, detail::serve_unbinned<Serve>{serve, {}});
-  else if (view.product_resolution() == 0)
-    at.exec.for_each(w.ray_count, detail::serve_view<Serve>{serve, view});
+  if (!keeps_fields())
+    serve_transient(at, w, caster, serve);
+  else if (options_.product_resolution > 0)
+    serve_kept<detail::serve_product<Serve>>(at, w, caster, serve);
   else
-    at.exec.for_each(w.ray_count, detail::serve_products<Serve>{serve, view});
+    serve_kept<detail::serve_field<Serve>>(at, w, caster, serve);
+}
+
+/// What kept fields are made for.
+template <class Exec>
+template <class Surfaces, class Random>
+kept_field_wave<Surfaces> octree_guide<Exec>::kept_wave(const guide_sample<Exec>& at,
+                                                        const wave<Surfaces, Random>& w) {
+  return {w.ray_count,
+          w.surfaces,
+          cache_.view(),
+          options_.field,
+          options_.mode,
+          fraction().with_enough_rays,
+          detail::hash(at.seed, w.depth),
+          points_at(at, w.depth),
+          depth_counts(w.depth)};
 }
 
 /// Kept fields: found, made and refreshed.
@@ -158,21 +171,29 @@ template <class Surfaces, class Random, class Caster>
 guide_view octree_guide<Exec>::keep_wave(const guide_sample<Exec>& at, const wave<Surfaces, Random>& w,
                                          const Caster& caster) {
   const auto timed = at.clock.time(detail::stage::fields);
-  if (!at.guided) {
-    if (w.depth < options_.guided_depths)  // bins are for rays that are to have fields
-      store_.count(at.exec, w.ray_count, detail::wave_rays<Surfaces>{w.surfaces, options_.mode});
-    return {};
+  if (at.guided) return store_.prepare(at.exec, kept_wave(at, w), caster, options_.caster_buffer_bytes);
+  if (w.depth < options_.guided_depths)  // bins are for rays that are to have fields
+    store_.count(at.exec, w.ray_count, detail::wave_rays<Surfaces>{w.surfaces, options_.mode});
+  return {};
+}
+
+/// The same, and drawn from, in one pass where no field is to be made in between.
+template <class Exec>
+template <class ServeField, class Surfaces, class Random, class Caster, class Serve>
+void octree_guide<Exec>::serve_kept(const guide_sample<Exec>& at, const wave<Surfaces, Random>& w,
+                                    const Caster& caster, const Serve& serve) {
+  if (at.guided && !store_.builds_in_wave()) {
+    const auto timed = at.clock.time(detail::stage::serve);
+    const kept_field_wave<Surfaces> kept = kept_wave(at, w);
+    store_.find_and_serve(at.exec, kept, ServeField{serve, store_.fields(kept.points)});
+    return;
   }
-  const kept_field_wave<Surfaces> wave{w.ray_count,
-                                       w.surfaces,
-                                       cache_.view(),
-                                       options_.field,
-                                       options_.mode,
-                                       fraction().with_enough_rays,
-                                       detail::hash(at.seed, w.depth),
-                                       points_at(at, w.depth),
-                                       depth_counts(w.depth)};
-  return store_.prepare(at.exec, wave, caster, options_.caster_buffer_bytes);
+  const guide_view view = keep_wave(at, w, caster);
+  const auto timed = at.clock.time(detail::stage::serve);
+  if (at.guided)
+    at.exec.for_each(w.ray_count, detail::serve_view<ServeField>{{serve, view.fields()}, view});
+  else
+    at.exec.for_each(w.ray_count, detail::serve_unbinned<Serve>{serve, {}});
 }
 
 /// Transient fields in scratch memory.

@@ -53,27 +53,33 @@ struct serve_ray {
   }
 };
 
-/// Rays whose fields are in memory.
+/// A ray whose field is in memory.
+template <class Serve>
+struct serve_field {
+  Serve serve;
+  resident_fields fields;
+  WFPG_HD void operator()(std::size_t ray, std::uint32_t field) const {
+    serve(static_cast<std::uint32_t>(ray), [&](const auto&) { return fields.mixture(field); });
+  }
+};
+
+/// The same with its product.
+template <class Serve>
+struct serve_product {
+  Serve serve;
+  resident_fields fields;
+  WFPG_HD void operator()(std::size_t ray, std::uint32_t field) const {
+    std::uint32_t words[max_product_words];
+    serve(static_cast<std::uint32_t>(ray), [&](const auto& s) { return fields.product(field, s, words); });
+  }
+};
+
+/// Rays of a view: serve(ray, field).
 template <class Serve>
 struct serve_view {
   Serve serve;
   guide_view view;
-  WFPG_HD void operator()(std::size_t i) const {
-    const auto ray = static_cast<std::uint32_t>(i);
-    serve(ray, [&](const auto&) { return view.mixture(ray); });
-  }
-};
-
-/// The same with products.
-template <class Serve>
-struct serve_products {
-  Serve serve;
-  guide_view view;
-  WFPG_HD void operator()(std::size_t i) const {
-    const auto ray = static_cast<std::uint32_t>(i);
-    std::uint32_t words[max_product_words];
-    serve(ray, [&](const auto& s) { return view.product(ray, s, words); });
-  }
+  WFPG_HD void operator()(std::size_t ray) const { serve(ray, view.field(static_cast<std::uint32_t>(ray))); }
 };
 
 /// What one ray draws from of a guide's view that has no mixture of its own for it.

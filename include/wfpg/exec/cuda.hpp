@@ -100,6 +100,11 @@ __global__ void for_each_kernel(Count n, F f) {
   for (std::size_t i = std::size_t(blockIdx.x) * blockDim.x + threadIdx.x; i < count; i += stride) f(i);
 }
 
+template <class F>
+__global__ void for_each_run_kernel(std::size_t n, F f) {
+  f(cuda_run(std::size_t(blockIdx.x) * blockDim.x + threadIdx.x, n));
+}
+
 /// Of 512 threads, the least that registers are to allow a multiprocessor, of the smallest there are. Two, so
 /// that shared memory may be large; all where F says that it `waits_for_memory`.
 template <class F, class = void>
@@ -204,6 +209,13 @@ class cuda {
     if (n.capacity == 0) return;
     const std::size_t blocks = (n.capacity + threads - 1) / threads;
     launch(wfpg::detail::for_each_kernel<device_count, F>, at_most_resident(blocks), threads, 0, n, f);
+  }
+
+  /// f(run) for runs of indices that make up [0, n), in no order; of none, one run or more.
+  template <class F>
+  void for_each_run(std::size_t n, const F& f) const {
+    const std::size_t blocks = n > 0 ? (n + threads - 1) / threads : 1;
+    launch(wfpg::detail::for_each_run_kernel<F>, blocks, threads, 0, n, f);
   }
 
   /// f(block, i) for each i in [0, n), by blocks with `scratch_bytes` of shared memory each. Throws

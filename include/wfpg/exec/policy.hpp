@@ -1,7 +1,7 @@
 // What an execution policy is. Algorithms are templates over one and mention no backend; the policies are
 // exec/seq.hpp, exec/omp.hpp, exec/tbb.hpp and exec/cuda.hpp.
 //
-// A policy is a small copyable object that answers four questions:
+// A policy is a small copyable object that answers five questions:
 //
 //   1. where memory comes from:  memory_resource* resource() const;
 //                                Exec with_resource(memory_resource*) const;
@@ -14,7 +14,12 @@
 //                                stable; the low `bits` bits of the unsigned keys are in their order
 //   3. a loop over indices:      void for_each(n, f) const;  f(i), in no order; f is a functor with a const
 //                                operator() that the device can call
-//   4. a loop over blocks:       void for_each_block(n, scratch_bytes, f) const;  f(block, i), where `block`
+//   4. a loop in steps:          void for_each_run(n, f) const;  f(run): indices that go through the steps of
+//   f
+//                                together, a warp's or some hundreds of a CPU's, so that what one step waits
+//                                for on a CPU is there for the next, and stays in registers on a GPU
+//                                (cpu_run in detail/cpu_policy.hpp says what a run offers); of no index too
+//   5. a loop over blocks:       void for_each_block(n, scratch_bytes, f) const;  f(block, i), where `block`
 //                                is a team of threads with fast scratch memory (detail/cpu_block.hpp says
 //                                what a block and its warps offer)
 //
