@@ -131,6 +131,52 @@ WFPG_TEST_CASE("field store: after many samples one wave in eight builds, whatev
   }
 }
 
+WFPG_TEST_CASE("field store: waves that build nothing find what others do, and every wave is counted alone",
+               "[field_store]") {
+  kept_box<Exec> box(slots_of(4, 40));
+  auto wave = floor_rays(3);
+  wave.push_back(make_surface({9.0f, 9.0f, 9.0f}, up, up));
+  while (box.sample < 41) box.whole_sample(wave);
+  int found = 0, built = 0;
+  for (int sample = 0; sample < 6; ++sample) {
+    box.begin();
+    for (int i = 0; i < 5; ++i) {
+      INFO("sample " << box.sample << ", wave " << i);
+      const bool builds = box.store.builds_in_wave(), is_empty = i == 2;
+      const auto rays = is_empty ? std::vector<test_surface>() : wave;
+      const guide_view view = builds ? box.prepare(rays) : guide_view();
+      const auto numbers = builds ? evaluate(box.exec(), rays.size(),
+                                             [=] WFPG_HD(std::size_t ray) {
+                                               return view.number(static_cast<std::uint32_t>(ray));
+                                             })
+                                  : box.find(rays);
+      (builds ? built : found) += is_empty ? 0 : 1;
+      const auto counts = box.last_wave();
+      CHECK(counts.served == (is_empty ? 0 : 3));
+      CHECK(counts.unserved == 0);
+      CHECK(counts.unbinned == (is_empty ? 0 : 1));
+      CHECK(counts.builds <= 3);
+      if (is_empty) continue;
+      CHECK(numbers[3] == wfpg::no_field);
+      for (int ray = 0; ray < 3; ++ray) CHECK(numbers[ray] < 40);
+      CHECK(std::set<std::uint32_t>(numbers.begin(), numbers.end()).size() == 4);
+    }
+    box.end();
+  }
+  CHECK(found > 15);
+  CHECK(built > 1);
+}
+
+WFPG_TEST_CASE("field store: who is to find fields only is given none that are not there", "[field_store]") {
+  kept_box<Exec> box(slots_of(4, 40));
+  box.begin();
+  CHECK(box.store.builds_in_wave());
+  CHECK(box.find(floor_rays(3)) == std::vector<std::uint32_t>(3, wfpg::no_field));
+  CHECK(box.last_wave().unserved == 3);
+  CHECK(box.cones(floor_rays(3)) == 3 * 16);
+  CHECK(box.last_wave().served == 3);
+}
+
 WFPG_TEST_CASE("field store: what is invalidated after many samples is cast in the next wave",
                "[field_store]") {
   kept_box<Exec> box(slots_of(4, 40));

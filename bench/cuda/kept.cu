@@ -88,8 +88,8 @@ void refreshing_slots(benchmark::State& state) {
       state, exec, [&] { build(false); }, copy_of(exec, found.bytes() + words.bytes()), renew);
 }
 
-/// A wave's rays to their slots, a direction and a density each, where no field is due; the floor reads the
-/// surfaces and writes the directions.
+/// A wave's rays to their slots, a direction and a density each, where fields would be built, but none is
+/// due; the floor reads the surfaces and writes the directions.
 void serving_kept(benchmark::State& state) {
   const exec_policy exec;
   const room_mesh mesh(exec, 100000);

@@ -58,7 +58,7 @@ struct render_options {
   std::uint32_t min_bin_level = 3;                    ///< l_min, from the root
   std::uint32_t deposits_per_leaf = 16;               ///< that are recorded in a sample; 0: all
   float guide_fraction = 0.0f;                        ///< in [0, 1]; 0: the mode's own, 0.5 of Open PGL's
-  /// Of a path, from its first vertex on, at least 1; never, with next-event estimation, the last direction.
+  /// Of a path, from its first vertex on, at least 1; with next-event estimation never the last of several.
   std::uint32_t guided_depths = 0xffffffffu;
   std::uint32_t light_groups = 32;           ///< that guided paths learn to choose lights from, in [1, 255]
   std::uint32_t samples_per_leaf = 32000;    ///< after which Open PGL's field splits a leaf, 8 to 2^30

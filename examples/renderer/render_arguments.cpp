@@ -154,9 +154,10 @@ void add_guider_options(CLI::App& app, render_options& options) {
   app.add_option("--guide-fraction", options.guide_fraction,
                  "samples drawn from fields (default: the mode's)")
       ->check(CLI::Range(0.0, 1.0));
-  app.add_option("--guided-depths", options.guided_depths,
-                 "so many vertices of a path are guided, the first ones (default: all; the last, whose "
-                 "direction finds emitters alone, never where --nee is on)")
+  app.add_option(
+         "--guided-depths", options.guided_depths,
+         "so many vertices of a path are guided, the first ones (default: all; with --nee on never the "
+         "last of several, whose direction finds emitters alone)")
       ->check(CLI::PositiveNumber);
   app.add_option("--samples-per-leaf", options.samples_per_leaf,
                  "after which Open PGL splits a leaf of its field (default: 32000)")

@@ -93,11 +93,11 @@ void take_samples(path_tracer<Exec, Caster>& tracer, Guider& guider, const pinho
   result.report.spp = budget.samples();
 }
 
-/// Of a path's depths those that are guided. The last direction finds emitters alone: where next-event
-/// estimation finds them too, it is left to the BSDF.
+/// Of a path's depths those that are guided. The last direction, where it is not the first, finds emitters
+/// alone: where next-event estimation finds them too, it is left to the BSDF.
 inline std::uint32_t guided_depths(const render_options& options) {
-  const auto last = static_cast<std::uint32_t>(options.max_depth > 2 ? options.max_depth - 2 : 1);
-  return options.nee ? std::min(options.guided_depths, last) : options.guided_depths;
+  const auto all_but_last = static_cast<std::uint32_t>(std::max(options.max_depth - 2, 1));
+  return options.nee ? std::min(options.guided_depths, all_but_last) : options.guided_depths;
 }
 
 /// What every guide is told.

@@ -4,8 +4,8 @@
 // Fields are the paper's (section 3.3), and their nodes are chosen as its bins are (Algorithm 2); that they
 // are kept and that they learn is wfpg's own.
 //
-// A sample:  begin_sample, then for each wave prepare, then end_sample. Nothing is read back to the host with
-// an inline caster.
+// A sample:  begin_sample, then for each wave prepare, or find_and_serve where it would build none, then
+//            end_sample. Nothing is read back to the host with an inline caster.
 //
 // Cost of a wave of n rays: O(n · depth) look-ups; F² cones a new slot, F²/R a refreshed one; O(F²) either.
 // Memory: the budget, 4 bytes a ray, 8 bytes a leaf and 4 an inner node; where fields learn, in a sample, 16
@@ -100,9 +100,10 @@ class field_store {
 
   /// Whether the next wave makes or refreshes fields.
   bool builds_in_wave() const { return sample_ <= busy_until_ || (sample_ + waves_) % turns == 0; }
-  /// Finds the fields of a wave's rays as prepare() does, and draws from them in the same pass:
+  /// Finds the fields of a wave's rays, makes none, and draws from those that there are in the same pass:
   ///   Serve  (std::size_t ray, std::uint32_t field), the number of one of fields(), or no_field
-  /// Precondition: not builds_in_wave(). Throws std::invalid_argument beyond max_rays.
+  /// For waves in which prepare() would make none either. Throws std::invalid_argument beyond max_rays, or
+  /// where P does not divide.
   template <class Surfaces, class Serve>
   void find_and_serve(const Exec& exec, const kept_field_wave<Surfaces>& wave, const Serve& serve);
   /// All fields, with a wave's points for products.
@@ -203,7 +204,8 @@ class field_store {
     in_wave_ = false;
   }
   template <class Surfaces>
-  detail::find_field<detail::wave_rays<Surfaces>> finder(const kept_field_wave<Surfaces>& wave);
+  detail::find_field<detail::wave_rays<Surfaces>> finder(const kept_field_wave<Surfaces>& wave,
+                                                         detail::wanted_builds wanted_now);
   template <class Surfaces>
   void find(const Exec& exec, const kept_field_wave<Surfaces>& wave);
   void bear(const Exec& exec);

@@ -89,7 +89,7 @@ struct guide_base {
 
   /// Whether it draws the directions of a whole wave by itself:
   ///   void serve(const guide_sample<Exec>&, const wave<Surfaces, Random>&, const Caster&, const Serve&);
-  /// as the octree's does, whose fields are gone when their rays are served.
+  /// as the octree's does, whose transient fields are gone when their rays are served.
   static constexpr bool serves_waves = false;
 };
 

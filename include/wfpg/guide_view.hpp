@@ -59,9 +59,9 @@ class guide_view {
       : field_of_ray_(field_of_ray), fields_(fields) {}
 
   /// Whether the ray has a field; without one it is its BSDF's.
-  WFPG_HD bool guides(std::uint32_t ray) const { return fields_.info(field(ray)).fraction > 0.0f; }
+  WFPG_HD bool guides(std::uint32_t ray) const { return fields_.info(number(ray)).fraction > 0.0f; }
   /// The ray's number among fields(), or no_field.
-  WFPG_HD std::uint32_t field(std::uint32_t ray) const {
+  WFPG_HD std::uint32_t number(std::uint32_t ray) const {
     return ray < field_of_ray_.size() ? field_of_ray_[ray] : no_field;
   }
   /// What rays draw from.
@@ -71,12 +71,12 @@ class guide_view {
   WFPG_HD std::uint32_t product_resolution() const { return fields_.points.resolution; }
 
   /// The ray's mixture of field and BSDF, without products; of a ray without field, the BSDF alone.
-  WFPG_HD guide_mixture mixture(std::uint32_t ray) const { return fields_.mixture(field(ray)); }
+  WFPG_HD guide_mixture mixture(std::uint32_t ray) const { return fields_.mixture(number(ray)); }
   /// The ray's mixture of product and BSDF: P² to 2 P² evaluations of the BSDF into `words`, P² of them,
   /// which it reads as long as it lives. Precondition: product_resolution() > 0.
   template <class Bsdf>
   WFPG_HD product_mixture product(std::uint32_t ray, const surface<Bsdf>& s, std::uint32_t* words) const {
-    return fields_.product(field(ray), s, words);
+    return fields_.product(number(ray), s, words);
   }
 
   /// A direction and its density from the field alone. Precondition: guides(ray).
@@ -84,7 +84,7 @@ class guide_view {
     sampled_direction result;
     result.direction = mixture(ray).field.sample(u, result.pdf);
     result.technique = sampling_technique::guide;
-    result.field = field_of_ray_[ray];
+    result.field = number(ray);
     return result;
   }
   /// The field's density of a unit direction, per steradian. Precondition: guides(ray).

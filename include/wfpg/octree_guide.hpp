@@ -84,7 +84,7 @@ class octree_guide : public guide_base {
   guide_view prepare(const guide_sample<Exec>& at, const wave<Surfaces, Random>& w, const Caster& caster) {
     return keeps_fields() ? keep_wave(at, w, caster) : make_resident(at, w, caster);
   }
-  static constexpr bool serves_waves = true;  ///< transient fields in scratch memory, products in a kernel
+  static constexpr bool serves_waves = true;  ///< transient fields in scratch memory, kept ones in one pass
   /// Draws the directions of a wave; Serve is detail::serve_ray.
   template <class Surfaces, class Random, class Caster, class Serve>
   void serve(const guide_sample<Exec>& at, const wave<Surfaces, Random>& w, const Caster& caster,

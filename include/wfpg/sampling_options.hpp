@@ -14,8 +14,8 @@ struct sampling_options {
   /// Share of guided samples, in [0, 1]; 0: the guide's own.
   float guide_fraction = 0.0f;
   /// Depths that are guided, from 0 on, at least 1; deeper rays are their BSDFs'. By default all. Beside
-  /// next-event estimation leave out the depth of a path's last direction, which finds emitters alone: it is
-  /// as well drawn from the BSDF, for less.
+  /// next-event estimation leave out the depth of a path's last direction, which finds emitters alone and is
+  /// as well drawn from the BSDF, for less: n - 2 of paths of n segments, if that is one or more.
   std::uint32_t guided_depths = 0xffffffffu;
   /// Guide toward emitters themselves. Beside next-event estimation they count with their MIS weight, and
   /// false leaves them to it: better where fields do not learn.

@@ -15,7 +15,7 @@ namespace wfpg {
 
 /// Time of one stage, in all.
 struct stage_time {
-  const char* name;  ///< bin, fields, serve, record or cache
+  const char* name;  ///< bin, fields, serve (where a wave makes no fields, finding them too), record or cache
   double seconds;    ///< of the host: on a device that of launching, unless a call waits
 };
 

@@ -69,6 +69,11 @@ inline wfpg::kept_field_options slots_of(std::uint32_t resolution, std::size_t s
   return options;
 }
 
+struct note_number {
+  wfpg::array_view<std::uint32_t> numbers;
+  WFPG_HD void operator()(std::size_t ray, std::uint32_t field) const { numbers[ray] = field; }
+};
+
 /// A store over the box with the patch. Fields are over nodes of level 2 until a marking.
 template <class Exec>
 struct kept_box {
@@ -96,18 +101,15 @@ struct kept_box {
   template <class Caster>
   wfpg::guide_view prepare(const std::vector<test_surface>& wave, const Caster& caster,
                            std::size_t buffer_bytes = std::size_t(1) << 20) {
-    surfaces = wfpg::buffer<test_surface, Exec>(exec(), wave);
-    const wfpg::kept_field_wave<stored_surfaces> kept{wave.size(),
-                                                      {const_view<test_surface>(surfaces)},
-                                                      box.cache.view(),
-                                                      field,
-                                                      mode,
-                                                      0.7f,
-                                                      wfpg::detail::hash(7, sample),
-                                                      {}};
-    return store.prepare(exec(), kept, caster, buffer_bytes);
+    return store.prepare(exec(), kept(wave), caster, buffer_bytes);
   }
   wfpg::guide_view prepare(const std::vector<test_surface>& wave) { return prepare(wave, log.caster()); }
+  /// A wave that makes no fields: each ray's number.
+  std::vector<std::uint32_t> find(const std::vector<test_surface>& wave) {
+    const wfpg::buffer<std::uint32_t, Exec> numbers(exec(), wave.size());
+    store.find_and_serve(exec(), kept(wave), note_number{numbers.view()});
+    return numbers.to_host(exec());
+  }
   /// Cones that a wave casts.
   std::size_t cones(const std::vector<test_surface>& wave) {
     log.take();
@@ -137,6 +139,19 @@ struct kept_box {
   /// A ray's field; its cells lie in the policy's memory.
   wfpg::directional_field field_of(const wfpg::guide_view& view, std::uint32_t ray) const {
     return evaluate(exec(), [=] WFPG_HD() { return view.mixture(ray).field; });
+  }
+
+ private:
+  wfpg::kept_field_wave<stored_surfaces> kept(const std::vector<test_surface>& wave) {
+    surfaces = wfpg::buffer<test_surface, Exec>(exec(), wave);
+    return {wave.size(),
+            {const_view<test_surface>(surfaces)},
+            box.cache.view(),
+            field,
+            mode,
+            0.7f,
+            wfpg::detail::hash(7, sample),
+            {}};
   }
 };
 

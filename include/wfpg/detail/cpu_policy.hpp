@@ -14,14 +14,17 @@
 
 namespace wfpg::detail {
 
-/// Indices that a thread takes through steps: all through one, then all through the next.
+/// Indices that go through steps: what one step waits for is there for the next on a CPU, and in registers on
+/// a device, where an index has a thread. All threads make every call; a run may be empty. From step to step
+/// an index sees what itself left, in memory and among varying values, and nobody else's.
 class cpu_run {
  public:
-  static constexpr int most = 32;
+  static constexpr int most = 32;  ///< indices
   /// What steps leave to each other: a value of each index.
   template <class T>
   using varying = lanes<T, most>;
 
+  /// Of [first, last) as many as a run has.
   WFPG_HD cpu_run(std::size_t first, std::size_t last)
       : first_(first), size_(static_cast<int>(min<std::size_t>(last - first, most))) {}
 
@@ -104,7 +107,7 @@ class cpu_policy {
     for_each(n.get(), f);
   }
 
-  /// f(run) for runs of indices that make up [0, n), in no order; of none, one run.
+  /// f(run) for runs of indices that make up [0, n), in no order; also where n is 0.
   template <class F>
   void for_each_run(std::size_t n, const F& f) const {
     if (n == 0) return f(cpu_run(0, 0));

@@ -186,12 +186,12 @@ struct use_ancestor {
   use_slot use;
 
   WFPG_HD std::uint32_t operator()(std::uint32_t key, std::size_t ray, std::uint32_t& field) const {
-    field = no_slot;
-    for (node_id node = key / orientations; field == no_slot && node != invalid_node;
-         node = tree.parent(node))
-      field = use.slots.find(node * orientations + key % orientations);
-    if (field == no_slot) return ray_counts::unserved;
-    use(field, ray);
+    std::uint32_t slot = no_slot;
+    for (node_id node = key / orientations; slot == no_slot && node != invalid_node; node = tree.parent(node))
+      slot = use.slots.find(node * orientations + key % orientations);
+    field = slot;
+    if (slot == no_slot) return ray_counts::unserved;
+    use(slot, ray);
     return ray_counts::served;
   }
 };
@@ -217,9 +217,10 @@ struct find_field {
     }
     if (counted.includes(i)) marks.count(leaf, counted.stride);
     const std::uint32_t key = marks.bin(leaf) * orientations + ray.orientation;
-    field = use.slots.find(key);
-    if (field != no_slot) {
-      use(field, i);
+    const std::uint32_t slot = use.slots.find(key);
+    if (slot != no_slot) {
+      field = slot;
+      use(slot, i);
       return ray_counts::served;
     }
     if (use.wanted == wanted_builds::none) return ancestor(key, i, field);
@@ -230,8 +231,8 @@ struct find_field {
   }
 };
 
-/// A wave's rays in runs, one a block.
-struct ray_runs {
+/// A wave's rays, so many a block.
+struct ray_blocks {
   static constexpr std::size_t length = 2048;
 
   std::size_t rays;
@@ -240,7 +241,7 @@ struct ray_runs {
 
   std::size_t size() const { return max<std::size_t>((rays + length - 1) / length, 1); }
 
-  /// find(ray, field) gives the rays of run i their fields.
+  /// find(ray, field) gives the rays of block i their fields.
   template <class Block, class Find>
   WFPG_HD void find(Block& block, std::size_t i, const Find& find) const {
     const std::size_t first = i * length;
@@ -259,25 +260,25 @@ struct find_fields {
   static constexpr bool waits_for_memory = true;
 
   find_field<Rays> find;
-  ray_runs runs;
+  ray_blocks blocks;
   field_wave_counts* next;  // of the wave after this one
 
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t i) const {
     if (i == 0) block.for_each(1, [&](int) { *next = {}; });
-    runs.find(block, i, find);
+    blocks.find(block, i, find);
   }
 };
 
 /// The rays that find_fields left marked: their fields have been born, or an ancestor's serve, or none do.
 struct find_missing_fields {
-  ray_runs runs;
+  ray_blocks blocks;
   use_ancestor own_or_ancestor;
 
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t i) const {
-    if (runs.counts.counts->missing == 0) return;
-    runs.find(block, i, [&](std::size_t ray, std::uint32_t& field) {
+    if (blocks.counts.counts->missing == 0) return;
+    blocks.find(block, i, [&](std::size_t ray, std::uint32_t& field) {
       return missing_key::is_marked(field) ? own_or_ancestor(missing_key::key(field), ray, field) : 0u;
     });
   }

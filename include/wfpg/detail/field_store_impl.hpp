@@ -176,7 +176,7 @@ void field_store<Exec>::find_and_serve(const Exec& exec, const kept_field_wave<S
                                        const Serve& serve) {
   begin_wave(exec, wave);
   exec.for_each_run(wave.ray_count, detail::find_and_serve<detail::wave_rays<Surfaces>, Serve>{
-                                        finder(wave), serve, other_counts()});
+                                        finder(wave, detail::wanted_builds::none), serve, other_counts()});
   end_wave();
 }
 
@@ -194,11 +194,7 @@ void field_store<Exec>::begin_wave(const Exec& exec, const kept_field_wave<Surfa
 template <class Exec>
 template <class Surfaces>
 detail::find_field<detail::wave_rays<Surfaces>> field_store<Exec>::finder(
-    const kept_field_wave<Surfaces>& wave) {
-  using detail::wanted_builds;
-  const wanted_builds wanted_now = !builds_in_wave() ? wanted_builds::none
-                                   : limits_builds() ? wanted_builds::marked
-                                                     : wanted_builds::listed;
+    const kept_field_wave<Surfaces>& wave, detail::wanted_builds wanted_now) {
   const detail::build_list builds{list_.data(), counts()};
   const detail::use_slot use{view(), sample_, wave.seed, wanted_now, builds};
   return {{wave.surfaces, wave.mode},
@@ -213,13 +209,16 @@ detail::find_field<detail::wave_rays<Surfaces>> field_store<Exec>::finder(
 template <class Exec>
 template <class Surfaces>
 void field_store<Exec>::find(const Exec& exec, const kept_field_wave<Surfaces>& wave) {
-  const auto find = finder(wave);
-  const detail::ray_runs runs{wave.ray_count, field_of_ray_.data(), find.counts};
-  exec.for_each_block(runs.size(), 0,
-                      detail::find_fields<detail::wave_rays<Surfaces>>{find, runs, other_counts()});
+  using detail::wanted_builds;
+  const auto find = finder(wave, !builds_in_wave() ? wanted_builds::none
+                                 : limits_builds() ? wanted_builds::marked
+                                                   : wanted_builds::listed);
+  const detail::ray_blocks blocks{wave.ray_count, field_of_ray_.data(), find.counts};
+  exec.for_each_block(blocks.size(), 0,
+                      detail::find_fields<detail::wave_rays<Surfaces>>{find, blocks, other_counts()});
   if (!builds_in_wave()) return;
   bear(exec);
-  exec.for_each_block(runs.size(), 0, detail::find_missing_fields{runs, find.ancestor});
+  exec.for_each_block(blocks.size(), 0, detail::find_missing_fields{blocks, find.ancestor});
   if (limits_builds()) list(exec, wave.seed, find.ancestor.use.builds);
 }
 

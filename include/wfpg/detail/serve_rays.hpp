@@ -79,7 +79,7 @@ template <class Serve>
 struct serve_view {
   Serve serve;
   guide_view view;
-  WFPG_HD void operator()(std::size_t ray) const { serve(ray, view.field(static_cast<std::uint32_t>(ray))); }
+  WFPG_HD void operator()(std::size_t ray) const { serve(ray, view.number(static_cast<std::uint32_t>(ray))); }
 };
 
 /// What one ray draws from of a guide's view that has no mixture of its own for it.

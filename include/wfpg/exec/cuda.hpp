@@ -211,7 +211,7 @@ class cuda {
     launch(wfpg::detail::for_each_kernel<device_count, F>, at_most_resident(blocks), threads, 0, n, f);
   }
 
-  /// f(run) for runs of indices that make up [0, n), in no order; of none, one run or more.
+  /// f(run) for runs of indices that make up [0, n), in no order; also where n is 0.
   template <class F>
   void for_each_run(std::size_t n, const F& f) const {
     const std::size_t blocks = n > 0 ? (n + threads - 1) / threads : 1;

@@ -14,17 +14,15 @@
 //                                stable; the low `bits` bits of the unsigned keys are in their order
 //   3. a loop over indices:      void for_each(n, f) const;  f(i), in no order; f is a functor with a const
 //                                operator() that the device can call
-//   4. a loop in steps:          void for_each_run(n, f) const;  f(run): indices that go through the steps of
-//   f
-//                                together, a warp's or some hundreds of a CPU's, so that what one step waits
-//                                for on a CPU is there for the next, and stays in registers on a GPU
-//                                (cpu_run in detail/cpu_policy.hpp says what a run offers); of no index too
+//   4. a loop in steps:          void for_each_run(n, f) const;  f(run): indices that go through f's steps
+//                                together, a warp's on a GPU, up to 32 on a CPU (detail/cpu_policy.hpp says
+//                                what a run offers)
 //   5. a loop over blocks:       void for_each_block(n, scratch_bytes, f) const;  f(block, i), where `block`
 //                                is a team of threads with fast scratch memory (detail/cpu_block.hpp says
 //                                what a block and its warps offer)
 //
-// n is a std::size_t, or a device_count where only the device knows it. Calls are ordered: one sees what the
-// one before it wrote. `Exec::warp_width` is the number of lanes of a warp, 8, 16 or 32, and
+// n is a std::size_t, or, but of runs, a device_count where only the device knows it. Calls are ordered: one
+// sees what the one before it wrote. `Exec::warp_width` is the number of lanes of a warp, 8, 16 or 32, and
 // `Exec::warps_per_block` that of the warps of a block.
 #pragma once
 
