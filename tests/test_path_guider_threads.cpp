@@ -18,11 +18,10 @@ using namespace wfpg_test;
 using wfpg::field_lifetime;
 
 #if defined(__CUDACC__)
-constexpr std::size_t threads = 4;  // racecheck takes minutes for each
+constexpr std::size_t threads = 4, paths = 100;  // racecheck takes minutes for each guider
 #else
-constexpr std::size_t threads = 8;
+constexpr std::size_t threads = 8, paths = 400;
 #endif
-constexpr std::size_t paths = 400;
 
 /// f(i) for i below `threads`, each on a thread of its own; what one throws is thrown here.
 template <class F>
