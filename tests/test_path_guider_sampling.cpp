@@ -1,6 +1,7 @@
-// What directions a guider draws: the same in both of its forms and on any number of threads, with densities
-// that are the mixture's, and without bias.
+// What directions a guider draws: the same on any number of threads, with densities that are the mixture's,
+// and without bias.
 #include "support/guiding.hpp"
+#include "support/kinds_of_guiding.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 #include "support/threads.hpp"
@@ -20,22 +21,6 @@ using wfpg::sampling_technique;
 
 namespace {
 
-constexpr guiding_mode modes[] = {guiding_mode::oriented, guiding_mode::plain};
-
-/// A renderer's kernel of the prepared form.
-struct sample_view {
-  wfpg::guide_view view;
-  stored_surfaces surfaces;
-  hashed_numbers random;
-  wfpg::array_view<sampled_direction> directions;
-  WFPG_HD void operator()(std::size_t i) const {
-    const auto ray = static_cast<std::uint32_t>(i);
-    const test_surface s = surfaces(ray);
-    directions[i] = {};
-    if (s.active) directions[i] = view.sample(ray, s, random(ray, 0).x, random(ray, 1));
-  }
-};
-
 struct query_view {
   wfpg::guide_view view;
   stored_surfaces surfaces;
@@ -52,119 +37,6 @@ struct stored_queries {
   wfpg::array_view<const vec3> queries;
   WFPG_HD vec3 operator()(std::uint32_t ray) const { return queries[ray]; }
 };
-
-template <class Exec, class Caster>
-std::vector<sampled_direction> sample_prepared(guided_box<Exec>& box,
-                                               const wfpg::buffer<test_surface, Exec>& surfaces,
-                                               const Caster& caster, std::uint32_t depth) {
-  const stored_surfaces stored{const_view<test_surface>(surfaces)};
-  const wfpg::guide_view view =
-      box.guider.prepare(wfpg::wave{depth, surfaces.size(), stored, hashed_numbers{}}, caster);
-  const wfpg::buffer<sampled_direction, Exec> directions(box.exec, surfaces.size());
-  box.exec.for_each(surfaces.size(), sample_view{view, stored, hashed_numbers{}, directions.view()});
-  return directions.to_host(box.exec);
-}
-
-int count_guided(const std::vector<sampled_direction>& drawn) {
-  int n = 0;
-  for (const sampled_direction& d : drawn) n += d.technique == sampling_technique::guide;
-  return n;
-}
-
-/// All options that forms should agree under.
-std::vector<guider_options> kinds_of_guiding() {
-  std::vector<guider_options> kinds;
-  for (guiding_mode mode : modes)
-    for (field_lifetime lifetime : lifetimes) kinds.push_back(box_options(mode, lifetime));
-  return kinds;
-}
-
-std::string describe(const guider_options& options) {
-  return std::string(options.mode == guiding_mode::plain ? "plain, " : "oriented, ") +
-         name_of(options.fields);
-}
-
-WFPG_TEST_CASE("path guider: both forms draw the same directions from the same numbers, bit for bit",
-               "[path_guider]") {
-  for (guider_options options : kinds_of_guiding()) {
-    options.rays_per_bin = 8;  // bins with more and with fewer rays than these
-    guided_box<Exec> fused(options), prepared(options), batch(options), prepared_batch(options);
-    for (guided_box<Exec>* box : {&fused, &prepared, &batch, &prepared_batch}) box->learn();
-    const auto surfaces = mixed_surfaces(700, 4);
-    const wfpg::buffer<test_surface, Exec> stored(fused.exec, surfaces);
-    batch_box_caster::log log;
-    const batch_box_caster caster{{}, &log};
-    for (int sample = 0; sample < 3; ++sample) {
-      for (std::uint32_t depth : {0u, 1u, 7u}) {
-        INFO(describe(options) << ", sample " << sample << ", depth " << depth);
-        const auto expected = fused.sample(surfaces, box_caster{}, 1, depth);
-        CHECK(count_guided(expected) > 150);
-        CHECK(same_draws(sample_prepared(prepared, stored, box_caster{}, depth), expected));
-        CHECK(same_draws(sample_prepared(prepared_batch, stored, caster, depth), expected));
-        CHECK(same_draws(batch.sample(surfaces, caster, 1, depth), expected));
-      }
-      for (guided_box<Exec>* box : {&fused, &prepared, &batch, &prepared_batch}) {
-        box->guider.end_sample();
-        box->guider.begin_sample();
-      }
-    }
-  }
-}
-
-WFPG_TEST_CASE("path guider: both forms agree, and count alike, where few waves make fields any more",
-               "[path_guider]") {
-  for (guiding_mode mode : modes)
-    for (std::uint32_t products : {0u, 4u}) {
-      guider_options options = box_options(mode, field_lifetime::kept);
-      options.product_resolution = products;
-      guided_box<Exec> fused(options), prepared(options);
-      fused.learn();
-      prepared.learn();
-      const auto surfaces = mixed_surfaces(300, 4);
-      const wfpg::buffer<test_surface, Exec> stored(fused.exec, surfaces);
-      for (int sample = 1; sample < 52; ++sample) {
-        CHECK(fused.sample({}).empty());
-        const wfpg::buffer<test_surface, Exec> none(prepared.exec, 0);
-        CHECK(sample_prepared(prepared, none, box_caster{}, 0).empty());
-        for (std::uint32_t depth : {0u, 1u, 7u}) {
-          INFO(describe(options) << ", P " << products << ", sample " << sample << ", depth " << depth);
-          const auto expected = fused.sample(surfaces, box_caster{}, 1, depth);
-          CHECK(count_guided(expected) > 60);
-          CHECK(same_draws(sample_prepared(prepared, stored, box_caster{}, depth), expected));
-        }
-        for (guided_box<Exec>* box : {&fused, &prepared}) {
-          box->guider.end_sample();
-          box->guider.begin_sample();
-        }
-      }
-      const auto counted = fused.guider.statistics().depths, alike = prepared.guider.statistics().depths;
-      for (std::size_t depth = 0; depth < counted.size(); ++depth) {
-        CHECK(counted[depth].rays == alike[depth].rays);
-        CHECK(counted[depth].unbinned == alike[depth].unbinned);
-        CHECK(counted[depth].cones == alike[depth].cones);
-      }
-      CHECK(counted[7].rays > 51 * 150);
-    }
-}
-
-WFPG_TEST_CASE("path guider: both forms agree where nothing guides yet", "[path_guider]") {
-  for (guider_options options : kinds_of_guiding()) {
-    INFO(describe(options));
-    options.unguided_samples = 1;
-    guided_box<Exec> box(options);
-    box.guider.begin_sample();
-    CHECK(!box.guider.guided());
-    const auto surfaces = mixed_surfaces(200, 4);
-    const wfpg::buffer<test_surface, Exec> stored(box.exec, surfaces);
-    const auto fused = box.sample(surfaces);
-    CHECK(count_guided(fused) == 0);
-    CHECK(same_draws(sample_prepared(box, stored, box_caster{}, 0), fused));
-    box.guider.end_sample();
-    box.guider.begin_sample();
-    CHECK(box.guider.guided());
-    CHECK(count_guided(box.sample(surfaces)) > 20);
-  }
-}
 
 /// As same_draws() has it.
 bool nearly(float a, float b) {

@@ -4,9 +4,6 @@
 #include "support/renderings.hpp"
 
 #include <cstring>
-#include <map>
-#include <string>
-#include <utility>
 
 namespace {
 
@@ -16,19 +13,10 @@ using render::guiding;
 using render::sampling_method;
 using wfpg_test::rendering;
 
-/// Of path tracing on the CPU, which guiding there agrees with (test_renderer_unbiased.cpp).
-const wfpg_test::tile_means& truth_of(const std::string& scene, bool nee) {
-  static std::map<std::pair<std::string, bool>, wfpg_test::tile_means> made;
-  const auto found = made.find({scene, nee});
-  if (found != made.end()) return found->second;
-  const rendering unguided{scene, nee, sampling_method::pt};
-  return made.emplace(std::make_pair(scene, nee), wfpg_test::render_tiles(unguided, 1000)).first->second;
-}
-
+/// Guiding on the CPU agrees with path tracing there (test_renderer_unbiased.cpp).
 void check_as_on_cpu(rendering what) {
   what.where = device::cuda;
-  const auto report =
-      wfpg_test::check_unbiased(truth_of(what.scene, what.nee), wfpg_test::render_tiles(what, 0));
+  const auto report = wfpg_test::check_rendering(what);
   INFO(what.name() << ": " << report.message);
   CHECK(report);
 }

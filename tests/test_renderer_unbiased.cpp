@@ -6,26 +6,13 @@
 
 #include <cstddef>
 #include <iterator>
-#include <map>
-#include <string>
-#include <utility>
 
 namespace {
 
-using wfpg_test::render_tiles;
 using wfpg_test::rendering;
 
-/// Of path tracing, made once.
-const wfpg_test::tile_means& unguided_tiles(const std::string& scene, bool nee) {
-  static std::map<std::pair<std::string, bool>, wfpg_test::tile_means> made;
-  const auto found = made.find({scene, nee});
-  if (found != made.end()) return found->second;
-  const rendering unguided{scene, nee, render::sampling_method::pt};
-  return made.emplace(std::make_pair(scene, nee), render_tiles(unguided, 1000)).first->second;
-}
-
 void check_unbiased(const rendering& what) {
-  const auto report = wfpg_test::check_unbiased(unguided_tiles(what.scene, what.nee), render_tiles(what, 0));
+  const auto report = wfpg_test::check_rendering(what);
   INFO(what.name() << ": " << report.message);
   CHECK(report);
 }

@@ -8,6 +8,7 @@
 #include <wfpg/exec/seq.hpp>
 
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -51,10 +52,10 @@ vec2 as_it_is(vec2 uv) {
 }
 
 /// Tiles of a renderer whose noise is normal, by sums of twelve uniform numbers.
-tile_means rendered(double mean, std::uint64_t seed) {
+tile_means rendered(double mean, std::uint64_t seed, int renderings = 24) {
   random_numbers random(seed);
   tile_means result(256);
-  for (int rendering = 0; rendering < 24; ++rendering) {
+  for (int rendering = 0; rendering < renderings; ++rendering) {
     std::vector<double> tiles;
     for (std::size_t tile = 0; tile < result.size(); ++tile) {
       double normal = -6.0;
@@ -159,4 +160,23 @@ TEST_CASE("statistics: tiles of two renderers", "[statistics]") {
   check_names(check_unbiased(truth, rendered(1.2, 3)), {"standard errors apart"});
   // Too little for a single tile, whose mean has a standard error of 2%.
   check_names(check_unbiased(truth, rendered(1.02, 4)), {"tiles together"});
+}
+
+TEST_CASE("statistics: what failed by chance is made anew, and what is biased fails again", "[statistics]") {
+  std::vector<int> factors;
+  const auto truth = [&](int factor) {
+    factors.push_back(factor);
+    return rendered(1.0, static_cast<std::uint64_t>(factor), 24 * factor);
+  };
+  const auto tested = [](double once, double anew) {
+    return [=](int factor) { return rendered(factor == 1 ? once : anew, 7, 24 * factor); };
+  };
+  CHECK(check_renderers_unbiased(truth, tested(1.0, 1.2)));
+  CHECK(factors == std::vector<int>{1});
+  CHECK(check_renderers_unbiased(truth, tested(1.2, 1.0)));
+  CHECK(factors == std::vector<int>{1, 1, 4});
+  check_names(check_renderers_unbiased(truth, tested(1.2, 1.2)), {"standard errors apart"});
+  // Too little for the first check, and not for the second.
+  CHECK(check_renderers_unbiased(truth, tested(1.01, 1.01)));
+  check_names(check_renderers_unbiased(truth, tested(1.2, 1.01)), {"tiles together"});
 }

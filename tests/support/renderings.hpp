@@ -9,7 +9,9 @@
 #include <wfpg/types.hpp>
 
 #include <cstdint>
+#include <map>
 #include <string>
+#include <tuple>
 #include <vector>
 
 namespace wfpg_test {
@@ -89,16 +91,34 @@ inline std::vector<double> tiles_of(const render::image& picture) {
   return result;
 }
 
-/// `first_seed`: renderings of other seeds are independent.
-inline tile_means render_tiles(const rendering& what, std::uint64_t first_seed) {
+/// The first `factor` * `renderings` seeds from `first_seed` on: those of other seeds are independent.
+inline tile_means render_tiles(const rendering& what, std::uint64_t first_seed, int factor) {
   tile_means result(tiles * tiles);
   const render::scene world = render::make_builtin_scene(what.scene);
   render::render_options options = what.options();
-  for (int i = 0; i < renderings; ++i) {
+  for (int i = 0; i < factor * renderings; ++i) {
     options.seed = first_seed + static_cast<std::uint64_t>(i);
     result.add(tiles_of(render::render(world, options, {}).picture));
   }
   return result;
+}
+
+/// Of path tracing on the CPU, made once.
+inline const tile_means& unguided_tiles(const std::string& scene, bool nee, int factor) {
+  static std::map<std::tuple<std::string, bool, int>, tile_means> made;
+  const auto found = made.find({scene, nee, factor});
+  if (found != made.end()) return found->second;
+  const rendering unguided{scene, nee, render::sampling_method::pt};
+  const auto first_seed = static_cast<std::uint64_t>(1000 * factor);
+  return made.emplace(std::make_tuple(scene, nee, factor), render_tiles(unguided, first_seed, factor))
+      .first->second;
+}
+
+/// Whether the mean of what is rendered is path tracing's on the CPU.
+inline wfpg::testing::check_report check_rendering(const rendering& what) {
+  return check_renderers_unbiased(
+      [&](int factor) { return unguided_tiles(what.scene, what.nee, factor); },
+      [&](int factor) { return render_tiles(what, static_cast<std::uint64_t>(500 * (factor - 1)), factor); });
 }
 
 }  // namespace wfpg_test

@@ -93,7 +93,7 @@ class cuda_run {
 
   __device__ cuda_run(std::size_t index, std::size_t end) : index_(index), is_within_(index < end) {}
 
-  __device__ std::size_t first() const { return index_ - threadIdx.x % cuda_warp::width; }
+  __device__ std::size_t first() const { return index_ - index_ % cuda_warp::width; }
   template <class F>
   __device__ void for_each(const F& f) const {
     if (is_within_) f(index_, 0);
@@ -106,7 +106,7 @@ class cuda_run {
   }
   template <class F>
   __device__ void once(const F& f) const {
-    if (threadIdx.x % cuda_warp::width == 0) f();
+    cuda_warp().for_lanes_below(1, [&](int) { f(); });
   }
 
  private:
