@@ -5,6 +5,7 @@
 #include "embree_caster.hpp"
 #include "openpgl_guider.hpp"
 #include "support/catch.hpp"
+#include "support/guided_depths.hpp"
 #include "support/renderings.hpp"
 #include "support/reports.hpp"
 #include "wavefront.hpp"
@@ -228,6 +229,11 @@ TEST_CASE("the first sample that Open PGL is shown is path tracing's", "[rendere
     CHECK(picture(method, 1) == picture(sampling_method::pt, 1));
     CHECK(picture(method, 3) != picture(sampling_method::pt, 3));
   }
+}
+
+TEST_CASE("a path's last direction is Open PGL's only where no next-event estimation finds the light",
+          "[renderer][openpgl]") {
+  for (const sampling_method method : methods) wfpg_test::check_depths_are_guided(method);
 }
 
 TEST_CASE("Open PGL where it cannot run, and leaves that it cannot fill, are refused by name",

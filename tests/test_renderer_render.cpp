@@ -3,6 +3,7 @@
 #include "device_scene.hpp"
 #include "render.hpp"
 #include "support/catch.hpp"
+#include "support/guided_depths.hpp"
 #include "support/pictures.hpp"
 
 #include <wfpg/exec/omp.hpp>
@@ -235,6 +236,13 @@ TEST_CASE("the first sample of a guided rendering is path tracing's, later ones 
   CHECK(guided.report.slots.capacity > guided.report.slots.live);
   CHECK(guided.report.slots.live > 0);
   CHECK(guided.report.slots.refreshed > 0.0);
+}
+
+TEST_CASE("a path's last direction is guided only where no next-event estimation finds the light",
+          "[renderer][guided]") {
+  for (const sampling_method method : {sampling_method::wfpg, sampling_method::wfpg_product,
+                                       sampling_method::sarsa, sampling_method::records})
+    wfpg_test::check_depths_are_guided(method);
 }
 
 TEST_CASE("left of the wall of cornell-wall all light is indirect", "[renderer][builtin]") {
