@@ -107,6 +107,12 @@ TEST_CASE("path guider: each loop of samples fails in its turn, and the call is 
   SUCCEED(covered << " loops");
 }
 
+TEST_CASE("path guider: the same where fields lack room, so that bins follow it", "[path_guider]") {
+  wfpg::guider_options options = stepwise_options(wfpg::field_lifetime::kept, 0);
+  options.kept.budget_bytes /= 2;
+  CHECK(fail_in_samples(options, afterwards::again) > 50);
+}
+
 TEST_CASE("path guider: each loop of samples fails in its turn, and the sample is given up",
           "[path_guider]") {
   std::size_t covered = 0;

@@ -227,6 +227,7 @@ class field_store {
   std::uint32_t waves_ = 0;        // of the sample
   std::uint32_t busy_until_ = 32;  // sample
   bool in_wave_ = false;           // also after one whose caster threw
+  bool adapted_ = false;           // bins to this sample: not twice where its end is made again
   detail::bin_marks<Exec> marks_;
   buffer<detail::field_slot, Exec> slots_;
   buffer<resident_field, Exec> fields_;      // a slot

@@ -49,7 +49,6 @@ struct adapt_pressure {
       state->pressure = static_cast<std::uint32_t>(
           clamp(clamp(next, low, 2 * now), std::uint64_t(least), std::uint64_t(most)));
     }
-    state->used = 0;
   }
 };
 
@@ -116,6 +115,7 @@ template <class Exec>
 void field_store<Exec>::begin_sample(const Exec& exec, std::uint32_t sample) {
   sample_ = sample;
   waves_ = 0;
+  adapted_ = false;
   exec.for_each(
       detail::max<std::size_t>(capacity_, 1),
       detail::begin_slots{view(), fields_.data(), state_.data(), counts(), sample, options_.idle_samples});
@@ -134,9 +134,11 @@ void field_store<Exec>::end_sample(const Exec& exec) {
   const bool is_power_of_two = (sample_ & (sample_ - 1)) == 0;
   if (sample_ == 0 || !is_power_of_two) return;
   expect_builds(turns);
-  if (sample_ > 1) {  // in the first, bins are as large as they may be
+  if (sample_ > 1 && !adapted_) {  // in the first, bins are as large as they may be
+    exec.fill_bytes(&state_.data()->used, 0, sizeof(std::uint32_t));
     exec.for_each(capacity_, detail::count_used{slots_.view(), sample_ / 2, state_.data()});
     exec.for_each(1, detail::adapt_pressure{state_.data(), capacity_, sample_});
+    adapted_ = true;
   }
   marks_.mark(exec, counted_samples_, capacity_, &state_.data()->pressure);
 }
