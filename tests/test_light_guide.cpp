@@ -184,13 +184,15 @@ WFPG_TEST_CASE("a guide of lights that knows nothing goes by weight", "[light_gu
 
 WFPG_TEST_CASE("groups are chosen as often as their probabilities say", "[light_guide]") {
   wfpg::light_guide_options options;
-  for (int g = 0; g < 33; ++g) options.weights.push_back(g == 5 ? 0.0f : static_cast<float>(1 + g % 4));
+  const auto is_worth_nothing = [](std::size_t g) { return g == 5 || g > 30; };  // the last ones, too
+  for (std::size_t g = 0; g < 33; ++g)
+    options.weights.push_back(is_worth_nothing(g) ? 0.0f : static_cast<float>(1 + g % 4));
   guided_box<Exec> box(options);
   std::vector<told> values;
   random_numbers random(4);
   for (int i = 0; i < 400; ++i) {
     const std::uint32_t group = random.below(33);
-    if (group != 5) values.push_back({on_floor, group, static_cast<float>(group)});
+    if (!is_worth_nothing(group)) values.push_back({on_floor, group, static_cast<float>(group)});
   }
   learn(box, values);
   const std::vector<float> p = probabilities_at(box, {on_floor});
@@ -202,8 +204,11 @@ WFPG_TEST_CASE("groups are chosen as often as their probabilities say", "[light_
     counted[choice.group] += 1.0;
   }
   for (const float probability : p) expected.push_back(draws * static_cast<double>(probability));
-  CHECK(p[5] == 0.0f);
-  CHECK(counted[5] == 0.0);
+  for (std::size_t g = 0; g < p.size(); ++g) {
+    INFO("group " << g);
+    CHECK((p[g] == 0.0f) == is_worth_nothing(g));
+    if (is_worth_nothing(g)) CHECK(counted[g] == 0.0);
+  }
   CHECK(wfpg::detail::chi_square_test(counted, expected).p > 1e-4);
 }
 
@@ -215,6 +220,29 @@ WFPG_TEST_CASE("probabilities sum to one everywhere and leave no group out", "[l
     REQUIRE(static_cast<double>(p[i]) + static_cast<double>(p[i + 1]) + static_cast<double>(p[i + 2]) ==
             Approx(1.0).margin(1e-6));
     REQUIRE(std::min({p[i], p[i + 1], p[i + 2]}) > 0.2f * 0.29f);
+  }
+}
+
+WFPG_TEST_CASE("groups worth nothing are never chosen, whatever rounding leaves", "[light_guide]") {
+  random_numbers random(6);
+  for (int i = 0; i < 20; ++i) {
+    wfpg::light_guide_options options;
+    options.resolution = 4;
+    const std::size_t groups = 4 + random.below(30);
+    while (options.weights.size() + 1 < groups) options.weights.push_back(random.unit());
+    options.weights.push_back(0.0f);
+    guided_box<Exec> box(options);
+    const auto chance_of_last = [&] {
+      float most = 0.0f;
+      const std::vector<float> p = probabilities_at(box, {on_floor, on_wall});
+      for (std::size_t last = groups - 1; last < p.size(); last += groups) most = std::max(most, p[last]);
+      return most;
+    };
+    CHECK(chance_of_last() == 0.0f);
+    std::vector<told> values;
+    for (int k = 0; k < 100; ++k) values.push_back({on_floor, random.below(3), random.unit()});
+    learn(box, values);
+    CHECK(chance_of_last() == 0.0f);
   }
 }
 

@@ -99,7 +99,11 @@ struct choose_light_groups {
       sum = min(sum + floor * defensive[g] + (1.0f - floor) * estimate(row, above, g, scale) / total, 1.0f);
       sums[row * rows.groups + g] = sum;
     }
-    sums[row * rows.groups + rows.groups - 1] = 1.0f;
+    // What rounding leaves is the last group's that can be chosen.
+    for (std::uint32_t g = rows.groups; g-- > 0;) {
+      sums[row * rows.groups + g] = 1.0f;
+      if (defensive[g] > 0.0f) break;
+    }
   }
 
  private:
