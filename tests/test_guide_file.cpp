@@ -308,6 +308,20 @@ TEST_CASE("guide files of other options are refused by the option's name", "[gui
   CHECK_THROWS_AS(loaded(one_policy(), bytes, invalid), std::invalid_argument);
 }
 
+TEST_CASE("a guide file has the octree's resolution, which a host's own fragments decide", "[guide_file]") {
+  const one_policy exec;
+  guider_options options = small_options();
+  wfpg::path_guider<one_policy> guider(exec, wfpg::voxelize(exec, box_mesh<one_policy>(exec).view(), 16),
+                                       options);
+  trace_paths(exec, guider, 3, paths, box_caster());
+  const std::string bytes = saved(guider);
+  const std::string message = fault(bytes, options);
+  INFO(message);
+  CHECK(message.find("option octree_resolution 16, the guider's is 8") != std::string::npos);
+  options.octree_resolution = 16;
+  CHECK(saved(loaded(exec, bytes, options)) == bytes);
+}
+
 TEST_CASE("what is in a guide file is checked, whatever its checksums say", "[guide_file]") {
   const guider_options options = small_options();
   const std::string bytes = saved(trained(one_policy(), options));

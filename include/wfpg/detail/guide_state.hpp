@@ -26,9 +26,10 @@ struct shaping_option {
   std::uint32_t value;
 };
 
-inline std::vector<shaping_option> shaping_options(const guider_options& options) {
+/// `resolution`: of the octree, which fragments decide where a host makes them itself.
+inline std::vector<shaping_option> shaping_options(const guider_options& options, std::uint32_t resolution) {
   const bool kept = options.fields == field_lifetime::kept;
-  return {{"octree_resolution", options.octree_resolution},
+  return {{"octree_resolution", resolution},
           {"mode", static_cast<std::uint32_t>(options.mode)},
           {"fields", static_cast<std::uint32_t>(options.fields)},
           {"kept.resolution", kept ? options.kept.resolution : 0},
@@ -37,15 +38,15 @@ inline std::vector<shaping_option> shaping_options(const guider_options& options
           {"lights.resolution", options.lights.weights.empty() ? 0 : options.lights.resolution}};
 }
 
-inline section_writer options_to_bytes(const guider_options& options) {
+inline section_writer options_to_bytes(const guider_options& options, std::uint32_t resolution) {
   section_writer bytes;
-  for (const shaping_option& option : shaping_options(options)) bytes.put(option.value);
+  for (const shaping_option& option : shaping_options(options, resolution)) bytes.put(option.value);
   return bytes;
 }
 
 inline void check_options(file_reader& file, const guider_options& options) {
   section_reader bytes = file.section("options");
-  for (const shaping_option& option : shaping_options(options)) {
+  for (const shaping_option& option : shaping_options(options, options.octree_resolution)) {
     const auto saved = bytes.get<std::uint32_t>();
     if (saved != option.value)
       file.fail(std::string("was saved with option ") + option.name + " " + std::to_string(saved) +
@@ -194,7 +195,7 @@ struct state_access {
   static void save(const path_guider<Exec>& guider, file_writer& file) {
     const Exec& exec = guider.exec_;
     const octree_guide<Exec>& guide = guider.guide_;
-    file.section("options", options_to_bytes(guider.options_));
+    file.section("options", options_to_bytes(guider.options_, guide.octree_.resolution()));
     file.section("octree", octree_to_bytes(exec, guide.octree_));
     file.section("cache", to_bytes(exec, guide.cache_));
     file.section("counts", counts_to_bytes(guider));
