@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <stdexcept>
 #include <vector>
 
 namespace {
@@ -386,6 +387,16 @@ WFPG_TEST_CASE("an empty scene is a valid octree", "[sparse_voxel_octree]") {
   for (const std::uint32_t resolution : {1u, 64u, 1024u}) {
     auto fragments = voxelized(exec, test_mesh(), resolution);
     check_empty(wfpg::sparse_voxel_octree<Exec>(exec, fragments));
+  }
+}
+
+TEST_CASE("fragments of a resolution that no octree has are refused", "[sparse_voxel_octree]") {
+  const one_policy exec;
+  for (const std::uint32_t resolution : {0u, 3u, 8192u, 16384u}) {
+    wfpg::voxel_fragments<one_policy> fragments;
+    fragments.grid.resolution = resolution;
+    using octree = wfpg::sparse_voxel_octree<one_policy>;
+    CHECK_THROWS_AS(octree(exec, fragments), std::invalid_argument);
   }
 }
 

@@ -242,8 +242,9 @@ class sparse_voxel_octree {
   sparse_voxel_octree() = default;
 
   /// Builds the octree whose leaves are the fragments' voxels, and sorts the fragments by Morton code (the
-  /// cache is built from them next). Throws out_of_memory, std::invalid_argument where there are 2³² - 1
-  /// nodes or more, or leaves times levels are.
+  /// cache is built from them next). Throws out_of_memory, std::invalid_argument where the fragments' grid
+  /// has no resolution that is a power of two in [1, 4096], and where there are 2³² - 1 nodes or more, or
+  /// leaves times levels are.
   sparse_voxel_octree(const Exec& exec, voxel_fragments<Exec>& fragments);
 
   /// What kernels see; valid while the octree lives.

@@ -183,6 +183,7 @@ void sort_fragments(const Exec& exec, voxel_fragments<Exec>& fragments) {
 
 template <class Exec>
 sparse_voxel_octree<Exec>::sparse_voxel_octree(const Exec& exec, voxel_fragments<Exec>& fragments) {
+  detail::require_resolution(fragments.grid.resolution);
   view_.grid_ = fragments.grid;
   while (1u << view_.depth_ < fragments.grid.resolution) ++view_.depth_;
   detail::sort_fragments(exec, fragments);
