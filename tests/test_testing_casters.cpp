@@ -132,6 +132,18 @@ TEST_CASE("check_ray_caster: each fault is found and named", "[testing]") {
   check_names(check_ray_caster(exec, faulty_caster{caster_fault::ignores_t_max}, unit_box, with_limits),
               {"t_max is not respected", "expected a miss"});
   CHECK_THROWS_AS(check_ray_caster(exec, box_caster{}, wfpg::bounds3{}), std::invalid_argument);
+  const auto refuses = [&](auto change) {
+    caster_check_options options;
+    change(options);
+    CHECK_THROWS_AS(check_ray_caster(exec, box_caster{}, unit_box, options), std::invalid_argument);
+  };
+  refuses([](caster_check_options& o) { o.rays = 0; });
+  refuses([](caster_check_options& o) { o.tolerance = 1.0f; });
+  refuses([](caster_check_options& o) { o.tolerance = nan_value; });
+  refuses([](caster_check_options& o) { o.least_distance = -1.0f; });
+  refuses([](caster_check_options& o) { o.least_hits = 1.5; });
+  refuses([](caster_check_options& o) { o.least_hits = std::nan(""); });
+  refuses([](caster_check_options& o) { o.exceptions = -0.5; });
 
   check_passes(check_ray_caster(exec, shifted_caster{}, unit_box));
   check_names(check_ray_caster(exec, shifted_caster{1}, unit_box),

@@ -17,6 +17,7 @@
 #include <wfpg/sparse_voxel_octree.hpp>
 #include <wfpg/types.hpp>
 
+#include <cstddef>
 #include <type_traits>
 #include <utility>
 
@@ -44,6 +45,15 @@ struct is_batch_caster<C, Exec,
                        std::void_t<decltype(std::declval<const C&>().cast(
                            std::declval<const Exec&>(), array_view<const ray>(), array_view<ray_hit>()))>>
     : std::true_type {};
+
+/// Rays through an inline caster.
+template <class Caster>
+struct cast_each {
+  Caster caster;
+  array_view<const ray> rays;
+  array_view<ray_hit> hits;
+  WFPG_HD void operator()(std::size_t i) const { hits[i] = caster(rays[i]); }
+};
 
 }  // namespace detail
 

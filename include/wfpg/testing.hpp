@@ -79,9 +79,9 @@ check_report check_bsdf(const Exec& exec, const Bsdf& bsdf, const bsdf_check_opt
 struct caster_check_options {
   std::size_t rays = std::size_t(1) << 14;  ///< positive
   std::uint64_t seed = 1;                   ///< of the rays
-  float tolerance = 1.0e-4f;                ///< between two hits of one ray, of the diagonal of the bounds
-  float least_distance = 0.0f;  ///< nearer hits are not cast anew, scene units; of use where a caster passes
-                                ///< what is near, as svo_ray_caster does
+  float tolerance = 1.0e-4f;    ///< between two hits of one ray, of the diagonal of the bounds, in [0, 1)
+  float least_distance = 0.0f;  ///< nearer hits are not cast anew, scene units, at least 0; of use where a
+                                ///< caster passes what is near, as svo_ray_caster does
   double least_hits = 0.01;     ///< share of the rays that have to hit, in [0, 1]; 1 in a closed scene
   double exceptions = 1.0e-3;   ///< share of the rays that order, anew, limits and leaves may find wrong:
                                 ///< edges and cracks; in [0, 1]

@@ -19,14 +19,6 @@
 
 namespace wfpg::detail {
 
-template <class Caster>
-struct cast_inline {
-  Caster caster;
-  array_view<const ray> rays;
-  array_view<ray_hit> hits;
-  WFPG_HD void operator()(std::size_t i) const { hits[i] = caster(rays[i]); }
-};
-
 /// 1 where a hit lies in a leaf or beside one.
 struct find_hit_leaves {
   sparse_voxel_octree_view tree;
@@ -53,6 +45,13 @@ class caster_check {
         near_(options.tolerance * glm::length(bounds.extent())) {
     require(!bounds.empty(), "extent of the bounds", bounds.extent().x, "not empty");
     require(options.rays > 0, "rays", options.rays, "positive");
+    require(options.tolerance >= 0.0f && options.tolerance < 1.0f, "tolerance", options.tolerance,
+            "in [0, 1)");
+    require(options.least_distance >= 0.0f, "least_distance", options.least_distance, "at least 0");
+    require(options.least_hits >= 0.0 && options.least_hits <= 1.0, "least_hits", options.least_hits,
+            "in [0, 1]");
+    require(options.exceptions >= 0.0 && options.exceptions <= 1.0, "exceptions", options.exceptions,
+            "in [0, 1]");
     rays_.resize(options.rays);
     for (std::size_t i = 0; i < rays_.size(); ++i) {
       const std::uint64_t state = hash(options.seed, i);
@@ -96,7 +95,7 @@ class caster_check {
     if constexpr (Batch)
       caster_.cast(exec_, array_view<const ray>(device.view()), hits.view());
     else
-      exec_.for_each(rays.size(), cast_inline<Caster>{caster_, device.view(), hits.view()});
+      exec_.for_each(rays.size(), cast_each<Caster>{caster_, device.view(), hits.view()});
     return hits.to_host(exec_);
   }
 

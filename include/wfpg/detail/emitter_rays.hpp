@@ -212,20 +212,12 @@ struct emit_in_leaves {
   }
 };
 
-template <class Caster>
-struct cast_each {
-  Caster caster;
-  const ray* rays;
-  ray_hit* hits;
-  WFPG_HD void operator()(std::size_t i) const { hits[i] = caster(rays[i]); }
-};
-
 /// The first n rays through a caster of either form.
 template <class Exec, class Caster>
 void cast_rays(const Exec& exec, const Caster& caster, const buffer<ray, Exec>& rays,
                const buffer<ray_hit, Exec>& hits, std::size_t n) {
   if constexpr (is_inline_caster_v<Caster>)
-    exec.for_each(n, cast_each<Caster>{caster, rays.data(), hits.data()});
+    exec.for_each(n, cast_each<Caster>{caster, rays.view(), hits.view()});
   else
     caster.cast(exec, array_view<const ray>(rays.data(), n), array_view<ray_hit>(hits.data(), n));
 }
