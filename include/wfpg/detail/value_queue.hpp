@@ -74,8 +74,8 @@ class value_queue_view {
 
   /// A non-negative finite value for a key. Precondition: the entry fits.
   WFPG_HD void write(std::uint32_t entry, std::uint32_t key, float value) const {
-    queue_[entry] = std::uint64_t(float_bits(value + 0.0f)) << 32 | key;  // + 0: no negative zero
-    prefetch(pending_ + key);                                             // for count()
+    queue_[entry] = std::uint64_t(float_bits(value) & 0x7fffffffu) << 32 | key;  // without zero's sign
+    prefetch(pending_ + key);                                                    // for count()
   }
   /// Precondition: the entry fits.
   WFPG_HD void drop(std::uint32_t entry) const { queue_[entry] = dropped; }
@@ -132,7 +132,7 @@ class value_queue {
  public:
   value_queue() = default;
   /// Of up to `capacity` values between two sums, at most 2³¹, for keys below `keys`, less than 2³² - 1.
-  /// Throws out_of_memory. Without capacity it takes no memory.
+  /// Throws out_of_memory. Without capacity it takes 4 bytes.
   value_queue(const Exec& exec, std::size_t capacity, std::size_t keys)
       : queue_(exec, capacity), pending_(exec, capacity > 0 ? keys : 0), queued_(exec, 1) {
     view_.queue_ = queue_.data();
