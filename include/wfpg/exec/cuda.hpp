@@ -21,11 +21,13 @@
 #include <mutex>
 #include <new>
 #include <type_traits>
+#include <utility>
 
 namespace wfpg {
 
 /// A call of the CUDA runtime failed; an error that an earlier kernel of the host left behind is reported by
-/// the first call after it.
+/// the first call after it. Where that is one of Thrust's, it comes as a thrust::system_error: both are
+/// std::runtime_error.
 class cuda_error : public device_error {
  public:
   /// The name of the call, and what it returned.
@@ -59,12 +61,15 @@ class stream_resource : public memory_resource {
                "cudaMemPoolSetAttribute");
   }
 
-  /// The one of a stream, for as long as the process lives: made on the device that is current then.
+  /// The one of a stream and the device that is current, for as long as the process lives: the default stream
+  /// is each device's own.
   static memory_resource* of(cudaStream_t stream) {
     static std::mutex guard;
-    static std::map<cudaStream_t, std::unique_ptr<stream_resource>> made;
+    static std::map<std::pair<int, cudaStream_t>, std::unique_ptr<stream_resource>> made;
+    int device = 0;
+    check_cuda(cudaGetDevice(&device), "cudaGetDevice");
     const std::lock_guard<std::mutex> lock(guard);
-    std::unique_ptr<stream_resource>& resource = made[stream];
+    std::unique_ptr<stream_resource>& resource = made[{device, stream}];
     if (!resource) resource = std::make_unique<stream_resource>(stream);
     return resource.get();
   }
@@ -149,7 +154,8 @@ class cuda {
   using block = wfpg::detail::cuda_block<warps_per_block>;
 
   /// `resource` hands out device memory, ordered on the stream, and outlives what is allocated; null stands
-  /// for a pool of the stream's own. Throws cuda_error, where there is no device to begin with.
+  /// for a pool of the stream's own on the current device. Throws cuda_error, where there is no device to
+  /// begin with.
   explicit cuda(cudaStream_t stream = nullptr, memory_resource* resource = nullptr)
       : stream_(stream), resource_(resource ? resource : wfpg::detail::stream_resource::of(stream)) {}
 
