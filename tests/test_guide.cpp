@@ -57,6 +57,15 @@ struct with_fewer_paths : uniform_guide<Exec> {
   }
 };
 
+/// One that notes in which samples it was to guide, before their waves.
+template <class Exec>
+struct with_notes : uniform_guide<Exec> {
+  using uniform_guide<Exec>::uniform_guide;
+  std::vector<bool> guided;
+
+  void begin_sample(const wfpg::guide_sample<Exec>& at) { guided.push_back(at.guided); }
+};
+
 /// One that has no use for paths.
 template <class Exec>
 struct without_paths : uniform_guide<Exec> {
@@ -144,6 +153,21 @@ struct direction_of {
   wfpg::array_view<const sampled_direction> drawn;
   WFPG_HD vec3 operator()(std::uint32_t ray) const { return drawn[ray].direction; }
 };
+
+WFPG_TEST_CASE("a guide is told from a sample's beginning on whether it guides", "[guide]") {
+  const Exec exec;
+  const box_mesh<Exec> mesh(exec);
+  wfpg::sampling_options options;
+  options.max_paths = 16;
+  options.unguided_samples = 2;
+  wfpg::path_guider<Exec, with_notes<Exec>> guider(exec, mesh.view(), options);
+  for (int sample = 0; sample < 4; ++sample) {
+    guider.begin_sample();
+    CHECK(guider.guided() == guider.guide().guided.back());
+    guider.end_sample();
+  }
+  CHECK(guider.guide().guided == std::vector<bool>{false, false, true, true});
+}
 
 WFPG_TEST_CASE("a guide's share of directions is guide_fraction, after the samples that only record",
                "[guide]") {

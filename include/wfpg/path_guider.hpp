@@ -115,7 +115,7 @@ class path_guider {
   /// What it was told, with max_rays completed.
   const options_type& options() const { return options_; }
   /// Whether the sample that has begun is guided.
-  bool guided() const { return samples_ > options_.unguided_samples && !guide_.empty(); }
+  bool guided() const { return is_guided(samples_); }
 
   /// What it has done so far. Waits for the work before it.
   guider_statistics statistics() const;
@@ -143,7 +143,10 @@ class path_guider {
   template <class Surfaces, class Random, class Caster>
   void check(const wave<Surfaces, Random>& w, const Caster& caster) const;
   std::uint64_t seed_of(std::uint32_t sample) const { return detail::hash(options_.seed, sample); }
-  guide_sample<Exec> at(std::uint32_t sample) { return {exec_, sample, seed_of(sample), guided(), clock_}; }
+  bool is_guided(std::uint32_t sample) const { return sample > options_.unguided_samples && !guide_.empty(); }
+  guide_sample<Exec> at(std::uint32_t sample) {
+    return {exec_, sample, seed_of(sample), is_guided(sample), clock_};
+  }
   guide_sample<Exec> now() { return at(samples_); }
   guide_sample<Exec> now(std::uint32_t depth) {
     return {exec_, samples_, seed_of(samples_), guided() && depth < options_.guided_depths, clock_};
