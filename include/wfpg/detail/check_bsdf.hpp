@@ -104,7 +104,6 @@ class bsdf_check {
   }
   outgoing_directions from() const { return {device_outgoing_.view(), options_.normal, transmits_}; }
   float above(vec3 d) const { return glm::dot(d, options_.normal); }
-  bool on_one_side(vec3 a, vec3 b) const { return above(a) * above(b) >= 0.0f; }
   double index_at(vec3 d) const { return above(d) >= 0.0f ? 1.0 : double(options_.ior); }
   /// What light from `incident` counts as energy where it goes to `outgoing`.
   double energy_factor(vec3 outgoing, vec3 incident) const {
