@@ -82,7 +82,7 @@ void add_measured(CLI::App& app, given_arguments& given) {
       "--scenes", given.scenes,
       "names of built-in scenes (" + render::listed_builtin_scenes() +
           ") and .glb or .gltf files; one with options is quoted: \"ajar --nee off\", which may be --nee, "
-          "--size, --max-depth and --environment");
+          "--size, --max-depth, --roulette-depth and --environment");
   std::string listed = "pt, wfpg, wfpg-product";
   for (const method& known : known_methods) listed += ", " + known.name;
   app.add_option("--methods", given.methods,

@@ -38,11 +38,13 @@ void add_file_options(CLI::App& app, arguments& given) {
 }
 
 void add_state_options(CLI::App& app, arguments& given) {
-  app.add_option("--save-guide", given.save_guide, "where the guide goes at the end: what it has learnt");
-  CLI::Option* const load =
-      app.add_option("--load-guide", given.options.load_guide, "guide to begin with, of the same scene");
+  app.add_option("--save-guide", given.save_guide,
+                 "where the guide of wfpg or wfpg-product goes at the end: what it has learnt");
+  CLI::Option* const load = app.add_option("--load-guide", given.options.load_guide,
+                                           "guide for wfpg or wfpg-product to begin with, of the same scene");
   app.add_option("--save-state", given.save_state,
-                 "where the rendering's state goes at the end, and when it is interrupted");
+                 "where the state of a rendering by pt, wfpg or wfpg-product goes at the end, and when it is "
+                 "interrupted");
   app.add_option("--resume", given.options.resume,
                  "state of the rendering to go on with; where it goes when that is interrupted")
       ->excludes(load);

@@ -1,8 +1,15 @@
 # cmake -Droot=DIR -P options.cmake: every option of the library is in docs/tuning.md.
 file(READ "${root}/docs/tuning.md" page)
 set(missing "")
-foreach(place IN ITEMS sampling_options.hpp:sampling_options octree_guide.hpp:guider_options field_store.hpp:kept_field_options radiance_field.hpp:field_options
-    light_guide.hpp:light_guide_options sarsa_options.hpp:sarsa_grid_options irradiance_records_options.hpp:irradiance_records_options)
+foreach(
+  place IN ITEMS
+  sampling_options.hpp:sampling_options
+  octree_guide.hpp:guider_options
+  field_store.hpp:kept_field_options
+  radiance_field.hpp:field_options
+  light_guide.hpp:light_guide_options
+  sarsa_options.hpp:sarsa_grid_options
+  irradiance_records_options.hpp:irradiance_records_options)
   string(REPLACE ":" ";" place "${place}")
   list(GET place 0 header)
   list(GET place 1 name)
