@@ -31,7 +31,8 @@ def print_stages(benchmarks):
     for b in benchmarks:
         stage, *arguments = b["name"].split("/iterations")[0].split("/")
         name = f"`{stage}` {', '.join(a.replace(':', ' ') for a in arguments)}".strip()
-        print(f"| {name} | {FLOORS[stage]} | {b['floor_ms']:.3g} | {b['median_ms']:.3g} | {b['ratio']:.2f} |")
+        floor = b.get("label", FLOORS[stage])  # where a build could not have that one
+        print(f"| {name} | {floor} | {b['floor_ms']:.3g} | {b['median_ms']:.3g} | {b['ratio']:.2f} |")
 
 
 def ratio(value):
@@ -40,6 +41,11 @@ def ratio(value):
 
 def error(value):
     return f"{value:.2e}" if value > 0.0 else "below the references' noise"
+
+
+def is_equal_time(scenes):
+    return isinstance(scenes, list) and all(
+        "milliseconds_a_sample" in m for scene in scenes for m in dict(scene.get("methods", {})).values())
 
 
 def print_equal_time(scenes):
@@ -153,8 +159,10 @@ def main(paths):
         print_compilers(first["compilers"])
     elif "settled_samples" in first:
         print_sample_times(first["settled_samples"])
-    else:
+    elif is_equal_time(first.get("scenes")):
         print_equal_time(first["scenes"])
+    else:
+        sys.exit(f"bench/table.py: {paths[0]} has no table that is made here")
 
 
 if __name__ == "__main__":

@@ -114,6 +114,7 @@ void casting(benchmark::State& state) {
   const auto floor = [&] { optix.caster().cast(exec, given, hits.view()); };
 #else
   const copy_of floor(exec, rays.bytes() + hits.bytes());
+  state.SetLabel("a copy of rays and hits, without OptiX");
 #endif
   compare(
       state, exec,
