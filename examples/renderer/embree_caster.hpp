@@ -1,11 +1,15 @@
-// Embree 3 as the ray caster of the renderer and of the guider.
+// Embree, version 3 or 4, as the ray caster of the renderer and of the guider.
 #pragma once
 
 #include "cut_outs.hpp"
 
 #include <wfpg/ray_caster.hpp>
 
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#else
 #include <embree3/rtcore.h>
+#endif
 
 #include <memory>
 
@@ -29,10 +33,8 @@ class embree_caster {
   /// True where anything lies inside (t_min, t_max).
   bool occluded(const wfpg::ray& ray) const {
     if (cut_outs_) return nearest(ray).triangle.is_hit();
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
     RTCRay shadow = convert(ray);
-    rtcOccluded1(scene_, &context, &shadow);
+    ask(rtcOccluded1, shadow);
     return shadow.tfar < 0.0f;
   }
 
@@ -60,13 +62,23 @@ class embree_caster {
     return result;
   }
 
-  hit cast(const wfpg::ray& ray) const {
+  /// One of Embree's calls with nothing that is not its default, which version 3 wants made.
+  template <class Call, class Ray>
+  void ask(Call call, Ray& ray) const {
+#if RTC_VERSION_MAJOR >= 4
+    call(scene_, &ray, nullptr);
+#else
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
+    call(scene_, &context, &ray);
+#endif
+  }
+
+  hit cast(const wfpg::ray& ray) const {
     RTCRayHit result{};
     result.ray = convert(ray);
     result.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(scene_, &context, &result);
+    ask(rtcIntersect1, result);
     if (result.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
     return {{result.hit.primID, result.hit.u, result.hit.v}, result.ray.tfar};
   }

@@ -1,9 +1,8 @@
 // Whether the guided pictures of the tracer in docs/integrate.md are right.
+#include "../support/catch.hpp"
 #include "tracer.hpp"
 
 #include <wfpg/exec/tbb.hpp>
-
-#include <catch2/catch.hpp>
 
 namespace {
 
