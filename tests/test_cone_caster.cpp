@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 #include <vector>
 
@@ -200,6 +201,22 @@ WFPG_TEST_CASE("cone caster: the environment is seen through an opening in its s
     CHECK(seen > field.least);
     CHECK(seen < 1.0);
   }
+}
+
+WFPG_TEST_CASE("cone caster: an environment without bounds counts as 1e30, and as nothing behind walls",
+               "[cone_caster]") {
+  const cached_scene<Exec> scene(open_box(), 32, 0);
+  const wfpg::voxel_opacity<Exec> opacity(scene.exec, scene.tree);
+  const svo_cone_caster caster(scene.view(), opacity.view(), std::numeric_limits<float>::infinity());
+  int lit = 0, dark = 0;
+  for (const float radiance : cast(scene.exec, caster, cells_of_sphere(vec3(0.5f), 16), 0.0f)) {
+    REQUIRE(radiance >= 0.0f);
+    REQUIRE(radiance <= 1.0e30f);
+    lit += radiance > 1.0e29f;
+    dark += radiance < 2.0f;
+  }
+  CHECK(lit > 20);
+  CHECK(dark > 100);
 }
 
 /// A thin cone, and the voxel that a ray meets.

@@ -66,7 +66,7 @@ WFPG_TEST_CASE("what is deposited on a side is read from it", "[exitance_cache]"
   CHECK(scene.radiance(0, 0) < 0.0f);
   deposit_colour(scene, p, z, vec3(1.0f, 2.0f, 3.0f));
   scene.cache.update(scene.exec);
-  CHECK(scene.read(leaf, z) == Approx(wfpg::luminance(vec3(1.0f, 2.0f, 3.0f))));
+  CHECK(scene.read(leaf, z) == Approx(0.2126 + 2.0 * 0.7152 + 3.0 * 0.0722));
 }
 
 std::vector<deposit> random_deposits(const test_mesh& mesh, std::size_t n, std::uint64_t seed) {

@@ -1,9 +1,12 @@
 // What path_guider asks of guides, with the one of docs/guides.md.
 #include "pages/uniform_guide.hpp"
+#include "support/estimates.hpp"
+#include "support/evaluate.hpp"
 #include "support/guiding.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <type_traits>
@@ -206,6 +209,12 @@ WFPG_TEST_CASE("what is deeper than guided_depths is its BSDF's, by the octree's
             guided += d.technique == sampling_technique::guide;
           INFO(name_of(lifetime) << ", P " << products << ", depth " << depth);
           CHECK((guided > 0) == (depth < 2));
+          const wave_of_surfaces<Exec> wave(box.exec, surfaces, depth);
+          const wfpg::guide_view view = box.guider.prepare(wave.get(), box_caster());
+          const auto fields = evaluate(box.exec, surfaces.size(), [=] WFPG_HD(std::size_t i) {
+            return view.number(static_cast<std::uint32_t>(i)) != wfpg::no_field ? 1 : 0;
+          });
+          CHECK((std::count(fields.begin(), fields.end(), 1) > 0) == (depth < 2));
         }
       }
 }
@@ -266,20 +275,10 @@ WFPG_TEST_CASE("a guide's view has the densities of its directions, and answers 
   CHECK(wrong == 0);
 }
 
-/// Mean of what paths of two bounces gather, and its variance.
-struct estimate {
-  double mean = 0.0, variance = 0.0;
-};
+/// Of what paths of two bounces gather.
 template <class Guider, class Exec>
 estimate estimate_radiance(const Exec& exec, Guider&& guider, std::uint32_t samples, std::size_t paths) {
-  double sum = 0.0, squares = 0.0;
-  const auto gathered = trace_paths(exec, guider, samples, paths, box_caster());
-  for (const float value : gathered) {
-    sum += double(value);
-    squares += double(value) * double(value);
-  }
-  const auto n = double(gathered.size());
-  return {sum / n, (squares / n - sum * sum / (n * n)) / n};
+  return estimate_of(trace_paths(exec, guider, samples, paths, box_caster()));
 }
 
 WFPG_TEST_CASE("what paths gather is the same, whichever guide they have", "[guide]") {

@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <limits>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -287,7 +288,7 @@ TEST_CASE("guide files cut off anywhere are refused", "[guide_file]") {
 }
 
 TEST_CASE("guide files of other options are refused by the option's name", "[guide_file]") {
-  const guider_options options = small_options();
+  const guider_options options = options_with_lights();
   const std::string bytes = saved(trained(one_policy(), options));
   const auto refused = [&](const char* name, auto change) {
     guider_options other = options;
@@ -302,6 +303,7 @@ TEST_CASE("guide files of other options are refused by the option's name", "[gui
   refused("kept.resolution", [](guider_options& o) { o.kept.resolution = 8; });
   refused("kept.learn", [](guider_options& o) { o.kept.learn = false; });
   refused("kept.budget_bytes", [](guider_options& o) { o.kept.budget_bytes /= 40; });
+  refused("lights.resolution", [](guider_options& o) { o.lights.resolution = 8; });
   refused("lights.weights.size()", [](guider_options& o) { o.lights.weights = {1.0f, 1.0f}; });
   guider_options invalid = options;
   invalid.rays_per_bin = 0;
@@ -429,6 +431,19 @@ TEST_CASE("guide files replace one another whole", "[guide_file]") {
   CHECK(save(folder.file("none/a.guide")) == "wfpg: " + folder.file("none/a.guide") + " cannot be written");
   CHECK(save(folder.file("")) == "wfpg: " + folder.file("") + " is there and is not a file");
   CHECK(save("/dev/null") == "wfpg: /dev/null is there and is not a file");
+  CHECK_THROWS_AS(wfpg::detail::replace_file(path,
+                                             [](std::ostream& out) {
+                                               out << "half";
+                                               throw std::runtime_error("fails on request");
+                                             }),
+                  std::runtime_error);
+  CHECK(content_of(path) == saved(guider));
+  CHECK_FALSE(std::filesystem::exists(path + ".partial"));
+  std::istringstream with_more(saved(guider) + "tail");
+  wfpg::load_guide(exec, with_more, options);
+  std::string left;
+  with_more >> left;
+  CHECK(left == "tail");
   std::ostringstream broken;
   broken.setstate(std::ios::badbit);
   CHECK(fault_of([&] { wfpg::save_guide(guider, broken); }) == "wfpg: the guide cannot be written");

@@ -366,7 +366,7 @@ WFPG_TEST_CASE("irradiance records: 64 bytes each, memory is told, and rebuildin
   const std::size_t allocations = resource.allocations;
   guider.forget_light();
   begin_with_wave(exec, guider, box_caster());
-  CHECK(resource.allocations - allocations < 8);  // the test's own
+  CHECK(resource.allocations - allocations <= (loops_on_host ? 1 : 7));  // the test's own
 }
 
 WFPG_TEST_CASE("irradiance records: without light, without emitters and without a scene", "[records]") {

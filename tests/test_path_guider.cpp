@@ -54,6 +54,20 @@ const std::vector<bad_option>& bad_options() {
       {"kept.recast", [](guider_options& o) { o.kept.recast = 0; }},
       {"kept.idle_samples", [](guider_options& o) { o.kept.idle_samples = 0; }},
       {"kept.budget_bytes", [](guider_options& o) { o.kept.budget_bytes = ~std::size_t(0); }},
+      {"product_resolution", [](guider_options& o) { o.product_resolution = 3; }},
+      {"product_resolution", [](guider_options& o) { o.product_resolution = 32; }},
+      {"kept.resolution", [](guider_options& o) { o.product_resolution = 16; }},  // 24 cells by default
+      {"field_resolution at a depth",
+       [](guider_options& o) {
+         o.fields = field_lifetime::transient;
+         o.product_resolution = 8;
+         o.min_field_resolution = 12;
+       }},
+      {"guide_fraction",
+       [](guider_options& o) {
+         o.product_resolution = 4;
+         o.guide_fraction = 1.0f;
+       }},
       {"guided_depths", [](guider_options& o) { o.guided_depths = 0; }},
       {"max_depth", [](guider_options& o) { o.max_depth = 0; }},
       {"max_depth", [](guider_options& o) { o.max_depth = 5000; }},

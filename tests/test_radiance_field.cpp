@@ -165,6 +165,12 @@ WFPG_TEST_CASE("radiance field: what is not finite or negative from a caster cou
     return cells.weigh(hit.radiance(cache), cone.direction);
   });
   CHECK(values == std::vector<float>{2.0f, 0.0f, 0.0f, 0.0f, 1e30f});
+  const std::vector<float> distances{INFINITY, 3e38f, 1e10f};
+  const auto far = evaluate(box.exec, distances, [=] WFPG_HD(float distance) {
+    const wfpg::ray cone = cells.cone({0, 0});
+    return cells.find(cache, cone, {distance, 5.0f}).radiance(cache);
+  });
+  CHECK(far == std::vector<float>(3, 0.0f));
 }
 
 /// The resident fields of one wave, as bits, and of each ray which is its.

@@ -319,7 +319,7 @@ WFPG_TEST_CASE("sarsa grid: memory is told; without paths or extent it guides on
     CHECK(guider.memory().persistent() + guider.memory().transient() == held);
     const std::size_t allocations = resource.allocations;
     trace_paths(exec, guider, 1, 500, box_caster());
-    CHECK(resource.allocations - allocations < 8);  // the test's own
+    CHECK(resource.allocations - allocations <= (loops_on_host ? 3 : 7));  // the test's own
   }
   sarsa_grid_options without_paths = sarsa_options(0);
   without_paths.max_rays = 500;

@@ -162,6 +162,17 @@ TEST_CASE("statistics: tiles of two renderers", "[statistics]") {
   check_names(check_unbiased(truth, rendered(1.02, 4)), {"tiles together"});
 }
 
+TEST_CASE("statistics: a tile that is not finite is no unbiased one", "[statistics]") {
+  const tile_means truth = rendered(1.0, 1);
+  for (const double bad : {std::nan(""), double(INFINITY), -double(INFINITY)}) {
+    tile_means tested = rendered(1.0, 2);
+    std::vector<double> tiles(tested.size(), 1.0);
+    tiles[3] = bad;
+    tested.add(tiles);
+    check_names(check_unbiased(truth, tested), {"tile 3"});
+  }
+}
+
 TEST_CASE("statistics: what failed by chance is made anew, and what is biased fails again", "[statistics]") {
   std::vector<int> factors;
   const auto truth = [&](int factor) {

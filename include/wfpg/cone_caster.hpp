@@ -119,7 +119,9 @@ class svo_cone_caster {
   /// W/(m² sr).
   WFPG_HD svo_cone_caster(const exitance_cache_view& cache, const voxel_opacity_view& opacity,
                           float environment = 0.0f, float clearance = 2.0f)
-      : cones_{cache.octree(), {cache, opacity}}, environment_(environment), clearance_(clearance) {}
+      : cones_{cache.octree(), {cache, opacity}},
+        environment_(detail::min(environment, 1.0e30f)),
+        clearance_(clearance) {}
 
   /// A miss with the radiance that a cone around `axis` gathers, and of the environment what is left clear;
   /// at most 1e30. `solid_angle` in steradians. A ray that is not finite, or whose direction is zero, leaves
