@@ -252,6 +252,20 @@ TEST_CASE("a dielectric reflects and refracts as Fresnel and Snell say", "[rende
     }
 }
 
+TEST_CASE("roulette sees of smooth glass what goes on, whatever its colour", "[renderer][bsdf]") {
+  const vec3 colour(0.5f, 0.25f, 0.0f);
+  for (const material_kind kind : {material_kind::dielectric, material_kind::thin_dielectric})
+    for (const bool is_black : {false, true}) {
+      const bsdf glass = make(kind, is_black ? vec3(0.0f) : colour);
+      const vec3 wo = viewers()[1];
+      const vec3 reflected = glass.sample(wo, {0.0f, 0.0f}).direction;
+      const vec3 transmitted = glass.sample(wo, {0.9999f, 0.0f}).direction;
+      REQUIRE(transmitted.z * wo.z < 0.0f);
+      CHECK(glass.reflectance(wo, reflected) == Approx(1.0f));
+      CHECK(glass.reflectance(wo, transmitted) == Approx(is_black ? 0.0f : wfpg::luminance(colour)));
+    }
+}
+
 TEST_CASE("a rough dielectric of little roughness has the smooth one's albedo", "[renderer][bsdf]") {
   const bsdf rough = make(material_kind::rough_dielectric, white, 0.02f);
   for (const float side : {1.0f, -1.0f})

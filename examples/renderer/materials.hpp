@@ -137,10 +137,10 @@ struct bsdf {
   /// What part of the light goes on, roughly and per sample of this BSDF: for Russian roulette.
   /// Does not see how radiance changes with the index of refraction, which paths that leave again get back.
   WFPG_HD float reflectance(vec3 outgoing, vec3 incident) const {
-    if (is_delta()) return wfpg::luminance(colour);
+    const float eta = ior_beyond(outgoing, incident);
+    if (is_delta()) return eta * eta * wfpg::luminance(delta_weight_rgb(outgoing, incident));
     const float density = pdf(outgoing, incident);
     if (!(density > 0.0f)) return 0.0f;
-    const float eta = ior_beyond(outgoing, incident);
     return eta * eta * eval(outgoing, incident) / density;
   }
 
