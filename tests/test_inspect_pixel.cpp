@@ -59,6 +59,23 @@ TEST_CASE("inspect: light arrives in a furnace alike from everywhere", "[inspect
   CHECK(light.mean().pixels.size() == 36);
 }
 
+TEST_CASE("inspect: light arrives by all lamps, however the guide groups them", "[inspect]") {
+  const render::scene lamps = render::make_builtin_scene("many-lamps");
+  std::vector<vec3> by_one_group;
+  for (const std::uint32_t groups : {1u, 32u}) {
+    render::render_options options = small(8, 2);
+    options.light_groups = groups;
+    const learnt_scene learnt(lamps, options, {});
+    const render::hit_surface& at = learnt.hits()[27];
+    const direction_grid cells(6, wfpg::detail::facing_normal(at.surface));
+    const std::vector<vec3> pixels = learnt.arriving(at, cells, 4, {}).mean().pixels;
+    if (groups == 1)
+      by_one_group = pixels;
+    else
+      CHECK(pixels == by_one_group);
+  }
+}
+
 TEST_CASE("inspect: a floor under the sky is sampled as its BSDF does", "[inspect]") {
   const learnt_scene learnt(lit_floor(render::material_kind::lambert), small(16, 4), {});
   const std::uint32_t pixel = 12 * 16 + 8;

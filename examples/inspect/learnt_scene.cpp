@@ -75,6 +75,7 @@ struct learnt_scene::state {
       : options(checked(given)),
         geometry(exec, scene),
         lights(exec, scene, options.light_groups),
+        lights_by_power(exec, scene),
         accelerated(exec, scene, geometry.view()),
         camera(scene.view, options.width, options.height),
         guider(render::begin_guider(exec, {geometry.view().positions, geometry.view().triangles},
@@ -127,6 +128,7 @@ struct learnt_scene::state {
   render::render_options options;
   render::device_scene<exec_policy> geometry;
   render::light_distribution<exec_policy> lights;
+  render::light_distribution<exec_policy> lights_by_power;  // for who does not learn to choose
   render::embree_scene accelerated;
   render::pinhole camera;
   wfpg::path_guider<exec_policy> guider;
@@ -199,7 +201,7 @@ incident_light learnt_scene::arriving(const render::hit_surface& at, const direc
     settings.width = settings.height = side;
     --settings.max_depth;
     settings.seed += reference_seed + (is_second ? 1 : 0);
-    tracer_type tracer(s.exec, settings, {s.geometry.view(), s.lights.view(), s.options.nee},
+    tracer_type tracer(s.exec, settings, {s.geometry.view(), s.lights_by_power.view(), s.options.nee},
                        s.accelerated.caster());
     render::unguided<exec_policy> guider(s.exec);
     for (int i = 0; i < half; ++i) {

@@ -25,7 +25,6 @@ class pixel_sampler {
   const wfpg::directional_field& field() const { return plain_.field; }
   /// Of guided samples, before glossy parts take theirs; 0 without a field.
   float fraction() const { return plain_.fraction; }
-  bool draws_product() const { return draws_product_; }
   /// What of the samples each part draws.
   wfpg::mixture_shares shares() const;
 
