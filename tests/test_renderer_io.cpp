@@ -33,13 +33,18 @@ image grey(int width, int height, float value) {
   return picture;
 }
 
-std::string error_of_read(const std::string& path) {
+template <class Call>
+std::string error_of(const Call& call) {
   try {
-    render::read_exr(path);
+    call();
   } catch (const std::runtime_error& error) {
     return error.what();
   }
   return "nothing was thrown";
+}
+
+std::string error_of_read(const std::string& path) {
+  return error_of([&] { render::read_exr(path); });
 }
 
 }  // namespace
@@ -106,6 +111,18 @@ TEST_CASE("Environments: OpenEXR and Radiance HDR, and what is wrong with one", 
   CHECK(contains(error(folder.file("negative.exr")), "negative"));
   render::write_exr(folder.file("nan.exr"), grey(2, 1, std::numeric_limits<float>::quiet_NaN()));
   CHECK(contains(error(folder.file("nan.exr")), "finite"));
+}
+
+TEST_CASE("PNG: what is written is read again, and what is not is an error", "[renderer][png]") {
+  const temporary_folder folder;
+  const std::string path = folder.file("a.png");
+  render::write_png(path, grey(4, 3, 0.5f), 1.0f);
+  const std::string bytes = content_of(path);
+  CHECK(bytes.substr(1, 3) == "PNG");
+  CHECK(bytes.substr(bytes.size() - 8, 4) == "IEND");
+  for (const std::string& nowhere : {folder.file("none/a.png"), std::string("/dev/full")})
+    CHECK(contains(error_of([&] { render::write_png(nowhere, grey(4, 3, 0.5f), 1.0f); }),
+                   nowhere + ": cannot be written"));
 }
 
 TEST_CASE("The sRGB curve goes both ways", "[renderer][png]") {

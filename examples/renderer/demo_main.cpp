@@ -239,6 +239,7 @@ void run(const std::filesystem::path& directory, const demo_device& on) {
       shown.c_str(), directory.string().c_str());
   std::ofstream file(directory / "summary.json");
   file << summary.dump(2) << '\n';
+  file.close();
   if (!file) throw std::runtime_error((directory / "summary.json").string() + ": cannot be written");
 }
 

@@ -16,6 +16,7 @@
 #include <fstream>
 #include <memory>
 #include <stdexcept>
+#include <string>
 
 namespace render {
 namespace {
@@ -161,8 +162,16 @@ void write_png(const std::string& path, const image& picture, float exposure) tr
       const float clamped = value > 0.0f ? std::min(value, 1.0f) : 0.0f;  // NaN is not above 0
       bytes.push_back(static_cast<std::uint8_t>(linear_to_srgb(clamped) * 255.0f + 0.5f));
     }
-  if (!stbi_write_png(path.c_str(), picture.width, picture.height, 3, bytes.data(), 3 * picture.width))
-    throw std::runtime_error("cannot be written");
+  std::string encoded;
+  const auto append = [](void* to, void* data, int size) {
+    static_cast<std::string*>(to)->append(static_cast<const char*>(data), static_cast<std::size_t>(size));
+  };
+  const bool is_encoded = stbi_write_png_to_func(append, &encoded, picture.width, picture.height, 3,
+                                                 bytes.data(), 3 * picture.width) != 0;
+  std::ofstream file(path, std::ios::binary);
+  file << encoded;
+  file.close();
+  if (!is_encoded || !file) throw std::runtime_error("cannot be written");
 } catch (const std::exception& reason) {
   throw with_path(path, reason);
 }

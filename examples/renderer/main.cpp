@@ -50,9 +50,8 @@ void add_state_options(CLI::App& app, arguments& given) {
       ->excludes(load);
 }
 
-/// What a rendering leaves behind beside its pictures.
-void save_states(const arguments& given, const render::render_result& result) {
-  if (!given.save_guide.empty()) render::write_bytes(given.save_guide, result.guide);
+/// What goes on from an interrupted rendering, or to more samples.
+void save_state(const arguments& given, const render::render_result& result) {
   const bool updates = given.save_state.empty() && result.is_stopped;
   const std::string& state = updates ? given.options.resume : given.save_state;
   if (!state.empty()) render::write_bytes(state, result.state);
@@ -64,6 +63,29 @@ void save_states(const arguments& given, const render::render_result& result) {
 void print_error(const render::image_error& error) {
   std::printf("mse %.6e  relmse %.6e  relmse trimmed %.6e  mse reinhard %.6e\n", error.mse, error.relmse,
               error.relmse_trimmed, error.mse_reinhard);
+}
+
+/// Writes all that was asked for, whatever of it fails, and says what does: rendering takes longer than that.
+bool write_all(const arguments& given, const render::render_result& result,
+               const std::optional<render::image>& reference) {
+  bool is_written = true;
+  const auto attempt = [&is_written](const auto& write) {
+    try {
+      write();
+    } catch (const std::exception& error) {
+      std::cerr << "wfpg-render: " << error.what() << '\n';
+      is_written = false;
+    }
+  };
+  if (!given.output.empty()) attempt([&] { render::write_exr(given.output, result.picture); });
+  if (!given.png.empty()) attempt([&] { render::write_png(given.png, result.picture, given.exposure); });
+  if (!given.save_guide.empty()) attempt([&] { render::write_bytes(given.save_guide, result.guide); });
+  attempt([&] { save_state(given, result); });
+  std::optional<render::image_error> error;
+  if (reference) attempt([&] { error = render::compare(result.picture, *reference); });
+  if (error) print_error(*error);
+  if (!given.stats.empty()) attempt([&] { render::write_stats(given.stats, result.report, error); });
+  return is_written;
 }
 
 int run(arguments& given) {
@@ -80,13 +102,7 @@ int run(arguments& given) {
   const render::render_result result =
       render::render(scene, given.options, [&bar](const render::render_progress& p) { bar.show(p); });
   bar.finish();
-  if (!given.output.empty()) render::write_exr(given.output, result.picture);
-  if (!given.png.empty()) render::write_png(given.png, result.picture, given.exposure);
-  std::optional<render::image_error> error;
-  if (reference) error = render::compare(result.picture, *reference);
-  if (error) print_error(*error);
-  if (!given.stats.empty()) render::write_stats(given.stats, result.report, error);
-  save_states(given, result);
+  if (!write_all(given, result, reference)) return failure;
   return result.is_stopped ? interrupted : 0;
 }
 
