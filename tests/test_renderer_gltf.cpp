@@ -326,6 +326,22 @@ TEST_CASE("glTF: what is not supported is said once", "[renderer][gltf]") {
   CHECK(lines == 2);
 }
 
+TEST_CASE("glTF: extensions and their textures that are not read are warned of", "[renderer][gltf]") {
+  tiny_gltf tiny;
+  tiny.with("extensionsUsed", R"(["EXT_mesh_gpu_instancing", "KHR_materials_transmission"])");
+  tiny.with("materials", R"([{"extensions": {"KHR_materials_transmission":
+      {"transmissionFactor": 0.5, "transmissionTexture": {"index": 0}}}}])");
+  const std::vector<std::string> warnings = tiny.load().warnings;
+  const auto lines_with = [&](const char* text) {
+    int lines = 0;
+    for (const std::string& line : warnings) lines += contains(line, text);
+    return lines;
+  };
+  CHECK(lines_with("extension EXT_mesh_gpu_instancing is not supported") == 1);
+  CHECK(lines_with("transmissionTexture is not supported") == 1);
+  CHECK(lines_with("KHR_materials_transmission") == 0);
+}
+
 TEST_CASE("glTF: hostile files", "[renderer][gltf][hostile]") {
   SECTION("missing") {
     CHECK_THROWS_AS(render::load_gltf("/nonexistent/no.glb"), std::runtime_error);

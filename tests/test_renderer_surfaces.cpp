@@ -58,6 +58,13 @@ TEST_CASE("textures are clamped or mirrored beyond their edges", "[renderer]") {
   CHECK(texels_of(1.3f, texture_wrap::mirrored_repeat) == found(2, 1));
   CHECK(texels_of(-0.3f, texture_wrap::mirrored_repeat) == found(1, 0));
   CHECK(texels_of(2.0f, texture_wrap::mirrored_repeat) == found(0, 0));
+  for (const texture_wrap wrap :
+       {texture_wrap::repeat, texture_wrap::mirrored_repeat, texture_wrap::clamp_to_edge})
+    for (const float far : {std::nanf(""), INFINITY, -INFINITY, 3e38f, -3e38f, 1e10f, -1e10f}) {
+      INFO(far);
+      CHECK(texels_of(far, wrap).first < 3);
+      CHECK(texels_of(far, wrap).second < 3);
+    }
 }
 
 TEST_CASE("rays go through what an alpha mask cuts out", "[renderer]") {

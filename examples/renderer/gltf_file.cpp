@@ -216,6 +216,8 @@ tinygltf::Model read_model(const std::string& path, std::vector<std::string>& wa
     fail("is of glTF version '" + model.asset.version + "', not 2");
   require_supported_extensions(model);
   add_lines(warnings, remarks);
+  for (const std::string& name : model.extensionsUsed)
+    if (!is_supported_extension(name)) warn_once(warnings, "the extension " + name + " is not supported");
   return model;
 }
 

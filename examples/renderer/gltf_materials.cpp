@@ -249,7 +249,19 @@ class material_reader {
     if (source.occlusionTexture.index >= 0) warn("occlusion textures are not supported");
     if (extension_colour(source, "KHR_materials_specular", "specularColorFactor") != vec3(1.0f))
       warn("a specularColorFactor is not supported: taken as white");
-    for (const auto& extension : source.extensions) warn_of_extension(extension.first);
+    for (const auto& extension : source.extensions) {
+      warn_of_extension(extension.first);
+      warn_of_textures(extension.second);
+    }
+  }
+
+  /// None of the extensions' own textures is read.
+  void warn_of_textures(const tinygltf::Value& extension) {
+    if (!extension.IsObject()) return;
+    const std::string suffix = "Texture";
+    for (const std::string& key : extension.Keys())
+      if (key.size() >= suffix.size() && key.compare(key.size() - suffix.size(), suffix.size(), suffix) == 0)
+        warn("a " + key + " is not supported: its factor is the same everywhere");
   }
 
   void warn_of_extension(const std::string& name) {

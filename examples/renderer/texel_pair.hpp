@@ -20,7 +20,9 @@ struct texel_pair {
     const float near = wrap == texture_wrap::clamp_to_edge
                            ? glm::clamp(coordinate, 0.0f, 1.0f)
                            : coordinate - period * std::floor(coordinate / period);
-    const float x = near * static_cast<float>(size) - 0.5f, floor = std::floor(x);
+    // A coordinate that is not finite, or too large to have a fraction, is the edge's.
+    const float inside = near >= 0.0f ? glm::min(near, period) : 0.0f;
+    const float x = inside * static_cast<float>(size) - 0.5f, floor = std::floor(x);
     second_weight = x - floor;
     first = wrapped(static_cast<std::int32_t>(floor), static_cast<std::int32_t>(size), wrap);
     second = wrapped(static_cast<std::int32_t>(floor) + 1, static_cast<std::int32_t>(size), wrap);
