@@ -254,6 +254,8 @@ TEST_CASE("a rendering begins with the guide of another one", "[renderer][state]
     const render_result warm = render::render(world, options, {});
     CHECK(warm.report.spp == 1);
     CHECK(warm.report.cones_per_segment > 0.0);
+    // What the other rendering counted is not counted again.
+    CHECK(warm.report.cones_per_segment < 3.0 * teacher.report.cones_per_segment);
     CHECK_FALSE(same_bits(warm.picture, cold.picture));
 
     options.spp = 5;

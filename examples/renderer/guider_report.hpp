@@ -34,9 +34,23 @@ void report_records(const wfpg::path_guider<Exec, wfpg::irradiance_records<Exec,
     report.cones_per_segment = static_cast<double>(found.cones) / static_cast<double>(segments);
 }
 
-/// The octree's. `segments`: rays that paths were extended by in all samples.
+/// What a guider has counted since it said `before`.
+inline void subtract(wfpg::guider_statistics& counted, const wfpg::guider_statistics& before) {
+  counted.guided_samples -= before.guided_samples;
+  for (std::size_t depth = 0; depth < before.depths.size(); ++depth) {
+    counted.depths[depth].bins -= before.depths[depth].bins;
+    counted.depths[depth].rays -= before.depths[depth].rays;
+    counted.depths[depth].cones -= before.depths[depth].cones;
+  }
+  counted.kept.born -= before.kept.born;
+  counted.kept.freed -= before.kept.freed;
+  counted.kept.refreshed -= before.kept.refreshed;
+}
+
+/// The octree's. `segments`: rays that paths were extended by in all samples, since the guider said `before`.
 template <class Exec>
-void report_guider(const wfpg::path_guider<Exec>& guider, std::uint64_t segments, render_report& report) {
+void report_guider(const wfpg::path_guider<Exec>& guider, std::uint64_t segments, render_report& report,
+                   const wfpg::guider_statistics& before = {}) {
   report_any_guider(guider, report);
   const wfpg::memory_report memory = guider.memory();
 
@@ -51,7 +65,8 @@ void report_guider(const wfpg::path_guider<Exec>& guider, std::uint64_t segments
   if (octree.node_count() > 0)
     report.octree.bytes_per_node = node_bytes / static_cast<double>(octree.node_count());
 
-  const wfpg::guider_statistics statistics = guider.statistics();
+  wfpg::guider_statistics statistics = guider.statistics();
+  subtract(statistics, before);
   const double samples = std::max(1.0, static_cast<double>(statistics.guided_samples));
   double cones = 0.0;
   for (const wfpg::depth_statistics& depth : statistics.depths) {

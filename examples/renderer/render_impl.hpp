@@ -245,13 +245,16 @@ render_result render_on(const Exec& exec, const scene& scene, const render_optio
               begin_guider(exec, mesh, guider_options_of(options, lights.shares()), options, result.guide);
           building.add("octree", build.seconds());
           result.report.octree.build_seconds = build.seconds();
+          // A guide that is loaded has counted another rendering's, one of a state this one's.
+          const wfpg::guider_statistics before =
+              options.load_guide.empty() ? wfpg::guider_statistics() : guider.statistics();
           if (options.through == cones::scene) {
             take_samples(tracer, guider, camera, options, progress, result);
           } else {
             octree_cone_guider<Exec> with_cones(exec, guider, geometry.environment, options.through);
             take_samples(tracer, with_cones, camera, options, progress, result);
           }
-          report_guider(guider, tracer.segments(), result.report);
+          report_guider(guider, tracer.segments(), result.report, before);
           result.guide = kept_guide(guider, options);
         }
       });
