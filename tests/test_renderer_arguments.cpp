@@ -103,3 +103,23 @@ TEST_CASE("the first vertices alone are guided where that is asked for", "[rende
   for (const char* const method : {"pt", "openpgl-vmm"})
     CHECK_THROWS_AS(parsed(std::string("--guided-depths 1 --method ") + method), CLI::RequiresError);
 }
+
+TEST_CASE("options of fields are refused where there are none", "[renderer][arguments]") {
+  const auto parse = [](const std::string& arguments) {
+    render::render_options options;
+    CLI::App app;
+    render::add_method_options(app, options);
+    render::add_guider_options(app, options);
+    app.parse(arguments);
+    render::check_render_options(app, options);
+  };
+  for (const char* const option :
+       {"--guiding plain", "--fields kept", "--octree-resolution 64", "--field-resolution 16",
+        "--slot-resolution 16", "--recast 4", "--learn off", "--light-groups 4", "--field-budget 1MiB",
+        "--rays-per-bin 32", "--min-bin-level 2", "--deposits-per-leaf 0", "--cones march"})
+    for (const char* const method : {"pt", "sarsa", "records", "openpgl-vmm"}) {
+      INFO(option << ", " << method);
+      CHECK_THROWS_AS(parse(option + std::string(" --method ") + method), CLI::RequiresError);
+      CHECK_NOTHROW(parse(option + std::string(" --method wfpg")));
+    }
+}

@@ -35,6 +35,19 @@ void parse_size(const std::string& text, render_options& options) {
     throw CLI::ValidationError("--size is " + text + ", expected WIDTHxHEIGHT, such as 640x360");
 }
 
+constexpr const char* field_option_names[] = {"--guiding",
+                                              "--fields",
+                                              "--octree-resolution",
+                                              "--field-resolution",
+                                              "--slot-resolution",
+                                              "--recast",
+                                              "--learn",
+                                              "--light-groups",
+                                              "--field-budget",
+                                              "--rays-per-bin",
+                                              "--min-bin-level",
+                                              "--deposits-per-leaf",
+                                              "--cones"};
 constexpr const char* sarsa_option_names[] = {"--sarsa-update",     "--sarsa-sampler",
                                               "--sarsa-resolution", "--sarsa-directions",
                                               "--sarsa-step",       "--sarsa-learning-rate"};
@@ -152,7 +165,7 @@ void add_guider_options(CLI::App& app, render_options& options) {
   app.add_option("--deposits-per-leaf", options.deposits_per_leaf,
                  "so many deposits a leaf of the octree are recorded in a sample; 0: all (default: 16)");
   app.add_option("--guide-fraction", options.guide_fraction,
-                 "samples drawn from fields (default: the mode's)")
+                 "samples drawn from the guide (default: the mode's, as 0)")
       ->check(CLI::Range(0.0, 1.0));
   app.add_option(
          "--guided-depths", options.guided_depths,
@@ -176,8 +189,9 @@ void check_render_options(const CLI::App& app, const render_options& options) {
   if (app.count("--guided-depths") > 0 &&
       (options.method == sampling_method::pt || is_openpgl(options.method)))
     throw CLI::RequiresError("--guided-depths", "--method wfpg, wfpg-product, sarsa or records");
-  if (app.count("--cones") > 0 && !is_wfpg(options.method))
-    throw CLI::RequiresError("--cones", "--method wfpg or wfpg-product");
+  for (const char* const name : field_option_names)
+    if (app.count(name) > 0 && !is_wfpg(options.method))
+      throw CLI::RequiresError(name, "--method wfpg or wfpg-product");
   for (const char* const name : sarsa_option_names)
     if (app.count(name) > 0 && options.method != sampling_method::sarsa)
       throw CLI::RequiresError(name, "--method sarsa");
