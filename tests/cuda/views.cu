@@ -164,6 +164,6 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(d::tabulate_bsdf<cuda_compile::grey>{});
   launch(d::pair_bsdf<cuda_compile::grey>{});
   launch(d::probe_surfaces<surfaces>{});
-  launch(d::cast_inline<wfpg::svo_ray_caster>{wfpg::svo_ray_caster(tree), {}, {}});
+  launch(d::cast_each<wfpg::svo_ray_caster>{wfpg::svo_ray_caster(tree), {}, {}});
   launch(d::find_hit_leaves{});
 }
