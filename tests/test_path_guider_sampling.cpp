@@ -172,6 +172,17 @@ std::vector<double> mean_patch_probability(guider_options options, const std::ve
   return mean;
 }
 
+WFPG_TEST_CASE("path guider: transient fields are cast anew in each sample", "[path_guider]") {
+  guided_box<Exec> box(field_lifetime::transient);
+  box.learn();
+  const auto surfaces = wall_surfaces(600, 7);
+  const auto drawn = box.sample(surfaces);
+  CHECK(same_draws(box.sample(surfaces), drawn));
+  box.guider.end_sample();
+  box.guider.begin_sample();
+  CHECK(!same_draws(box.sample(surfaces), drawn));
+}
+
 WFPG_TEST_CASE("path guider: kept fields find the patch as transient ones do", "[path_guider]") {
   const vec3 places[] = {{0.2f, 0, 0.3f}, {0.6f, 0, 0.7f}, {0.0f, 0.3f, 0.6f}, {0.4f, 0.2f, 0.0f}};
   const vec3 normals[] = {{0, 1, 0}, {0, 1, 0}, {1, 0, 0}, {0, 0, 1}};
