@@ -1,6 +1,8 @@
 // Hashes, files, processes, the machine.
 #include "system.hpp"
 
+#include "whole_file.hpp"
+
 #include <wfpg/version.hpp>
 
 #include <sys/utsname.h>
@@ -67,10 +69,7 @@ std::string content_of(const std::filesystem::path& path) {
 
 void write_whole(const std::filesystem::path& path, const std::string& content) {
   const std::string unfinished = path.string() + ".part" + std::to_string(getpid());
-  std::ofstream file(unfinished, std::ios::binary);
-  file << content;
-  file.close();
-  if (!file) throw std::runtime_error(unfinished + ": cannot be written");
+  render::write_whole_file(unfinished, content);
   std::filesystem::rename(unfinished, path);
 }
 

@@ -7,12 +7,12 @@
 #include "option_names.hpp"
 #include "page.hpp"
 #include "progress_bar.hpp"
+#include "whole_file.hpp"
 
 #include <wfpg/error.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <ostream>
 #include <stdexcept>
 
@@ -180,11 +180,7 @@ std::string note_of(const learnt_scene& learnt, std::uint32_t pixel) {
 }
 
 void write_numbers(const picture_folder& folder, const json& numbers) {
-  const std::string path = (folder.path() / "numbers.json").string();
-  std::ofstream file(path);
-  file << numbers.dump(2) << '\n';
-  file.close();
-  if (!file) throw std::runtime_error(path + ": cannot be written");
+  render::write_whole_file((folder.path() / "numbers.json").string(), numbers.dump(2) + '\n');
 }
 
 }  // namespace

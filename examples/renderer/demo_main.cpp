@@ -7,6 +7,7 @@
 #include "plot.hpp"
 #include "progress_bar.hpp"
 #include "render.hpp"
+#include "whole_file.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -15,7 +16,6 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <string>
 #include <vector>
@@ -237,10 +237,7 @@ void run(const std::filesystem::path& directory, const demo_device& on) {
       "were made. cones: a path segment. Pictures, left to right %sreference,\n"
       "and plots of error over time: %s\n",
       shown.c_str(), directory.string().c_str());
-  std::ofstream file(directory / "summary.json");
-  file << summary.dump(2) << '\n';
-  file.close();
-  if (!file) throw std::runtime_error((directory / "summary.json").string() + ": cannot be written");
+  render::write_whole_file((directory / "summary.json").string(), summary.dump(2) + '\n');
 }
 
 }  // namespace

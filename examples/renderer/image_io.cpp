@@ -2,6 +2,8 @@
 // the path in front.
 #include "image_io.hpp"
 
+#include "whole_file.hpp"
+
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -111,6 +113,26 @@ image read_hdr(const std::string& path) {
   return picture;
 }
 
+std::string encoded_png(const image& picture, float exposure) {
+  require_consistent(picture);
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(picture.pixels.size() * 3);
+  for (const vec3& pixel : picture.pixels)
+    for (int c = 0; c < 3; ++c) {
+      const float value = pixel[c] * exposure;
+      const float clamped = value > 0.0f ? std::min(value, 1.0f) : 0.0f;  // NaN is not above 0
+      bytes.push_back(static_cast<std::uint8_t>(linear_to_srgb(clamped) * 255.0f + 0.5f));
+    }
+  std::string encoded;
+  const auto append = [](void* to, void* data, int size) {
+    static_cast<std::string*>(to)->append(static_cast<const char*>(data), static_cast<std::size_t>(size));
+  };
+  if (!stbi_write_png_to_func(append, &encoded, picture.width, picture.height, 3, bytes.data(),
+                              3 * picture.width))
+    throw std::runtime_error("cannot be encoded");
+  return encoded;
+}
+
 }  // namespace
 
 image make_image(int width, int height) {
@@ -152,28 +174,14 @@ void write_exr(const std::string& path, const image& picture) try {
   throw with_path(path, reason);
 }
 
-void write_png(const std::string& path, const image& picture, float exposure) try {
-  require_consistent(picture);
-  std::vector<std::uint8_t> bytes;
-  bytes.reserve(picture.pixels.size() * 3);
-  for (const vec3& pixel : picture.pixels)
-    for (int c = 0; c < 3; ++c) {
-      const float value = pixel[c] * exposure;
-      const float clamped = value > 0.0f ? std::min(value, 1.0f) : 0.0f;  // NaN is not above 0
-      bytes.push_back(static_cast<std::uint8_t>(linear_to_srgb(clamped) * 255.0f + 0.5f));
-    }
+void write_png(const std::string& path, const image& picture, float exposure) {
   std::string encoded;
-  const auto append = [](void* to, void* data, int size) {
-    static_cast<std::string*>(to)->append(static_cast<const char*>(data), static_cast<std::size_t>(size));
-  };
-  const bool is_encoded = stbi_write_png_to_func(append, &encoded, picture.width, picture.height, 3,
-                                                 bytes.data(), 3 * picture.width) != 0;
-  std::ofstream file(path, std::ios::binary);
-  file << encoded;
-  file.close();
-  if (!is_encoded || !file) throw std::runtime_error("cannot be written");
-} catch (const std::exception& reason) {
-  throw with_path(path, reason);
+  try {
+    encoded = encoded_png(picture, exposure);
+  } catch (const std::exception& reason) {
+    throw with_path(path, reason);
+  }
+  write_whole_file(path, encoded);
 }
 
 image side_by_side(const std::vector<image>& pictures, int gap) {

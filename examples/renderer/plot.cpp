@@ -1,11 +1,12 @@
 // SVG by hand: a frame, decades as grid lines, curves with their names at their ends.
 #include "plot.hpp"
 
+#include "whole_file.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
-#include <stdexcept>
+#include <sstream>
 #include <utility>
 
 namespace render {
@@ -160,22 +161,20 @@ void write_svg(const std::string& path, const plot& drawn) {
       }
   const log_axis x = make_axis(xs, left, right_end);
   const log_axis y = make_axis(ys, height - bottom, top);
-  std::ofstream file(path);
-  file << "<svg xmlns='http://www.w3.org/2000/svg' width='" << width_of(drawn) << "' height='" << height
-       << "' font-family='sans-serif' font-size='13'>\n<rect width='100%' height='100%' fill='white'/>\n"
-       << grid(x, true) << grid(y, false)
-       << label(left, top - 15.0, drawn.title, "font-size='15' font-weight='bold'")
-       << label((left + right_end) / 2.0, height - 15.0, drawn.x_label, "text-anchor='middle'")
-       << label(0.0, 0.0, drawn.y_label,
-                "text-anchor='middle' transform='translate(18 " + number((top + height - bottom) / 2.0) +
-                    ") rotate(-90)'");
+  std::ostringstream svg;
+  svg << "<svg xmlns='http://www.w3.org/2000/svg' width='" << width_of(drawn) << "' height='" << height
+      << "' font-family='sans-serif' font-size='13'>\n<rect width='100%' height='100%' fill='white'/>\n"
+      << grid(x, true) << grid(y, false)
+      << label(left, top - 15.0, drawn.title, "font-size='15' font-weight='bold'")
+      << label((left + right_end) / 2.0, height - 15.0, drawn.x_label, "text-anchor='middle'")
+      << label(0.0, 0.0, drawn.y_label,
+               "text-anchor='middle' transform='translate(18 " + number((top + height - bottom) / 2.0) +
+                   ") rotate(-90)'");
   std::vector<end_label> labels;
   for (std::size_t i = 0; i < drawn.curves.size(); ++i)
-    file << draw(drawn.curves[i], x, y, colours[i % (sizeof colours / sizeof colours[0])], labels);
-  file << draw(std::move(labels));
-  file << "</svg>\n";
-  file.close();
-  if (!file) throw std::runtime_error(path + ": cannot be written");
+    svg << draw(drawn.curves[i], x, y, colours[i % (sizeof colours / sizeof colours[0])], labels);
+  svg << draw(std::move(labels)) << "</svg>\n";
+  write_whole_file(path, svg.str());
 }
 
 }  // namespace render

@@ -1,10 +1,9 @@
 // Reports to JSON.
 #include "stats_json.hpp"
 
-#include <nlohmann/json.hpp>
+#include "whole_file.hpp"
 
-#include <fstream>
-#include <stdexcept>
+#include <nlohmann/json.hpp>
 
 namespace render {
 namespace {
@@ -79,10 +78,7 @@ void write_stats(const std::string& path, const render_report& report,
   stats["cones_per_segment"] = report.cones_per_segment;
   if (error) stats["error"] = to_json(*error);
 
-  std::ofstream file(path);
-  file << stats.dump(2) << '\n';
-  file.close();
-  if (!file) throw std::runtime_error(path + ": cannot be written");
+  write_whole_file(path, stats.dump(2) + '\n');
 }
 
 }  // namespace render
