@@ -1,12 +1,10 @@
 // What path_guider asks of guides, with the one of docs/guides.md.
 #include "pages/uniform_guide.hpp"
 #include "support/estimates.hpp"
-#include "support/evaluate.hpp"
 #include "support/guiding.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 #include <type_traits>
@@ -211,10 +209,7 @@ WFPG_TEST_CASE("what is deeper than guided_depths is its BSDF's, by the octree's
           CHECK((guided > 0) == (depth < 2));
           const wave_of_surfaces<Exec> wave(box.exec, surfaces, depth);
           const wfpg::guide_view view = box.guider.prepare(wave.get(), box_caster());
-          const auto fields = evaluate(box.exec, surfaces.size(), [=] WFPG_HD(std::size_t i) {
-            return view.number(static_cast<std::uint32_t>(i)) != wfpg::no_field ? 1 : 0;
-          });
-          CHECK((std::count(fields.begin(), fields.end(), 1) > 0) == (depth < 2));
+          CHECK((count_guided(box.exec, view, surfaces.size()) > 0) == (depth < 2));
         }
       }
 }

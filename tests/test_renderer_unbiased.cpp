@@ -9,13 +9,8 @@
 
 namespace {
 
+using wfpg_test::check_rendering;
 using wfpg_test::rendering;
-
-void check_unbiased(const rendering& what) {
-  const auto report = wfpg_test::check_rendering(what);
-  INFO(what.name() << ": " << report.message);
-  CHECK(report);
-}
 
 using render::fields;
 using render::guiding;
@@ -27,19 +22,19 @@ constexpr auto product_method = sampling_method::wfpg_product;
 
 TEST_CASE("pictures guided by kept fields have the mean of unguided ones", "[renderer][unbiased]") {
   for (const char* scene : {"cornell-box", "cornell-enclosed", "ajar", "thin-wall", "furnace"})
-    for (const bool nee : {false, true}) check_unbiased({scene, nee});
-  check_unbiased({"cornell-wall", true});
-  check_unbiased({"many-lamps", true});  // whose choice is learnt
-  check_unbiased({"cornell-enclosed", false, wfpg_method, fields::kept, guiding::plain});
-  check_unbiased({"thin-wall", true, wfpg_method, fields::kept, guiding::plain});
+    for (const bool nee : {false, true}) check_rendering({scene, nee});
+  check_rendering({"cornell-wall", true});
+  check_rendering({"many-lamps", true});  // whose choice is learnt
+  check_rendering({"cornell-enclosed", false, wfpg_method, fields::kept, guiding::plain});
+  check_rendering({"thin-wall", true, wfpg_method, fields::kept, guiding::plain});
 }
 
 TEST_CASE("pictures guided by transient fields have the mean of unguided ones", "[renderer][unbiased]") {
   for (const bool nee : {false, true}) {
-    check_unbiased({"cornell-enclosed", nee, wfpg_method, fields::transient, guiding::oriented});
-    check_unbiased({"thin-wall", nee, wfpg_method, fields::transient, guiding::plain});
+    check_rendering({"cornell-enclosed", nee, wfpg_method, fields::transient, guiding::oriented});
+    check_rendering({"thin-wall", nee, wfpg_method, fields::transient, guiding::plain});
   }
-  check_unbiased({"many-lamps", true, wfpg_method, fields::transient, guiding::oriented});
+  check_rendering({"many-lamps", true, wfpg_method, fields::transient, guiding::oriented});
 }
 
 TEST_CASE("pictures guided by fields of the octree's cones have the mean of unguided ones",
@@ -48,25 +43,25 @@ TEST_CASE("pictures guided by fields of the octree's cones have the mean of ungu
     for (const fields lifetime : {fields::kept, fields::transient}) {
       rendering what{"thin-wall", true, wfpg_method, lifetime};
       what.through = through;
-      check_unbiased(what);
+      check_rendering(what);
     }
   rendering what{"cornell-enclosed", false, product_method};
   what.through = render::cones::trace;
-  check_unbiased(what);
+  check_rendering(what);
 }
 
 TEST_CASE("pictures guided by products have the mean of unguided ones", "[renderer][unbiased]") {
   for (const char* scene : {"cornell-box", "cornell-enclosed", "ajar", "thin-wall", "glossy-room"})
-    for (const bool nee : {false, true}) check_unbiased({scene, nee, product_method});
+    for (const bool nee : {false, true}) check_rendering({scene, nee, product_method});
   for (const bool nee : {false, true}) {
-    check_unbiased({"cornell-enclosed", nee, product_method, fields::transient, guiding::oriented});
-    check_unbiased({"thin-wall", nee, product_method, fields::transient, guiding::plain});
+    check_rendering({"cornell-enclosed", nee, product_method, fields::transient, guiding::oriented});
+    check_rendering({"thin-wall", nee, product_method, fields::transient, guiding::plain});
   }
 }
 
 TEST_CASE("pictures guided by a SARSA grid have the mean of unguided ones", "[renderer][unbiased]") {
   for (const char* scene : {"ajar", "glossy-room"})
-    for (const bool nee : {false, true}) check_unbiased({scene, nee, sampling_method::sarsa});
+    for (const bool nee : {false, true}) check_rendering({scene, nee, sampling_method::sarsa});
   rendering what{"cornell-enclosed", true, sampling_method::sarsa};
   // Each with another: test_sarsa_grid_light.cpp has all pairs.
   const auto updates = render::sarsa_update_names();
@@ -74,12 +69,12 @@ TEST_CASE("pictures guided by a SARSA grid have the mean of unguided ones", "[re
   for (std::size_t i = 0; i < samplers.size(); ++i) {
     what.update = std::next(updates.begin(), static_cast<std::ptrdiff_t>(i % updates.size()))->second;
     what.sampler = std::next(samplers.begin(), static_cast<std::ptrdiff_t>(i))->second;
-    check_unbiased(what);
+    check_rendering(what);
   }
 }
 
 TEST_CASE("pictures guided by irradiance records have the mean of unguided ones", "[renderer][unbiased]") {
-  for (const bool nee : {false, true}) check_unbiased({"cornell-enclosed", nee, sampling_method::records});
+  for (const bool nee : {false, true}) check_rendering({"cornell-enclosed", nee, sampling_method::records});
 }
 
 TEST_CASE("a furnace guided by products has its radiance within 0.5%", "[renderer][unbiased]") {

@@ -4,6 +4,7 @@
 #include "builtin_scenes.hpp"
 #include "option_names.hpp"
 #include "render.hpp"
+#include "support/catch.hpp"
 #include "support/statistics.hpp"
 
 #include <wfpg/types.hpp>
@@ -114,11 +115,13 @@ inline const tile_means& unguided_tiles(const std::string& scene, bool nee, int 
       .first->second;
 }
 
-/// Whether the mean of what is rendered is path tracing's on the CPU.
-inline wfpg::testing::check_report check_rendering(const rendering& what) {
-  return check_renderers_unbiased(
+/// Checks that the mean of what is rendered is path tracing's on the CPU.
+inline void check_rendering(const rendering& what) {
+  const wfpg::testing::check_report report = check_renderers_unbiased(
       [&](int factor) { return unguided_tiles(what.scene, what.nee, factor); },
       [&](int factor) { return render_tiles(what, static_cast<std::uint64_t>(500 * (factor - 1)), factor); });
+  INFO(what.name() << ": " << report.message);
+  CHECK(report);
 }
 
 }  // namespace wfpg_test
