@@ -46,16 +46,26 @@ struct without_memory : uniform_guide<Exec> {
   void memory() const {}
 };
 
-/// One that has fewer paths recorded once means have settled, and tells how many were.
+/// One that has fewer samples recorded once means have settled, and notes what it was told of each.
 template <class Exec>
-struct with_fewer_paths : uniform_guide<Exec> {
+struct with_turns : uniform_guide<Exec> {
   using uniform_guide<Exec>::uniform_guide;
-  std::size_t recorded = 0;
+  std::uint32_t turns = 4;
+  std::vector<std::size_t> recorded;       // paths, of samples that learn() was called of
+  std::vector<std::uint32_t> learnt_from;  // those samples
+  std::vector<bool> said;                  // of all samples, by update()
 
-  wfpg::recording_needs recording() const { return {1, false, 3}; }
-  void learn(const wfpg::guide_sample<Exec>&, const wfpg::path_recorder<Exec>& paths) {
-    recorded = paths.recorded();
+  wfpg::recording_needs recording() const { return {1, false, turns}; }
+  void learn(const wfpg::guide_sample<Exec>& at, const wfpg::path_recorder<Exec>& paths) {
+    recorded.push_back(paths.recorded());
+    learnt_from.push_back(at.number);
   }
+  void update(const wfpg::guide_sample<Exec>& at) { said.push_back(at.recorded); }
+};
+template <class Exec>
+struct without_turns : with_turns<Exec> {
+  using with_turns<Exec>::with_turns;
+  wfpg::recording_needs recording() const { return {1, false, 0}; }
 };
 
 /// One that notes in which samples it was to guide, before their waves.
@@ -87,36 +97,47 @@ WFPG_TEST_CASE("a guide is what has options, a mesh, a view, and learns", "[guid
   CHECK(!wfpg::is_guide_v<without_memory<Exec>, Exec>);
 }
 
-WFPG_TEST_CASE("fewer paths are recorded after 32 samples, where a guide says so", "[guide]") {
+WFPG_TEST_CASE("one sample in so many is recorded after 32, where a guide says so", "[guide]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   wfpg::sampling_options options;
   options.max_paths = 1024;
-  wfpg::path_guider<Exec, with_fewer_paths<Exec>> guider(exec, mesh.view(), options);
-  for (std::uint32_t sample = 1; sample <= 34; ++sample) {
+  wfpg::path_guider<Exec, with_turns<Exec>> guider(exec, mesh.view(), options);
+  std::vector<std::uint32_t> expected;
+  for (std::uint32_t sample = 1; sample <= 50; ++sample) {
     guider.begin_sample();
     guider.end_sample();
-    CHECK(guider.guide().recorded == (sample <= 32 ? 512 : 128));
+    const bool recorded = sample <= 32 || sample % 4 == 0;
+    CHECK(guider.guide().said.size() == sample);
+    CHECK(guider.guide().said.back() == recorded);
+    if (recorded) expected.push_back(sample);
   }
+  CHECK(guider.guide().learnt_from == expected);
+  CHECK(guider.guide().recorded == std::vector<std::size_t>(expected.size(), 512));
+  CHECK_THROWS_WITH((wfpg::path_guider<Exec, without_turns<Exec>>(exec, mesh.view(), options)),
+                    "wfpg: settled_turns is 0, expected at least 1");
 }
 
-TEST_CASE("as many paths are recorded as have the vertices that are wanted, or up to twice", "[guide]") {
+TEST_CASE(
+    "as many paths are recorded as have the vertices that are wanted, or up to twice, and then a quarter",
+    "[guide]") {
   const auto needs = [](std::size_t paths, std::uint64_t wanted) {
     wfpg::sampling_options options;
     options.max_paths = paths;
     options.max_depth = 4;
     return wfpg::detail::recorded_share(options, wanted).needs(true);
   };
-  const auto is = [](const wfpg::recording_needs& n, std::uint32_t share, std::uint32_t settled) {
-    return n.directions && n.share_shift == share && n.settled_share_shift == settled;
+  const auto is = [](const wfpg::recording_needs& n, std::uint32_t share, std::uint32_t turns) {
+    return n.directions && n.share_shift == share && n.settled_turns == turns;
   };
-  CHECK(is(needs(1000, 0), 0, 0));  // none in particular: all
-  CHECK(is(needs(1000, 16000), 0, 0));
-  CHECK(is(needs(1000, 8000), 0, 1));  // a quarter is 2000 of 4000
-  CHECK(is(needs(1000, 4000), 0, 2));
-  CHECK(is(needs(1000, 2004), 0, 2));
-  CHECK(is(needs(1000, 2000), 1, 3));
-  CHECK(is(needs(1000000, 2000), 10, 12));
+  CHECK(is(needs(1000, 0), 0, 1));  // none in particular: all
+  CHECK(is(needs(1000, 16000), 0, 1));
+  CHECK(is(needs(1000, 8000), 0, 2));  // a quarter is 2000 of 4000
+  CHECK(is(needs(1000, 4000), 0, 4));
+  CHECK(is(needs(1000, 2004), 0, 4));
+  CHECK(is(needs(1000, 2000), 1, 4));
+  CHECK(is(needs(1000000, 2000), 10, 4));
+  CHECK(is(needs(1000, 3), 10, 1));  // a quarter is none, which would be all
 }
 
 /// A guider that has begun its n-th sample.

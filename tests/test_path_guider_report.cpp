@@ -106,6 +106,60 @@ WFPG_TEST_CASE("path guider: a share of the paths teaches what all of them do", 
   CHECK(std::abs(some - all) < 0.1f * all);
 }
 
+/// A guider that has begun 32 samples, of so small an octree that a part of its paths is all that it wants.
+template <class Exec>
+struct settled_guider {
+  static constexpr std::size_t paths = 2048;
+
+  Exec exec;
+  box_mesh<Exec> mesh{exec};
+  wfpg::path_guider<Exec> guider;
+
+  explicit settled_guider(std::size_t deposit_capacity)
+      : guider(exec, mesh.view(), options(deposit_capacity)) {
+    for (int sample = 0; sample < 32; ++sample) {
+      guider.begin_sample();
+      guider.end_sample();
+    }
+  }
+
+  static guider_options options(std::size_t deposit_capacity) {
+    guider_options options = tracing_options(paths);
+    options.octree_resolution = 2;
+    options.deposits_per_leaf = 256;
+    options.deposit_capacity = deposit_capacity;
+    return options;
+  }
+  float radiance() const {
+    const wfpg::exitance_cache_view cache = guider.cache();
+    return evaluate(exec, [=] WFPG_HD { return cache.radiance(0, 0); });
+  }
+};
+
+WFPG_TEST_CASE("path guider: one sample in four teaches, after 32", "[path_guider]") {
+  settled_guider<Exec> settled(0);
+  for (std::uint64_t sample = 33; sample <= 41; ++sample) {
+    const float before = settled.radiance();
+    trace_paths(settled.exec, settled.guider, {1, settled.paths, 2, sample}, box_caster{}, patch_box());
+    INFO("sample " << sample);
+    CHECK((settled.radiance() != before) == (sample % 4 == 0));
+  }
+  CHECK(settled.guider.statistics().dropped_vertices == 0);
+  CHECK(settled.guider.statistics().deposits.total() == 0);
+}
+
+WFPG_TEST_CASE("path guider: what a host deposits by itself is seen after every sample", "[path_guider]") {
+  settled_guider<Exec> settled(6 * 4 * 4);
+  for (std::uint32_t sample = 33; sample <= 37; ++sample) {
+    const float before = settled.radiance();
+    settled.guider.begin_sample();
+    deposit_on_walls(settled.exec, settled.guider.cache(), 4,
+                     [=](std::uint32_t, float, float) { return static_cast<float>(sample); });
+    settled.guider.end_sample();
+    CHECK(settled.radiance() > before);
+  }
+}
+
 /// Other bins every time, and a third more of them after the first.
 std::vector<test_surface> unlike_wave(std::uint32_t sample, std::uint32_t depth) {
   auto surfaces = wall_surfaces(512, 10 * sample + depth);

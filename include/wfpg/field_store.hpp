@@ -117,9 +117,9 @@ class field_store {
     return {array_view<const resident_field>(fields_.data(), capacity_), options_.resolution, queue_.view()};
   }
 
-  /// Ends the sample: fields learn; after samples 1, 2, 4, 8, ... chooses the nodes anew by the rays counted
-  /// so far.
-  void end_sample(const Exec& exec);
+  /// Ends the sample: fields learn, unless nothing was `told` to learnt(); after samples 1, 2, 4, 8, ...
+  /// chooses the nodes anew by the rays counted so far.
+  void end_sample(const Exec& exec, bool told = true);
 
   /// Forgets what fields learnt.
   void forget(const Exec& exec) {

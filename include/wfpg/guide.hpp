@@ -49,15 +49,17 @@ struct guide_sample {
   std::uint32_t number;  ///< of the sample, from 1; 0 before the first
   std::uint64_t seed;    ///< of the sample
   bool guided;  ///< false: directions are to be their BSDFs'; in the first samples, and beyond guided_depths
+  bool recorded;               ///< whether its paths are: learn() is called then alone
   detail::stage_clock& clock;  ///< for stages of the guide's own; prepare, learn and update are timed
 };
 
 /// What a guide wants recorded of paths.
 struct recording_needs {
-  std::uint32_t share_shift = 0;  ///< of 2^share_shift paths one
+  std::uint32_t share_shift = 0;  ///< of 2^share_shift paths one, in samples that are recorded
   bool directions = false;        ///< what scatter() and escape() tell, too
-  /// share_shift once means have settled, after 32 samples; where it is below that, nothing changes then.
-  std::uint32_t settled_share_shift = 0;
+  /// Once means have settled, after 32 samples, of so many samples one is recorded, at least 1. The others
+  /// end for nothing: most of what a sample's end costs a GPU does not depend on how many paths there are.
+  std::uint32_t settled_turns = 1;
 };
 
 /// What guides have that do not say otherwise: a guide derives from it, and hides what it does by itself.
@@ -75,10 +77,10 @@ struct guide_base {
   /// Before the waves of a sample.
   template <class Exec>
   void begin_sample(const guide_sample<Exec>&) {}
-  /// Learns nothing.
+  /// After the waves of a sample that is recorded: learns nothing.
   template <class Exec>
   void learn(const guide_sample<Exec>&, path_recorder<Exec>&) {}
-  /// After the waves of a sample, and what was learnt from it.
+  /// After the waves of each sample, and what was learnt from it.
   template <class Exec>
   void update(const guide_sample<Exec>&) {}
   /// Adds nothing to what a guider tells.

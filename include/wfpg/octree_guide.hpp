@@ -51,10 +51,13 @@ struct guider_options : sampling_options {
   /// resolutions (16 is none of kept.resolution's default); 0: from fields.
   std::uint32_t product_resolution = 0;
   /// Of the paths of a sample so many are recorded, others in each, that leaves get about as many deposits on
-  /// average, or up to twice as many, and after 32 samples a quarter of that; 0: all are. What they cost is
-  /// bounded then, however many pixels.
+  /// average, or up to twice as many; after 32 samples in one sample of four, or of two where even all paths
+  /// bring no more than twice what is wanted. 0: all are, in all samples. What they cost is bounded then,
+  /// however many pixels.
   std::uint32_t deposits_per_leaf = 16;
-  std::size_t deposit_capacity = 0;  ///< deposits of a sample; 0: recorded paths · max_depth
+  /// Deposits of a sample, in each of which there may be some; 0: recorded paths · max_depth, of the samples
+  /// that are recorded.
+  std::size_t deposit_capacity = 0;
   std::size_t caster_buffer_bytes = std::size_t(16) << 20;  ///< for the cones of a batch caster in flight
 };
 

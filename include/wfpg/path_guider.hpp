@@ -133,7 +133,10 @@ class path_guider {
         exec_(exec.with_resource(working_memory_.get())),
         guide_(exec, exec_, std::forward<Scene>(scene), options_),
         recorder_(exec_, Guide::records_paths ? options_.max_paths : 0, options_.max_depth,
-                  options_.include_emission, guide_.recording().share_shift, guide_.recording().directions) {}
+                  options_.include_emission, guide_.recording().share_shift, guide_.recording().directions) {
+    const std::uint32_t turns = guide_.recording().settled_turns;
+    detail::require(turns >= 1, "settled_turns", turns, "at least 1");
+  }
 
   static options_type completed(options_type options) {
     detail::require_valid(static_cast<const sampling_options&>(options));
@@ -144,12 +147,17 @@ class path_guider {
   void check(const wave<Surfaces, Random>& w, const Caster& caster) const;
   std::uint64_t seed_of(std::uint32_t sample) const { return detail::hash(options_.seed, sample); }
   bool is_guided(std::uint32_t sample) const { return sample > options_.unguided_samples && !guide_.empty(); }
+  bool is_recorded(std::uint32_t sample) const {
+    return sample <= 32 || sample % guide_.recording().settled_turns == 0;
+  }
   guide_sample<Exec> at(std::uint32_t sample) {
-    return {exec_, sample, seed_of(sample), is_guided(sample), clock_};
+    return {exec_, sample, seed_of(sample), is_guided(sample), is_recorded(sample), clock_};
   }
   guide_sample<Exec> now() { return at(samples_); }
   guide_sample<Exec> now(std::uint32_t depth) {
-    return {exec_, samples_, seed_of(samples_), guided() && depth < options_.guided_depths, clock_};
+    guide_sample<Exec> result = now();
+    result.guided = result.guided && depth < options_.guided_depths;
+    return result;
   }
 
   options_type options_;
@@ -179,15 +187,14 @@ path_guider<Exec, Guide>& path_guider<Exec, Guide>::operator=(path_guider&& othe
 template <class Exec, class Guide>
 void path_guider<Exec, Guide>::begin_sample() {
   const std::uint32_t sample = samples_ + 1;
-  const std::uint32_t share_shift = sample > 32 ? guide_.recording().settled_share_shift : 0;
-  recorder_.begin_sample(exec_, static_cast<std::uint32_t>(seed_of(sample)), share_shift);
+  recorder_.begin_sample(exec_, static_cast<std::uint32_t>(seed_of(sample)), is_recorded(sample));
   guide_.begin_sample(at(sample));
   samples_ = sample;  // last: a call that threw is made again for the same sample
 }
 
 template <class Exec, class Guide>
 void path_guider<Exec, Guide>::end_sample() {
-  {
+  if (is_recorded(samples_)) {
     const auto timed = clock_.time(detail::stage::record);
     guide_.learn(now(), recorder_);
   }

@@ -1,7 +1,7 @@
 // The vertices of the paths in flight, and the radiance that leaves each of them, by back-propagation (paper,
 // Eq. 5): what arrives at a path's origin, divided by the throughput up to a vertex, left that vertex. Of
-// large waves a part is recorded, another in each sample, which is wfpg's own: leaves need no more. So is
-// that kept fields learn from paths what their directions found.
+// large waves a part is recorded, another in each sample, and not in all samples, which is wfpg's own: leaves
+// need no more. So is that kept fields learn from paths what their directions found.
 //
 // Memory: 40 bytes a vertex, 48 where fields learn, recorded paths × depths of them, and 4 a recorded path.
 #pragma once
@@ -126,7 +126,7 @@ class path_recorder_view {
   }
   /// Where a path is among the recorded ones; false where it is not, and dropped where there is no such path.
   WFPG_HD bool find(std::size_t path, std::uint32_t& place) const {
-    if (path < paths_) return runs_.find(path, place);
+    if (path < paths_) return recorded_ > 0 && runs_.find(path, place);
     drop();
     return false;
   }
@@ -278,10 +278,10 @@ class path_recorder {
         places_(exec, lengths_.size() * max_depth),
         light_(exec, lengths_.size() * max_depth),
         directions_(exec, fields_learn ? lengths_.size() * max_depth : 0),
-        dropped_(exec, 1),
-        share_shift_(share_shift) {
+        dropped_(exec, 1) {
     view_.paths_ = paths;
-    record(share_shift);
+    view_.recorded_ = lengths_.size();
+    view_.runs_.shift = share_shift;
     view_.max_depth_ = max_depth;
     view_.include_emission_ = include_emission;
     view_.lengths_ = lengths_.data();
@@ -303,15 +303,16 @@ class path_recorder {
   /// Paths that this sample records, at most.
   std::size_t recorded() const { return view_.recorded_; }
 
-  /// Forgets all paths. Views from then on record the paths of a sample of this seed: of 2^`share_shift`
-  /// paths one, where that is fewer than the recorder was made for.
-  void begin_sample(const Exec& exec, std::uint32_t seed, std::uint32_t share_shift = 0) {
+  /// Forgets all paths. Views from then on record the paths of a sample of this seed, or none.
+  void begin_sample(const Exec& exec, std::uint32_t seed, bool records = true) {
     view_.runs_.seed = seed;
-    record(detail::max(share_shift_, share_shift));
+    view_.recorded_ = records ? lengths_.size() : 0;
     clear(exec);
   }
   /// Forgets all paths.
-  void clear(const Exec& exec) { exec.fill_bytes(lengths_.data(), 0, lengths_.bytes()); }
+  void clear(const Exec& exec) {
+    exec.fill_bytes(lengths_.data(), 0, view_.recorded_ * sizeof(std::uint32_t));
+  }
 
   /// Queues the radiance of every recorded vertex in the cache, tells kept fields what their directions
   /// found, and forgets the paths. O(paths · depth).
@@ -327,17 +328,11 @@ class path_recorder {
  private:
   friend struct detail::state_access;
 
-  void record(std::uint32_t shift) {
-    view_.runs_.shift = shift;
-    view_.recorded_ = view_.runs_.size(view_.paths_);
-  }
-
   buffer<std::uint32_t, Exec> lengths_;
   buffer<detail::recorded_place, Exec> places_;
   buffer<detail::recorded_light, Exec> light_;
   buffer<detail::recorded_direction, Exec> directions_;
   buffer<std::uint32_t, Exec> dropped_;
-  std::uint32_t share_shift_ = 0;
   path_recorder_view view_;
 };
 

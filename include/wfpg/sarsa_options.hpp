@@ -39,7 +39,7 @@ struct sarsa_grid_options : sampling_options {
   float learning_rate = 0.05f;
   float floor = 0.01f;  ///< that each direction has at least, times the cell's mean: finite, at least 0
   /// Of the paths of a sample so many are recorded, others in each, that directions get about as many values
-  /// on average, or up to twice as many, and after 32 samples a quarter of that; 0: all are.
+  /// on average, or up to twice as many; after 32 samples in one sample of four. 0: all are, in all samples.
   std::uint32_t values_per_direction = 4;
 };
 

@@ -129,8 +129,8 @@ void field_store<Exec>::begin_sample(const Exec& exec, std::uint32_t sample) {
 }
 
 template <class Exec>
-void field_store<Exec>::end_sample(const Exec& exec) {
-  learn(exec);
+void field_store<Exec>::end_sample(const Exec& exec, bool told) {
+  if (told) learn(exec);
   const bool is_power_of_two = (sample_ & (sample_ - 1)) == 0;
   if (sample_ == 0 || !is_power_of_two) return;
   expect_builds(turns);

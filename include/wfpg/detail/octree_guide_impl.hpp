@@ -88,8 +88,10 @@ void octree_guide<Exec>::begin_sample(const guide_sample<Exec>& at) {
 
 template <class Exec>
 void octree_guide<Exec>::update(const guide_sample<Exec>& at) {
-  cache_.update(at.exec);
-  if (keeps_fields()) store_.end_sample(at.exec);
+  // A host that deposits by itself does so in every sample.
+  const bool deposited = at.recorded || options_.deposit_capacity > 0;
+  if (deposited) cache_.update(at.exec);
+  if (keeps_fields()) store_.end_sample(at.exec, deposited);
   lights_.end_sample(at.exec);
 }
 

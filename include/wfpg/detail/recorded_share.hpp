@@ -1,4 +1,4 @@
-// Of how many paths a guide has the vertices recorded.
+// Of how many paths a guide has the vertices recorded, and in which samples.
 #pragma once
 
 #include <wfpg/detail/recorded_runs.hpp>
@@ -17,8 +17,11 @@ class recorded_share {
   recorded_share(const sampling_options& o, std::uint64_t wanted)
       : paths_(o.max_paths), depth_(o.max_depth), wanted_(wanted) {}
 
-  /// A quarter of the vertices is enough once means have settled.
-  recording_needs needs(bool directions) const { return {shift(wanted_), directions, shift(wanted_ / 4)}; }
+  /// A quarter of the vertices is enough once means have settled: the same of fewer samples.
+  recording_needs needs(bool directions) const {
+    const std::uint32_t share = shift(wanted_), settled = max(shift(wanted_ / 4), share);
+    return {share, directions, 1u << (settled - share)};
+  }
 
   /// Of a sample, at most. Throws std::invalid_argument, which says to set `options`, where a queue holds
   /// fewer.

@@ -81,7 +81,8 @@ sarsa_grid_view sarsa_grid<Exec>::prepare(const guide_sample<Exec>& at, const wa
                                           const Caster&) {
   sarsa_grid_view view = view_;
   if (!at.guided) view.fraction_ = 0.0f;
-  if (!expects() || !(view.fraction_ > 0.0f) || numbered_ + w.ray_count > expected_.size()) return view;
+  const bool asked = expects() && at.recorded && view.fraction_ > 0.0f;
+  if (!asked || numbered_ + w.ray_count > expected_.size()) return view;
   at.exec.for_each(w.ray_count, detail::expect_scattering<Surfaces>{
                                     w.surfaces, table(), expected_.data() + numbered_,
                                     static_cast<std::uint32_t>(detail::hash(at.seed, numbered_))});
