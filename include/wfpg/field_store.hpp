@@ -181,6 +181,8 @@ class field_store {
   }
   // Once there is little to build, waves take turns: one field keeps a GPU as long as a hundred.
   static constexpr std::uint32_t turns = 8;
+  // In so many samples all waves make the fields that bins which were chosen anew ask for.
+  static constexpr std::uint32_t busy_samples = 4;
   void expect_builds(std::uint32_t samples) { busy_until_ = detail::max(busy_until_, sample_ + samples); }
   bool learns() const { return learnt_.size() > 0; }
   bool limits_builds() const { return options_.max_wave_cones != detail::build_limits::none; }

@@ -133,7 +133,7 @@ void field_store<Exec>::end_sample(const Exec& exec, bool told) {
   if (told) learn(exec);
   const bool is_power_of_two = (sample_ & (sample_ - 1)) == 0;
   if (sample_ == 0 || !is_power_of_two) return;
-  expect_builds(turns);
+  expect_builds(busy_samples);
   if (sample_ > 1 && !adapted_) {  // in the first, bins are as large as they may be
     exec.fill_bytes(&state_.data()->used, 0, sizeof(std::uint32_t));
     exec.for_each(capacity_, detail::count_used{slots_.view(), sample_ / 2, state_.data()});
