@@ -19,8 +19,12 @@ void check_as_on_cpu(rendering what) {
   wfpg_test::check_rendering(what);
 }
 
+// All but many-lamps, where next-event estimation is not to be off: too little light is hit by chance.
+constexpr const char* scenes[] = {"cornell-box", "cornell-enclosed", "cornell-wall", "ajar",
+                                  "thin-wall",   "glossy-room",      "caustic-pool", "furnace"};
+
 void check_all_scenes(sampling_method method) {
-  for (const char* scene : {"cornell-box", "cornell-enclosed", "ajar", "thin-wall", "furnace", "glossy-room"})
+  for (const char* scene : scenes)
     for (const bool nee : {false, true}) check_as_on_cpu({scene, nee, method});
   check_as_on_cpu({"many-lamps", true, method});
 }
@@ -60,11 +64,23 @@ TEST_CASE("pictures of a GPU guided by irradiance records have the means of the 
 }
 
 TEST_CASE("pictures of a GPU guided by transient fields have the means of the CPU's", "[renderer][cuda]") {
-  for (const sampling_method method : {sampling_method::wfpg, sampling_method::wfpg_product})
-    for (const char* scene : {"cornell-enclosed", "ajar", "thin-wall", "glossy-room"}) {
+  for (const sampling_method method : {sampling_method::wfpg, sampling_method::wfpg_product}) {
+    for (const char* scene : scenes) {
       check_as_on_cpu({scene, true, method, fields::transient, guiding::oriented});
       check_as_on_cpu({scene, false, method, fields::transient, guiding::plain});
     }
+    check_as_on_cpu({"many-lamps", true, method, fields::transient, guiding::oriented});
+  }
+}
+
+TEST_CASE("pictures of a GPU have the means of the CPU's once fields have settled", "[renderer][cuda]") {
+  for (const sampling_method method : {sampling_method::wfpg, sampling_method::wfpg_product})
+    for (const char* scene : {"cornell-enclosed", "ajar", "glossy-room"})
+      for (const bool nee : {false, true}) {
+        rendering what{scene, nee, method};
+        what.spp = wfpg_test::settled_samples;
+        check_as_on_cpu(what);
+      }
 }
 
 TEST_CASE("one seed gives one picture on a GPU", "[renderer][cuda]") {

@@ -29,6 +29,15 @@ TEST_CASE("pictures guided by kept fields have the mean of unguided ones", "[ren
   check_rendering({"thin-wall", true, wfpg_method, fields::kept, guiding::plain});
 }
 
+TEST_CASE("pictures have that mean too once fields have settled", "[renderer][unbiased]") {
+  for (const sampling_method method : {wfpg_method, product_method})
+    for (const bool nee : {false, true}) {
+      rendering what{"cornell-enclosed", nee, method};
+      what.spp = wfpg_test::settled_samples;
+      check_rendering(what);
+    }
+}
+
 TEST_CASE("pictures guided by transient fields have the mean of unguided ones", "[renderer][unbiased]") {
   for (const bool nee : {false, true}) {
     check_rendering({"cornell-enclosed", nee, wfpg_method, fields::transient, guiding::oriented});

@@ -21,6 +21,9 @@ inline constexpr int tiles = 8;        // along a side
 inline constexpr int tile_pixels = 4;  // along a tile's side
 inline constexpr int renderings = 24;  // independent, of each method
 
+// Fields have settled in the second half: fewer waves make any, and fewer samples are learnt from.
+inline constexpr int settled_samples = 64;
+
 /// What a rendering is of, and how.
 struct rendering {
   std::string scene;
@@ -32,6 +35,7 @@ struct rendering {
   wfpg::sarsa_update update = wfpg::sarsa_update::sarsa;
   wfpg::sarsa_sampler sampler = wfpg::sarsa_sampler::mixed_rejection;
   render::cones through = render::cones::scene;
+  int spp = 12;
 
   render::render_options options() const {
     render::render_options options;
@@ -43,7 +47,7 @@ struct rendering {
     options.where = where;
     options.width = options.height = tiles * tile_pixels;
     options.max_depth = 6;
-    options.spp = 12;
+    options.spp = spp;
     options.octree_resolution = 32;
     options.field_resolution = 8;
     options.slot_resolution = 8;
@@ -65,8 +69,9 @@ struct rendering {
     return options;
   }
   std::string name() const {
-    const std::string view = scene + (where == render::device::cuda ? " on cuda" : "") +
-                             ", next-event estimation " + (nee ? "on" : "off") + ", ";
+    const std::string view = scene + (where == render::device::cuda ? " on cuda" : "") + ", " +
+                             std::to_string(spp) + " samples, next-event estimation " + (nee ? "on" : "off") +
+                             ", ";
     if (method == render::sampling_method::sarsa)
       return view + "SARSA grid, update " + render::name_of(render::sarsa_update_names(), update) +
              ", sampler " + render::name_of(render::sarsa_sampler_names(), sampler);
