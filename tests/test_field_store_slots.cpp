@@ -131,6 +131,20 @@ WFPG_TEST_CASE("field store: after many samples one wave in eight builds, whatev
   }
 }
 
+WFPG_TEST_CASE("field store: after bins are chosen anew all waves build for four samples", "[field_store]") {
+  kept_box<Exec> box(slots_of(4, 40));
+  while (box.sample < 64) box.whole_sample(floor_rays(3));
+  for (int i = 0; i < 8; ++i) {
+    box.begin();
+    for (std::uint32_t wave = 0; wave < 8; ++wave) {
+      INFO("sample " << box.sample << ", wave " << wave);
+      CHECK(box.store.builds_in_wave() == (box.sample <= 68 || (box.sample + wave) % 8 == 0));
+      box.prepare({});
+    }
+    box.end();
+  }
+}
+
 WFPG_TEST_CASE("field store: waves that build nothing find what others do, and every wave is counted alone",
                "[field_store]") {
   kept_box<Exec> box(slots_of(4, 40));

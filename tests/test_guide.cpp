@@ -50,17 +50,21 @@ struct without_memory : uniform_guide<Exec> {
 template <class Exec>
 struct with_turns : uniform_guide<Exec> {
   using uniform_guide<Exec>::uniform_guide;
-  std::uint32_t turns = 4;
-  std::vector<std::size_t> recorded;       // paths, of samples that learn() was called of
-  std::vector<std::uint32_t> learnt_from;  // those samples
-  std::vector<bool> said;                  // of all samples, by update()
+  std::vector<std::size_t> recorded;       // paths, whenever there was something to learn
+  std::vector<std::uint32_t> learnt_from;  // samples
+  std::vector<std::uint32_t> said;         // samples that update() was told are recorded
+  std::uint32_t updates = 0;
 
-  wfpg::recording_needs recording() const { return {1, false, turns}; }
+  wfpg::recording_needs recording() const { return {1, false, 4}; }
   void learn(const wfpg::guide_sample<Exec>& at, const wfpg::path_recorder<Exec>& paths) {
     recorded.push_back(paths.recorded());
     learnt_from.push_back(at.number);
   }
-  void update(const wfpg::guide_sample<Exec>& at) { said.push_back(at.recorded); }
+  void update(const wfpg::guide_sample<Exec>& at) {
+    ++updates;
+    if (at.recorded) said.push_back(at.number);
+  }
+  void forget_light(const Exec&) {}
 };
 template <class Exec>
 struct without_turns : with_turns<Exec> {
@@ -97,24 +101,54 @@ WFPG_TEST_CASE("a guide is what has options, a mesh, a view, and learns", "[guid
   CHECK(!wfpg::is_guide_v<without_memory<Exec>, Exec>);
 }
 
-WFPG_TEST_CASE("one sample in so many is recorded after 32, where a guide says so", "[guide]") {
+/// Samples that are recorded of 100, of which light was forgotten after some.
+template <class Exec>
+std::vector<std::uint32_t> recorded_samples(std::uint64_t seed, std::uint32_t forgotten_after) {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   wfpg::sampling_options options;
   options.max_paths = 1024;
+  options.seed = seed;
   wfpg::path_guider<Exec, with_turns<Exec>> guider(exec, mesh.view(), options);
-  std::vector<std::uint32_t> expected;
-  for (std::uint32_t sample = 1; sample <= 50; ++sample) {
+  for (std::uint32_t sample = 1; sample <= 100; ++sample) {
     guider.begin_sample();
     guider.end_sample();
-    const bool recorded = sample <= 32 || sample % 4 == 0;
-    CHECK(guider.guide().said.size() == sample);
-    CHECK(guider.guide().said.back() == recorded);
-    if (recorded) expected.push_back(sample);
+    if (sample == forgotten_after) guider.forget_light();
   }
-  CHECK(guider.guide().learnt_from == expected);
-  CHECK(guider.guide().recorded == std::vector<std::size_t>(expected.size(), 512));
-  CHECK_THROWS_WITH((wfpg::path_guider<Exec, without_turns<Exec>>(exec, mesh.view(), options)),
+  const with_turns<Exec>& guide = guider.guide();
+  CHECK(guide.updates == 100);
+  CHECK(guide.said == guide.learnt_from);
+  CHECK(guide.recorded == std::vector<std::size_t>(guide.learnt_from.size(), 512));
+  return guide.learnt_from;
+}
+
+/// How many of them are among [first, last].
+std::ptrdiff_t count_between(const std::vector<std::uint32_t>& samples, std::uint32_t first,
+                             std::uint32_t last) {
+  return std::count_if(samples.begin(), samples.end(),
+                       [=](std::uint32_t s) { return s >= first && s <= last; });
+}
+
+WFPG_TEST_CASE("one sample in so many is recorded once means have settled, where a guide says so",
+               "[guide]") {
+  const auto samples = recorded_samples<Exec>(7, 0), others = recorded_samples<Exec>(8, 0);
+  CHECK(count_between(samples, 1, 32) == 32);
+  for (std::uint32_t first = 33; first < 100; first += 4)
+    CHECK(count_between(samples, first, first + 3) == 1);
+  for (std::uint32_t turn = 0; turn < 4; ++turn)  // none of a host's own turns is always left out
+    CHECK(std::any_of(samples.begin() + 32, samples.end(), [=](std::uint32_t s) { return s % 4 == turn; }));
+  CHECK(samples != others);
+
+  const auto forgotten = recorded_samples<Exec>(7, 50);
+  CHECK(count_between(forgotten, 1, 50) == count_between(samples, 1, 50));
+  CHECK(count_between(forgotten, 51, 82) == 32);
+  CHECK(count_between(forgotten, 85, 100) == 4);
+}
+
+WFPG_TEST_CASE("a guide that has no sample recorded is refused", "[guide]") {
+  const Exec exec;
+  const box_mesh<Exec> mesh(exec);
+  CHECK_THROWS_WITH((wfpg::path_guider<Exec, without_turns<Exec>>(exec, mesh.view())),
                     "wfpg: settled_turns is 0, expected at least 1");
 }
 
@@ -137,7 +171,8 @@ TEST_CASE(
   CHECK(is(needs(1000, 2004), 0, 4));
   CHECK(is(needs(1000, 2000), 1, 4));
   CHECK(is(needs(1000000, 2000), 10, 4));
-  CHECK(is(needs(1000, 3), 10, 1));  // a quarter is none, which would be all
+  CHECK(is(needs(8, 7), 2, 4));  // a quarter is 2 of 32, rounded up
+  CHECK(is(needs(1000, 3), 10, 2));
 }
 
 /// A guider that has begun its n-th sample.

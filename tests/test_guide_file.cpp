@@ -120,6 +120,22 @@ WFPG_TEST_CASE("fields without room, invalidated or without light go on to the b
   }
 }
 
+WFPG_TEST_CASE("a guide that not all samples teach any more goes on to the bit", "[guide_file]") {
+  const Exec exec;
+  guider_options options = small_options();
+  options.octree_resolution = 8;
+  options.deposits_per_leaf = 1;
+  for (const bool dark : {false, true}) {  // from then on all samples are recorded for a while
+    wfpg::path_guider<Exec> first = trained(exec, options, 41);
+    REQUIRE(first.guide().recording().settled_turns == 4);
+    if (dark) first.forget_light();
+    wfpg::path_guider<Exec> second = loaded(exec, saved(first), options);
+    CHECK(trace_paths(exec, second, 9, paths, box_caster()) ==
+          trace_paths(exec, first, 9, paths, box_caster()));
+    CHECK(saved(first) == saved(second));
+  }
+}
+
 struct tell_lights {
   wfpg::light_guide_view lights;
   WFPG_HD void operator()(std::size_t i) const {
@@ -229,9 +245,9 @@ TEST_CASE("guide files that are cut off, altered or foreign are told apart", "[g
   for (const std::string& foreign : {std::string(), std::string("\x89PNG\r\n\x1a\n................"),
                                      std::string(1000, '\0'), std::string("glTF"), bytes.substr(1)})
     CHECK(fault(foreign, options) == "wfpg: the guide is not a guide file");
-  CHECK(fault(with_version(bytes, 2), options) ==
-        "wfpg: the guide is of version 2, expected 1 or older: a newer wfpg wrote it");
-  CHECK(fault(with_version(bytes, 0), options) == "wfpg: the guide is of version 0, expected 1");
+  CHECK(fault(with_version(bytes, 3), options) ==
+        "wfpg: the guide is of version 3, expected 2 or older: a newer wfpg wrote it");
+  CHECK(fault(with_version(bytes, 1), options) == "wfpg: the guide is of version 1, expected 2");
   for (const std::size_t at : {8u, 11u, 12u}) {
     std::string altered = bytes;
     altered[at] = static_cast<char>(altered[at] ^ 1);
@@ -347,6 +363,7 @@ TEST_CASE("what is in a guide file is checked, whatever its checksums say", "[gu
   refused("cache", 3 * nodes - leaves, 8, 1ull << 63 | 0x3ff0000000000000ull,
           "has radiance that is negative or not finite");
   refused("counts", 0, 4, 0x80000000u, "has samples without end");
+  refused("counts", 4, 4, 36, "settles after samples that are to come");
   refused("levels", 0, 4, 4, "has more samples than there were");
   refused("levels", 4, 4, 36, "has more samples than there were");
   refused("levels", 8 + 5 * leaves - 1, 1, 4, "has a level below the leaves");

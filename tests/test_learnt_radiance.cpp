@@ -262,6 +262,21 @@ WFPG_TEST_CASE("learnt radiance: a field turns to where light was found, and for
   CHECK(share_around(box, box.whole_sample(wave), lit) == Approx(1.0 / 256.0).epsilon(1e-4));
 }
 
+WFPG_TEST_CASE("learnt radiance: what is told waits for a sample's end that learns", "[learnt_radiance]") {
+  kept_box<Exec> box(slots_of(16, 100, 4, true), wfpg::guiding_mode::oriented, 0, 1000);
+  box.box.cache.clear(box.exec());
+  box.field.filter_alpha = 0.0f;
+  const auto wave = rays_at({0.5f, 0.5f, 0.0f}, up, 20);
+  box.whole_sample(wave);
+  box.begin();
+  const wfpg::guide_view view = box.settle(wave);
+  const wfpg::learnt_radiance_view learnt = box.store.learnt();
+  box.exec().for_each(50, [=] WFPG_HD(std::size_t) { learnt.deposit(view.mixture(0).number, up, 4.0f); });
+  box.store.end_sample(box.exec(), false);
+  CHECK(share_around(box, box.whole_sample(wave), up) == Approx(1.0 / 256.0).epsilon(1e-4));
+  CHECK(share_around(box, box.whole_sample(wave), up) > 0.98);
+}
+
 WFPG_TEST_CASE("learnt radiance: cones count beside it, and a field that is cast anew forgets",
                "[learnt_radiance]") {
   auto options = slots_of(16, 100, 4, true);

@@ -73,8 +73,10 @@ TEST_CASE("pictures of a GPU guided by transient fields have the means of the CP
   }
 }
 
-TEST_CASE("pictures of a GPU have the means of the CPU's once fields have settled", "[renderer][cuda]") {
-  for (const sampling_method method : {sampling_method::wfpg, sampling_method::wfpg_product})
+TEST_CASE("pictures of a GPU have the means of the CPU's once what guides know has settled",
+          "[renderer][cuda]") {
+  for (const sampling_method method :
+       {sampling_method::wfpg, sampling_method::wfpg_product, sampling_method::sarsa})
     for (const char* scene : {"cornell-enclosed", "ajar", "glossy-room"})
       for (const bool nee : {false, true}) {
         rendering what{scene, nee, method};

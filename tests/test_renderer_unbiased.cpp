@@ -29,8 +29,8 @@ TEST_CASE("pictures guided by kept fields have the mean of unguided ones", "[ren
   check_rendering({"thin-wall", true, wfpg_method, fields::kept, guiding::plain});
 }
 
-TEST_CASE("pictures have that mean too once fields have settled", "[renderer][unbiased]") {
-  for (const sampling_method method : {wfpg_method, product_method})
+TEST_CASE("pictures have that mean too once what guides know has settled", "[renderer][unbiased]") {
+  for (const sampling_method method : {wfpg_method, product_method, sampling_method::sarsa})
     for (const bool nee : {false, true}) {
       rendering what{"cornell-enclosed", nee, method};
       what.spp = wfpg_test::settled_samples;

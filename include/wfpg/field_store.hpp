@@ -90,10 +90,10 @@ class field_store {
 
   /// Finds or makes the fields of a wave's rays, and refreshes those that are due; what kernels sample from,
   /// until the next call. A ray without room for its field has its nearest ancestor's, or none. After 32
-  /// samples little is left to make: then one wave in 8 does, the others use what there is. A batch
-  /// caster gets at most `caster_buffer_bytes` of cones at once, and the host reads how many fields are
-  /// built. Throws std::invalid_argument beyond max_rays, or where P does not divide; what a caster throws,
-  /// and then the wave's fields are built again.
+  /// samples little is left to make: one wave in 8 does then, but for 4 samples after nodes were chosen anew,
+  /// and the others use what there is. A batch caster gets at most `caster_buffer_bytes` of cones at once,
+  /// and the host reads how many fields are built. Throws std::invalid_argument beyond max_rays, or where P
+  /// does not divide; what a caster throws, and then the wave's fields are built again.
   template <class Surfaces, class Caster>
   guide_view prepare(const Exec& exec, const kept_field_wave<Surfaces>& wave, const Caster& caster,
                      std::size_t caster_buffer_bytes);
@@ -181,7 +181,7 @@ class field_store {
   }
   // Once there is little to build, waves take turns: one field keeps a GPU as long as a hundred.
   static constexpr std::uint32_t turns = 8;
-  // In so many samples all waves make the fields that bins which were chosen anew ask for.
+  // Bins that are chosen anew ask for fields that are not there yet: in so many samples all waves make some.
   static constexpr std::uint32_t busy_samples = 4;
   void expect_builds(std::uint32_t samples) { busy_until_ = detail::max(busy_until_, sample_ + samples); }
   bool learns() const { return learnt_.size() > 0; }

@@ -13,7 +13,7 @@
 //                   what a wave's rays draw from, with `sample` and `pdf`: is_guide_view_v says how. It holds
 //                   until the next call.
 //   4. what learns: void learn(const guide_sample<Exec>& at, path_recorder<Exec>& paths);
-//                   the paths of the sample (recorded_path), which it clears
+//                   the paths of a sample that is recorded (recorded_path), which it clears
 //                   void update(const guide_sample<Exec>& at);
 //                   after that, and also where nothing is recorded
 //   5. memory:      std::vector<memory_part> memory() const;
@@ -49,7 +49,7 @@ struct guide_sample {
   std::uint32_t number;  ///< of the sample, from 1; 0 before the first
   std::uint64_t seed;    ///< of the sample
   bool guided;  ///< false: directions are to be their BSDFs'; in the first samples, and beyond guided_depths
-  bool recorded;               ///< whether its paths are: learn() is called then alone
+  bool recorded;               ///< whether its paths are: only then is learn() called
   detail::stage_clock& clock;  ///< for stages of the guide's own; prepare, learn and update are timed
 };
 
@@ -57,9 +57,12 @@ struct guide_sample {
 struct recording_needs {
   std::uint32_t share_shift = 0;  ///< of 2^share_shift paths one, in samples that are recorded
   bool directions = false;        ///< what scatter() and escape() tell, too
-  /// Once means have settled, after 32 samples, of so many samples one is recorded, at least 1. The others
-  /// end for nothing: most of what a sample's end costs a GPU does not depend on how many paths there are.
+  /// Once means have settled, of so many samples one is recorded, drawn at random; at least 1. The others
+  /// cost next to nothing to end: most of what that costs a GPU does not depend on how many paths there are.
   std::uint32_t settled_turns = 1;
+
+  /// Samples after the beginning, or after forget_light(), that means take to settle.
+  static constexpr std::uint32_t settling_samples = 32;
 };
 
 /// What guides have that do not say otherwise: a guide derives from it, and hides what it does by itself.

@@ -51,12 +51,12 @@ struct guider_options : sampling_options {
   /// resolutions (16 is none of kept.resolution's default); 0: from fields.
   std::uint32_t product_resolution = 0;
   /// Of the paths of a sample so many are recorded, others in each, that leaves get about as many deposits on
-  /// average, or up to twice as many; after 32 samples in one sample of four, or of two where even all paths
-  /// bring no more than twice what is wanted. 0: all are, in all samples. What they cost is bounded then,
+  /// average, or up to twice as many; once means have settled a quarter of that, in one sample of four, or in
+  /// two or all where there are few paths. 0: all are, in all samples. What they cost is bounded then,
   /// however many pixels.
   std::uint32_t deposits_per_leaf = 16;
-  /// Deposits of a sample, in each of which there may be some; 0: recorded paths · max_depth, of the samples
-  /// that are recorded.
+  /// Room for a sample's deposits, and values that fields learn. 0: for those of the recorder alone. A host
+  /// that deposits by itself sets it, and may do so in any sample.
   std::size_t deposit_capacity = 0;
   std::size_t caster_buffer_bytes = std::size_t(16) << 20;  ///< for the cones of a batch caster in flight
 };
@@ -94,6 +94,7 @@ class octree_guide : public guide_base {
              const Serve& serve);
   /// Deposits what was recorded.
   void learn(const guide_sample<Exec>& at, path_recorder<Exec>& paths) {
+    told_ = true;
     paths.deposit(at.exec, cache_.view(), store_.learnt());
   }
   /// Updates the cache, and what fields and choices of lights learn.
@@ -178,6 +179,7 @@ class octree_guide : public guide_base {
   buffer<std::uint32_t, Exec> field_of_ray_;
   buffer<product_point, Exec> product_points_;
   buffer<depth_statistics, Exec> counts_;
+  bool told_ = false;  // of paths, since the last update that was completed
 };
 
 }  // namespace wfpg

@@ -85,10 +85,13 @@ class path_guider {
   void invalidate_all() { guide_.invalidate_all(exec_); }
   /// Forgets all cached light, and what kept fields and choices of lights learnt: for lights that moved.
   /// Fields follow without being cast anew.
-  void forget_light() { guide_.forget_light(exec_); }
+  void forget_light() {
+    guide_.forget_light(exec_);
+    settled_after_ = samples_ + recording_needs::settling_samples;
+  }
 
-  /// Where the renderer's kernels record their paths: a path_recorder_view, or a no_path_recorder where the
-  /// guide has no use for them.
+  /// Where the renderer's kernels record their paths in the sample that has begun: a path_recorder_view, or a
+  /// no_path_recorder where the guide has no use for them.
   auto recorder() const {
     if constexpr (Guide::records_paths)
       return recorder_.view();
@@ -97,7 +100,8 @@ class path_guider {
   }
   /// Which lights next-event estimation is to ask, in this sample; empty without options.lights.weights.
   light_guide_view lights() const { return guide_.lights(); }
-  /// Where kernels deposit, and what they read, without the recorder. Of the octree, as those that follow.
+  /// Where kernels deposit, and what they read, without the recorder. Of the octree, as those that follow. A
+  /// host that deposits by itself makes room for it by `deposit_capacity`.
   exitance_cache_view cache() const { return guide_.cache(); }
   /// Where they tell kept fields what their directions found, without it; empty where fields do not learn.
   learnt_radiance_view learnt() const { return guide_.learnt(); }
@@ -132,10 +136,10 @@ class path_guider {
         working_memory_(std::make_unique<retaining_resource>(exec.resource())),
         exec_(exec.with_resource(working_memory_.get())),
         guide_(exec, exec_, std::forward<Scene>(scene), options_),
+        needs_(guide_.recording()),
         recorder_(exec_, Guide::records_paths ? options_.max_paths : 0, options_.max_depth,
-                  options_.include_emission, guide_.recording().share_shift, guide_.recording().directions) {
-    const std::uint32_t turns = guide_.recording().settled_turns;
-    detail::require(turns >= 1, "settled_turns", turns, "at least 1");
+                  options_.include_emission, needs_.share_shift, needs_.directions) {
+    detail::require(needs_.settled_turns >= 1, "settled_turns", needs_.settled_turns, "at least 1");
   }
 
   static options_type completed(options_type options) {
@@ -147,11 +151,13 @@ class path_guider {
   void check(const wave<Surfaces, Random>& w, const Caster& caster) const;
   std::uint64_t seed_of(std::uint32_t sample) const { return detail::hash(options_.seed, sample); }
   bool is_guided(std::uint32_t sample) const { return sample > options_.unguided_samples && !guide_.empty(); }
+  /// Of `settled_turns` samples one at random: a host may have turns of its own, such as tiles.
   bool is_recorded(std::uint32_t sample) const {
-    return sample <= 32 || sample % guide_.recording().settled_turns == 0;
+    const std::uint32_t turns = needs_.settled_turns, round = (sample - 1) / turns;
+    return sample <= settled_after_ || (sample - 1) % turns == detail::hash(~options_.seed, round) % turns;
   }
   guide_sample<Exec> at(std::uint32_t sample) {
-    return {exec_, sample, seed_of(sample), is_guided(sample), is_recorded(sample), clock_};
+    return {exec_, sample, seed_of(sample), is_guided(sample), recorded_, clock_};
   }
   guide_sample<Exec> now() { return at(samples_); }
   guide_sample<Exec> now(std::uint32_t depth) {
@@ -165,8 +171,11 @@ class path_guider {
   std::unique_ptr<retaining_resource> working_memory_;  // of what follows, in part
   Exec exec_;                                           // allocates there
   Guide guide_;
+  recording_needs needs_;
   path_recorder<Exec> recorder_;
   std::uint32_t samples_ = 0;
+  std::uint32_t settled_after_ = recording_needs::settling_samples;
+  bool recorded_ = true;  // the sample that has begun
 };
 
 /// What memory lies in is to outlive it: the old guider is gone as a whole, at the end.
@@ -179,22 +188,26 @@ path_guider<Exec, Guide>& path_guider<Exec, Guide>::operator=(path_guider&& othe
   working_memory_ = std::move(other.working_memory_);
   exec_ = other.exec_;
   guide_ = std::move(other.guide_);
+  needs_ = other.needs_;
   recorder_ = std::move(other.recorder_);
   samples_ = other.samples_;
+  settled_after_ = other.settled_after_;
+  recorded_ = other.recorded_;
   return *this;
 }
 
 template <class Exec, class Guide>
 void path_guider<Exec, Guide>::begin_sample() {
   const std::uint32_t sample = samples_ + 1;
-  recorder_.begin_sample(exec_, static_cast<std::uint32_t>(seed_of(sample)), is_recorded(sample));
+  recorded_ = is_recorded(sample);
+  recorder_.begin_sample(exec_, static_cast<std::uint32_t>(seed_of(sample)), recorded_);
   guide_.begin_sample(at(sample));
   samples_ = sample;  // last: a call that threw is made again for the same sample
 }
 
 template <class Exec, class Guide>
 void path_guider<Exec, Guide>::end_sample() {
-  if (is_recorded(samples_)) {
+  if (recorded_) {
     const auto timed = clock_.time(detail::stage::record);
     guide_.learn(now(), recorder_);
   }

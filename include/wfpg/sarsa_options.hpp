@@ -39,7 +39,8 @@ struct sarsa_grid_options : sampling_options {
   float learning_rate = 0.05f;
   float floor = 0.01f;  ///< that each direction has at least, times the cell's mean: finite, at least 0
   /// Of the paths of a sample so many are recorded, others in each, that directions get about as many values
-  /// on average, or up to twice as many; after 32 samples in one sample of four. 0: all are, in all samples.
+  /// on average, or up to twice as many; once means have settled a quarter of that, in one sample of four, or
+  /// in two or all where there are few paths. 0: all are, in all samples.
   std::uint32_t values_per_direction = 4;
 };
 

@@ -21,7 +21,7 @@ inline constexpr int tiles = 8;        // along a side
 inline constexpr int tile_pixels = 4;  // along a tile's side
 inline constexpr int renderings = 24;  // independent, of each method
 
-// Fields have settled in the second half: fewer waves make any, and fewer samples are learnt from.
+// In the second half what guides know has settled: fewer waves make fields, and fewer samples teach.
 inline constexpr int settled_samples = 64;
 
 /// What a rendering is of, and how.
@@ -49,6 +49,11 @@ struct rendering {
     options.max_depth = 6;
     options.spp = spp;
     options.octree_resolution = 32;
+    if (spp == settled_samples) {  // leaves, and values, that want no more than a part of the paths
+      options.octree_resolution = 16;
+      options.deposits_per_leaf = 1;
+      options.sarsa.values_per_direction = 1;
+    }
     options.field_resolution = 8;
     options.slot_resolution = 8;
     options.product_resolution = 4;

@@ -18,7 +18,7 @@
 
 namespace wfpg::detail {
 
-inline constexpr file_kind guide_file_kind{{"\x89wfpgG\n\x1a", 8}, 1, "a guide file"};
+inline constexpr file_kind guide_file_kind{{"\x89wfpgG\n\x1a", 8}, 2, "a guide file"};
 
 /// An option that decides how a guider's state is laid out.
 struct shaping_option {
@@ -157,6 +157,7 @@ struct state_access {
   static section_writer counts_to_bytes(const path_guider<Exec>& guider) {
     section_writer bytes;
     bytes.put(guider.samples_);
+    bytes.put(guider.settled_after_);
     const octree_guide<Exec>& guide = guider.guide_;
     bytes.put(guide.build_.non_finite);
     bytes.put(guide.build_.out_of_range);
@@ -177,6 +178,9 @@ struct state_access {
     octree_guide<Exec>& guide = guider.guide_;
     guider.samples_ = bytes.get<std::uint32_t>();
     bytes.require(guider.samples_ < 0x80000000u, "has samples without end");
+    guider.settled_after_ = bytes.get<std::uint32_t>();
+    bytes.require(guider.settled_after_ <= guider.samples_ + recording_needs::settling_samples,
+                  "settles after samples that are to come");
     guide.build_.non_finite = bytes.get<std::uint32_t>();
     guide.build_.out_of_range = bytes.get<std::uint32_t>();
     guide.build_.degenerate = bytes.get<std::uint32_t>();

@@ -88,11 +88,12 @@ void octree_guide<Exec>::begin_sample(const guide_sample<Exec>& at) {
 
 template <class Exec>
 void octree_guide<Exec>::update(const guide_sample<Exec>& at) {
-  // A host that deposits by itself does so in every sample.
-  const bool deposited = at.recorded || options_.deposit_capacity > 0;
-  if (deposited) cache_.update(at.exec);
-  if (keeps_fields()) store_.end_sample(at.exec, deposited);
+  // A host that made room for deposits of its own may have made some in any sample.
+  const bool told = told_ || options_.deposit_capacity > 0;
+  if (told) cache_.update(at.exec);
+  if (keeps_fields()) store_.end_sample(at.exec, told);
   lights_.end_sample(at.exec);
+  told_ = false;
 }
 
 template <class Exec>

@@ -17,9 +17,9 @@ class recorded_share {
   recorded_share(const sampling_options& o, std::uint64_t wanted)
       : paths_(o.max_paths), depth_(o.max_depth), wanted_(wanted) {}
 
-  /// A quarter of the vertices is enough once means have settled: the same of fewer samples.
+  /// A quarter of the vertices is enough once means have settled: as many, but not of all samples.
   recording_needs needs(bool directions) const {
-    const std::uint32_t share = shift(wanted_), settled = max(shift(wanted_ / 4), share);
+    const std::uint32_t share = shift(wanted_), settled = shift((wanted_ + 3) / 4);
     return {share, directions, 1u << (settled - share)};
   }
 
