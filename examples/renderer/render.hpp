@@ -56,7 +56,7 @@ struct render_options {
   std::uint32_t product_resolution = 8;               ///< blocks a side of products, 4, 8 or 16
   std::uint32_t rays_per_bin = 64;                    ///< c_ray
   std::uint32_t min_bin_level = 3;                    ///< l_min, from the root
-  std::uint32_t deposits_per_leaf = 16;               ///< that are recorded in a sample; 0: all
+  std::uint32_t deposits_per_leaf = 16;               ///< of a sample that is recorded; 0: all
   float guide_fraction = 0.0f;                        ///< in [0, 1]; 0: the mode's own, 0.5 of Open PGL's
   /// Of a path, from its first vertex on, at least 1; with next-event estimation never the last of several.
   std::uint32_t guided_depths = 0xffffffffu;

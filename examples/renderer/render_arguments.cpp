@@ -163,7 +163,7 @@ void add_guider_options(CLI::App& app, render_options& options) {
   app.add_option("--rays-per-bin", options.rays_per_bin, "rays that a bin should have (default: 64)");
   app.add_option("--min-bin-level", options.min_bin_level, "octree level of the largest bins (default: 3)");
   app.add_option("--deposits-per-leaf", options.deposits_per_leaf,
-                 "so many deposits a leaf of the octree are recorded in a sample; 0: all (default: 16)");
+                 "deposits a leaf of the octree in a sample that is recorded; 0: all, in each (default: 16)");
   app.add_option("--guide-fraction", options.guide_fraction,
                  "samples drawn from the guide (default: the mode's, as 0)")
       ->check(CLI::Range(0.0, 1.0));
