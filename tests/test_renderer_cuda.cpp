@@ -77,7 +77,9 @@ TEST_CASE("pictures of a GPU have the means of the CPU's once what guides know h
           "[renderer][cuda]") {
   for (const sampling_method method :
        {sampling_method::wfpg, sampling_method::wfpg_product, sampling_method::sarsa})
-    for (const char* scene : {"cornell-enclosed", "ajar", "glossy-room"})
+    // In ajar unguided pictures would need so many more samples than guided ones for their means to be
+    // normal.
+    for (const char* scene : {"cornell-box", "cornell-enclosed", "glossy-room"})
       for (const bool nee : {false, true}) {
         rendering what{scene, nee, method};
         what.spp = wfpg_test::settled_samples;
