@@ -5,7 +5,9 @@
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <string>
 #include <type_traits>
 #include <utility>

@@ -82,7 +82,7 @@ TEST_CASE("pictures of a GPU have the means of the CPU's once what guides know h
     for (const char* scene : {"cornell-box", "cornell-enclosed", "glossy-room"})
       for (const bool nee : {false, true}) {
         rendering what{scene, nee, method};
-        what.spp = wfpg_test::settled_samples;
+        what.settled = true;
         check_as_on_cpu(what);
       }
 }

@@ -33,7 +33,7 @@ TEST_CASE("pictures have that mean too once what guides know has settled", "[ren
   for (const sampling_method method : {wfpg_method, product_method, sampling_method::sarsa})
     for (const bool nee : {false, true}) {
       rendering what{"cornell-enclosed", nee, method};
-      what.spp = wfpg_test::settled_samples;
+      what.settled = true;
       check_rendering(what);
     }
 }

@@ -21,9 +21,6 @@ inline constexpr int tiles = 8;        // along a side
 inline constexpr int tile_pixels = 4;  // along a tile's side
 inline constexpr int renderings = 24;  // independent, of each method
 
-// In the second half what guides know has settled: fewer waves make fields, and fewer samples teach.
-inline constexpr int settled_samples = 64;
-
 /// What a rendering is of, and how.
 struct rendering {
   std::string scene;
@@ -35,7 +32,7 @@ struct rendering {
   wfpg::sarsa_update update = wfpg::sarsa_update::sarsa;
   wfpg::sarsa_sampler sampler = wfpg::sarsa_sampler::mixed_rejection;
   render::cones through = render::cones::scene;
-  int spp = 12;
+  bool settled = false;  ///< so long that in its second half fewer waves make fields and fewer samples teach
 
   render::render_options options() const {
     render::render_options options;
@@ -47,9 +44,9 @@ struct rendering {
     options.where = where;
     options.width = options.height = tiles * tile_pixels;
     options.max_depth = 6;
-    options.spp = spp;
+    options.spp = settled ? 64 : 12;
     options.octree_resolution = 32;
-    if (spp == settled_samples) {  // leaves, and values, that want no more than a part of the paths
+    if (settled) {  // leaves, and values, that want no more than a part of the paths
       options.octree_resolution = 16;
       options.deposits_per_leaf = 1;
       options.sarsa.values_per_direction = 1;
@@ -75,7 +72,7 @@ struct rendering {
   }
   std::string name() const {
     const std::string view = scene + (where == render::device::cuda ? " on cuda" : "") + ", " +
-                             std::to_string(spp) + " samples, next-event estimation " + (nee ? "on" : "off") +
+                             (settled ? "settled, " : "") + "next-event estimation " + (nee ? "on" : "off") +
                              ", ";
     if (method == render::sampling_method::sarsa)
       return view + "SARSA grid, update " + render::name_of(render::sarsa_update_names(), update) +
