@@ -1,8 +1,9 @@
 // Memory that runs out: every allocation of building a guider, of a sample and of loading a guide fails in
-// its turn. The call throws, nothing leaks, and the guider goes on.
+// its turn. The call throws, nothing leaks, and the guider goes on. And memory that is not zero.
 #include "support/catch.hpp"
 #include "support/failing_resource.hpp"
 #include "support/guiding.hpp"
+#include "support/poisoning_resource.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 #include "support/stepwise_samples.hpp"
@@ -145,6 +146,31 @@ WFPG_TEST_CASE("path guider: what a resource throws by itself comes through", "[
     resource.fail_at(k);
     CHECK_THROWS_AS((path_guider<Exec>(exec, mesh.view(), options)), std::length_error);
     CHECK(resource.live() == 0);
+  }
+}
+
+/// The bytes of a guide after some samples.
+template <class Exec>
+std::string guide_with(unsigned char poison, wfpg::field_lifetime lifetime) {
+  poisoning_resource<Exec> resource(poison);
+  constexpr std::size_t paths = 300;
+  wfpg::guider_options options = tracing_options(paths, wfpg::guiding_mode::oriented, lifetime);
+  options.product_resolution = 4;
+  options.lights.weights = {1.0f, 2.0f};
+  const Exec exec = Exec().with_resource(&resource);
+  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
+  trace_paths(exec, guider, 4, paths, box_caster());
+  std::ostringstream out;
+  wfpg::save_guide(guider, out);
+  return out.str();
+}
+
+WFPG_TEST_CASE("a guider reads nothing that it has not written", "[path_guider][memory]") {
+  for (const wfpg::field_lifetime lifetime : lifetimes) {
+    INFO(name_of(lifetime));
+    const std::string zeros = guide_with<Exec>(0x00, lifetime);
+    CHECK((guide_with<Exec>(0xcd, lifetime) == zeros));
+    CHECK((guide_with<Exec>(0xff, lifetime) == zeros));
   }
 }
 

@@ -2,8 +2,8 @@
 // its Morton code, normal and area (paper, section 3.2; conservative as in Crassin & Green 2012). Fragments
 // are what the octree and its cache are built from.
 //
-// Cost: O(voxels touched + columns of the triangles' boxes) time; 16 bytes a fragment, and while it runs 8 a
-// triangle and 12 for each 16 columns begun.
+// Cost: O(voxels touched + columns of the triangles' boxes) time; 16 bytes a fragment, and while it runs 16 a
+// triangle and 76 for each 16 columns begun.
 #pragma once
 
 #include <wfpg/buffer.hpp>

@@ -195,19 +195,23 @@ struct emit_in_leaves {
     const voxel_grid& grid = tree.grid();
     const grid_triangle t{grid.to_grid(e.a), grid.to_grid(e.b), grid.to_grid(e.c)};
     const lit_nodes sides{nullptr, normals};
-    const triangle_columns columns(t, grid.resolution);
+    const triangle_columns columns(t, grid.resolution, column_axis(t));
+    const column_box box = columns.box();
     const vec3 normal = unit_normal(e.a, e.b, e.c);
-    block.for_each(static_cast<int>(columns.count()), [&](int column) {
-      columns.for_each_voxel(static_cast<std::uint64_t>(column), [&](uvec3 voxel) {
+    block.for_each(static_cast<int>(box.count()), [&](int i) {
+      const glm::uvec2 column = box.column(static_cast<std::uint64_t>(i));
+      const voxel_run run = columns.run(box, column);
+      for (std::uint32_t along = run.first; along < run.first + run.count; ++along) {
+        const uvec3 voxel = box.voxel(column, along);
         const node_id leaf = tree.leaf_at(voxel);
         const float area = area_inside(t.relative_to(vec3(voxel) + 0.5f));
-        if (leaf == invalid_node || !(area > 0.0f)) return;
+        if (leaf == invalid_node || !(area > 0.0f)) continue;
         const auto power = static_cast<std::uint64_t>(ceilf(area * e.radiance / unit));
         const std::uint32_t side = sides.side_facing(leaf, normal);
         std::uint64_t* const emitted = light[leaf - tree.first_leaf()].emitted;
         atomic_add(emitted + side, power);
         if (e.two_sided) atomic_add(emitted + (side ^ 1u), power);
-      });
+      }
     });
   }
 };

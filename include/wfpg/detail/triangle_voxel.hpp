@@ -145,34 +145,84 @@ WFPG_HD inline float area_inside(const grid_triangle& t) {
   return fabsf(area.sum) * glm::length(n) / fabsf(n[w]);
 }
 
-/// The unit normal of the counter-clockwise side, or zero where the triangle has no area.
-WFPG_HD inline vec3 unit_normal(vec3 a, vec3 b, vec3 c) {
+/// A normal of the counter-clockwise side, at most 2 long: zero where an edge has no length.
+WFPG_HD inline vec3 scaled_normal(vec3 a, vec3 b, vec3 c) {
   const vec3 e = b - a;
   const vec3 f = c - a;
   const float size_e = max(fabsf(e.x), max(fabsf(e.y), fabsf(e.z)));
   const float size_f = max(fabsf(f.x), max(fabsf(f.y), fabsf(f.z)));
   if (!(size_e > 0.0f) || !(size_f > 0.0f)) return vec3(0.0f);
-  const vec3 n = glm::cross(e / size_e, f / size_f);
+  return glm::cross(e / size_e, f / size_f);
+}
+
+/// The unit normal of the counter-clockwise side, or zero where the triangle has no area.
+WFPG_HD inline vec3 unit_normal(vec3 a, vec3 b, vec3 c) {
+  const vec3 n = scaled_normal(a, b, c);
   const float length = glm::length(n);
   return length > 1.0e-12f ? n / length : vec3(0.0f);
 }
 
-/// The columns of voxels along the triangle's dominant axis that its box covers, in row order, and in each
-/// column the voxels that its plane can reach.
+/// Voxels in a row along an axis.
+struct voxel_run {
+  std::uint32_t first = 0;  ///< coordinate of the first one
+  std::uint32_t count = 0;
+};
+
+/// The columns of voxels that a triangle's box covers, in row order, in 8 bytes. Columns run along `axis()`.
+class column_box {
+ public:
+  column_box() = default;
+  /// Inclusive bounds in [0, 4095] along the two axes after `axis`.
+  WFPG_HD column_box(int axis, glm::uvec2 lower, glm::uvec2 upper)
+      : bits_(std::uint64_t(lower.x) | std::uint64_t(lower.y) << 12 | std::uint64_t(upper.x - lower.x) << 24 |
+              std::uint64_t(upper.y - lower.y) << 36 |
+              std::uint64_t(static_cast<std::uint32_t>(axis)) << 48) {}
+
+  /// 0, 1 or 2.
+  WFPG_HD int axis() const { return static_cast<int>(bits_ >> 48); }
+  /// Number of columns, at least 1.
+  WFPG_HD std::uint64_t count() const { return std::uint64_t(width()) * (part(36) + 1); }
+  /// Coordinates of column i along the two axes after `axis()`.
+  WFPG_HD glm::uvec2 column(std::uint64_t i) const {
+    const auto at = static_cast<std::uint32_t>(i);
+    return {part(0) + at % width(), part(12) + at / width()};
+  }
+  /// The voxel at `along` in a column.
+  WFPG_HD uvec3 voxel(glm::uvec2 column, std::uint32_t along) const {
+    const int w = axis();
+    if (w == 0) return {along, column.x, column.y};
+    return w == 1 ? uvec3(column.y, along, column.x) : uvec3(column.x, column.y, along);
+  }
+
+ private:
+  WFPG_HD std::uint32_t part(int shift) const { return static_cast<std::uint32_t>(bits_ >> shift) & 0xfffu; }
+  WFPG_HD std::uint32_t width() const { return part(24) + 1; }
+
+  std::uint64_t bits_ = 0;
+};
+
+/// The axis along which a triangle's normal is longest.
+WFPG_HD inline int column_axis(const grid_triangle& t) {
+  return largest_axis(glm::cross(t.b - t.a, t.c - t.a));
+}
+
+/// Finds the voxels that a triangle touches, in columns along an axis.
 class triangle_columns {
  public:
-  WFPG_HD triangle_columns(const grid_triangle& t, std::uint32_t resolution)
-      : triangle_(t), normal_(accurate_cross(t.b - t.a, t.c - t.b)) {
+  /// `t` in grid units; `resolution` at most 4096; `axis`: the dominant one.
+  WFPG_HD triangle_columns(const grid_triangle& t, std::uint32_t resolution, int axis)
+      : triangle_(t),
+        normal_(accurate_cross(t.b - t.a, t.c - t.b)),
+        u_((axis + 1) % 3),
+        v_((axis + 2) % 3),
+        w_(axis) {
     const vec3 n = glm::cross(t.b - t.a, t.c - t.a);
-    w_ = largest_axis(n);
-    u_ = (w_ + 1) % 3;
-    v_ = (w_ + 2) % 3;
-    for (int axis = 0; axis < 3; ++axis) {
-      const float low = min(t.a[axis], min(t.b[axis], t.c[axis])) - touch_tolerance;
-      const float high = max(t.a[axis], max(t.b[axis], t.c[axis])) + touch_tolerance;
+    for (int i = 0; i < 3; ++i) {
+      const float low = min(t.a[i], min(t.b[i], t.c[i])) - touch_tolerance;
+      const float high = max(t.a[i], max(t.b[i], t.c[i])) + touch_tolerance;
       const float last = static_cast<float>(resolution - 1);
-      lower_[axis] = static_cast<int>(clamp(floorf(low), 0.0f, last));
-      upper_[axis] = static_cast<int>(clamp(floorf(high), 0.0f, last));
+      lower_[i] = static_cast<int>(clamp(floorf(low), 0.0f, last));
+      upper_[i] = static_cast<int>(clamp(floorf(high), 0.0f, last));
     }
     if (fabsf(n[w_]) > 0.0f) slope_ = {-n[u_] / n[w_], -n[v_] / n[w_]};
     // The normal of a sliver is rounded; how far its plane misses the vertices says by how much.
@@ -180,25 +230,25 @@ class triangle_columns {
     reach_ = 0.5f * (fabsf(slope_.x) + fabsf(slope_.y)) + miss + 4.0f * touch_tolerance;
   }
 
-  WFPG_HD std::uint64_t count() const {
-    return static_cast<std::uint64_t>(upper_[u_] - lower_[u_] + 1) *
-           static_cast<std::uint64_t>(upper_[v_] - lower_[v_] + 1);
+  /// The columns of the triangle's box.
+  WFPG_HD column_box box() const {
+    return {w_, glm::uvec2(lower_[u_], lower_[v_]), glm::uvec2(upper_[u_], upper_[v_])};
   }
 
-  /// f(voxel) for each voxel of column i that the triangle touches.
-  template <class F>
-  WFPG_HD void for_each_voxel(std::uint64_t i, F f) const {
-    const auto width = static_cast<std::uint64_t>(upper_[u_] - lower_[u_] + 1);
-    int voxel[3];
-    voxel[u_] = lower_[u_] + static_cast<int>(i % width);
-    voxel[v_] = lower_[v_] + static_cast<int>(i / width);
+  /// The voxels of a column that the triangle touches: one run, since triangle and column are convex. `box`
+  /// runs along the same axis; who calls twice may get two answers where a compiler fuses operations.
+  WFPG_HD voxel_run run(const column_box& box, glm::uvec2 column) const {
     int first, last;
-    plane_range(voxel[u_], voxel[v_], first, last);
-    for (voxel[w_] = first; voxel[w_] <= last; ++voxel[w_]) {
-      const uvec3 coordinates(voxel[0], voxel[1], voxel[2]);
-      const grid_triangle local = triangle_.relative_to(vec3(coordinates) + 0.5f);
-      if (overlaps_cube(local, normal_, 0.5f + touch_tolerance)) f(coordinates);
+    plane_range(column, first, last);
+    voxel_run found;
+    for (int along = first; along <= last; ++along) {
+      const auto at = static_cast<std::uint32_t>(along);
+      const grid_triangle local = triangle_.relative_to(vec3(box.voxel(column, at)) + 0.5f);
+      if (!overlaps_cube(local, normal_, 0.5f + touch_tolerance)) continue;
+      if (found.count == 0) found.first = at;
+      found.count = at - found.first + 1;
     }
+    return found;
   }
 
  private:
@@ -206,10 +256,10 @@ class triangle_columns {
     return triangle_.a[w_] + slope_.x * (p[u_] - triangle_.a[u_]) + slope_.y * (p[v_] - triangle_.a[v_]);
   }
 
-  WFPG_HD void plane_range(int column_u, int column_v, int& first, int& last) const {
+  WFPG_HD void plane_range(glm::uvec2 column, int& first, int& last) const {
     vec3 centre(0.0f);
-    centre[u_] = static_cast<float>(column_u) + 0.5f;
-    centre[v_] = static_cast<float>(column_v) + 0.5f;
+    centre[u_] = static_cast<float>(column.x) + 0.5f;
+    centre[v_] = static_cast<float>(column.y) + 0.5f;
     const float limit = 1.0e6f;
     first = max(lower_[w_], static_cast<int>(floorf(clamp(plane(centre) - reach_, -limit, limit))));
     last = min(upper_[w_], static_cast<int>(floorf(clamp(plane(centre) + reach_, -limit, limit))));

@@ -1,5 +1,5 @@
-// Implementation of voxelizer.hpp: triangles in items of equal work, which count their voxels and then write
-// them.
+// Implementation of voxelizer.hpp: triangles in items of equal work, which find their voxels and then write
+// them. Each test of a triangle is evaluated once and kept: two kernels may round one expression differently.
 #pragma once
 
 #include <wfpg/detail/atomic.hpp>
@@ -107,7 +107,8 @@ inline constexpr std::uint64_t columns_per_item = 16;
 
 struct count_items {
   triangle_reader reader;
-  array_view<std::uint64_t> items;
+  array_view<column_box> boxes;     // a triangle
+  array_view<std::uint64_t> items;  // a triangle
   std::uint32_t* counters;
 
   WFPG_HD void operator()(std::size_t i) const {
@@ -119,8 +120,9 @@ struct count_items {
       return;
     }
     t = reader.in_grid(t);
-    items[i] =
-        (triangle_columns(t, reader.grid.resolution).count() + columns_per_item - 1) / columns_per_item;
+    const column_box box = triangle_columns(t, reader.grid.resolution, column_axis(t)).box();
+    boxes[i] = box;
+    items[i] = (box.count() + columns_per_item - 1) / columns_per_item;
   }
 };
 
@@ -134,46 +136,61 @@ struct mark_first_items {
   }
 };
 
-/// Visits the voxels of one item of work, f(triangle, voxel).
-struct item_voxels {
-  triangle_reader reader;
+/// The columns of one item of work, and the run of voxels that was found in each.
+struct item_columns {
+  array_view<const column_box> boxes;             // a triangle
   array_view<const std::uint64_t> items_through;  // a triangle: the items up to and with its own
   array_view<const std::uint32_t> triangles;      // an item
+  std::uint32_t* runs;  // a column and item: packed; items side by side, so that threads write in a row
 
+  /// f(column, run) for each column.
   template <class F>
-  WFPG_HD void for_each(std::uint64_t item, F f) const {
+  WFPG_HD void for_each(std::size_t item, const column_box& box, F f) const {
     const std::uint32_t triangle = triangles[item];
-    const triangle_columns columns(reader.in_grid(reader.checked(triangle)), reader.grid.resolution);
     const std::uint64_t first = (item - (triangle > 0 ? items_through[triangle - 1] : 0)) * columns_per_item;
-    const std::uint64_t last = min(first + columns_per_item, columns.count());
-    for (std::uint64_t c = first; c < last; ++c)
-      columns.for_each_voxel(c, [&](uvec3 voxel) { f(triangle, voxel); });
+    const std::uint64_t n = min(columns_per_item, box.count() - first);
+    for (std::uint64_t c = 0; c < n; ++c) f(box.column(first + c), runs[c * triangles.size() + item]);
   }
 };
 
-struct count_fragments {
-  item_voxels voxels;
-  array_view<std::uint64_t> counts;
+/// Decides which voxels the triangles touch.
+struct find_runs {
+  triangle_reader reader;
+  item_columns columns;
+  array_view<std::uint64_t> counts;  // an item: its voxels
+
   WFPG_HD void operator()(std::size_t item) const {
+    const std::uint32_t triangle = columns.triangles[item];
+    const column_box box = columns.boxes[triangle];
+    const triangle_columns found(reader.in_grid(reader.checked(triangle)), reader.grid.resolution,
+                                 box.axis());
     std::uint64_t n = 0;
-    voxels.for_each(item, [&](std::uint32_t, uvec3) { ++n; });
+    columns.for_each(item, box, [&](glm::uvec2 column, std::uint32_t& packed) {
+      const voxel_run run = found.run(box, column);
+      packed = run.first | run.count << 16;
+      n += run.count;
+    });
     counts[item] = n;
   }
 };
 
 /// Writes fragments, with their triangles where their normals will be.
 struct emit_fragments {
-  item_voxels voxels;
+  item_columns columns;
   array_view<const std::uint64_t> fragments_through;
   array_view<morton_code> codes;
   array_view<fragment_surface> surfaces;
 
   WFPG_HD void operator()(std::size_t item) const {
+    const std::uint32_t triangle = columns.triangles[item];
+    const column_box box = columns.boxes[triangle];
     std::uint64_t at = item ? fragments_through[item - 1] : 0;
-    voxels.for_each(item, [&](std::uint32_t triangle, uvec3 voxel) {
-      codes[at] = morton_encode(voxel);
-      surfaces[at].normal = triangle;
-      ++at;
+    columns.for_each(item, box, [&](glm::uvec2 column, std::uint32_t packed) {
+      const std::uint32_t first = packed & 0xffffu, end = first + (packed >> 16);
+      for (std::uint32_t along = first; along < end; ++along, ++at) {
+        codes[at] = morton_encode(box.voxel(column, along));
+        surfaces[at].normal = triangle;
+      }
     });
   }
 };
@@ -189,7 +206,8 @@ struct measure_fragments {
     const vec3 centre = vec3(morton_decode(codes[i])) + 0.5f;
     const float voxel = reader.grid.voxel_size();
     const float area = area_inside(reader.in_grid(t).relative_to(centre)) * voxel * voxel;
-    surfaces[i] = {pack_direction(unit_normal(t.a, t.b, t.c)), area};
+    const vec3 n = scaled_normal(t.a, t.b, t.c);  // that it has a length was decided before
+    surfaces[i] = {pack_direction(n / glm::length(n)), area};
   }
 };
 
@@ -260,9 +278,9 @@ struct emit_samples {
   WFPG_HD void operator()(std::size_t i) const {
     const std::uint64_t at = i ? used_through[i - 1] : 0;
     if (used_through[i] == at) return;
-    uvec3 voxel(0u);
-    grid.voxel_of(samples[i].position, voxel);
-    codes[at] = morton_encode(voxel);
+    const vec3 g =
+        glm::clamp(grid.to_grid(samples[i].position), 0.0f, static_cast<float>(grid.resolution - 1));
+    codes[at] = morton_encode(uvec3(g));
     surfaces[at] = {pack_direction(glm::normalize(samples[i].normal)), samples[i].area};
   }
 };
@@ -278,24 +296,26 @@ voxel_fragments<Exec> voxelize(const Exec& exec, triangle_mesh_view mesh, std::u
   reader.grid = detail::grid_around(detail::bounds_of(exec, mesh), resolution);
 
   const buffer<std::uint32_t, Exec> counters(exec, std::vector<std::uint32_t>(detail::counters, 0));
+  const buffer<detail::column_box, Exec> boxes(exec, n);
   buffer<std::uint64_t, Exec> items(exec, n);
-  exec.for_each(n, detail::count_items{reader, items.view(), counters.data()});
+  exec.for_each(n, detail::count_items{reader, boxes.view(), items.view(), counters.data()});
   const std::uint64_t item_count = detail::sum_through(exec, items);
   const buffer<std::uint32_t, Exec> triangles(exec, item_count);
   ::thrust::fill_n(exec.thrust(), triangles.data(), item_count, 0u);
   exec.for_each(n, detail::mark_first_items{items.view(), triangles.data()});
   ::thrust::inclusive_scan(exec.thrust(), triangles.data(), triangles.data() + item_count, triangles.data(),
                            ::thrust::maximum<std::uint32_t>());
-  const detail::item_voxels voxels{reader, items.view(), triangles.view()};
 
+  const buffer<std::uint32_t, Exec> runs(exec, item_count * detail::columns_per_item);
+  const detail::item_columns columns{boxes.view(), items.view(), triangles.view(), runs.data()};
   buffer<std::uint64_t, Exec> counts(exec, item_count);
-  exec.for_each(item_count, detail::count_fragments{voxels, counts.view()});
+  exec.for_each(item_count, detail::find_runs{reader, columns, counts.view()});
   const std::uint64_t fragment_count = detail::sum_through(exec, counts);
   detail::require_fragment_count(fragment_count);
 
   voxel_fragments<Exec> result(exec, fragment_count);
   exec.for_each(item_count,
-                detail::emit_fragments{voxels, counts.view(), result.codes.view(), result.surfaces.view()});
+                detail::emit_fragments{columns, counts.view(), result.codes.view(), result.surfaces.view()});
   exec.for_each(fragment_count,
                 detail::measure_fragments{reader, result.codes.view(), result.surfaces.view()});
   result.grid = reader.grid;
