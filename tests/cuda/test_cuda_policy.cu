@@ -181,7 +181,8 @@ TEST_CASE("samples after the first guided one allocate nothing on the GPU", "[cu
     for (const std::uint32_t product_resolution : product_resolutions) {
       INFO(name_of(lifetime) << ", products " << product_resolution);
       const own_stream stream;
-      counting_resource resource(wfpg::detail::stream_resource::of(stream));
+      const cuda_policy upstream(stream);
+      counting_resource resource(upstream.resource());
       {
         renderer counted(cuda_policy(stream, &resource), options_of(lifetime, product_resolution));
         for (int sample = 0; sample < 2; ++sample) counted.sample();
@@ -192,6 +193,59 @@ TEST_CASE("samples after the first guided one allocate nothing on the GPU", "[cu
       }
       CHECK(resource.bytes_in_use == 0);
     }
+}
+
+namespace {
+
+/// Bytes of the device that nobody has.
+std::size_t free_bytes() {
+  std::size_t free = 0, all = 0;
+  check_cuda(cudaDeviceSynchronize(), "cudaDeviceSynchronize");
+  check_cuda(cudaMemGetInfo(&free, &all), "cudaMemGetInfo");
+  return free;
+}
+
+constexpr std::size_t much = std::size_t(256) << 20;
+using bytes_of_device = wfpg::buffer<std::byte, cuda_policy>;
+
+}  // namespace
+
+// Alone on the GPU: other processes' memory counts, too.
+TEST_CASE("a policy keeps memory until it is trimmed or gone", "[cuda][pool]") {
+  const std::size_t before = free_bytes();
+  const auto holds = [&] { return free_bytes() + much / 2 < before; };
+  {
+    const cuda_policy exec;
+    { const bytes_of_device block(exec, much); }
+    CHECK(holds());
+    const cuda_policy copy = exec;
+    copy.trim();
+    CHECK(!holds());
+    { const bytes_of_device block(copy, much); }
+    CHECK(holds());
+  }
+  CHECK(!holds());
+}
+
+TEST_CASE("policies of one stream share no pool", "[cuda]") {
+  const own_stream stream;
+  const cuda_policy first(stream), second(stream), copy = first;
+  CHECK(first.resource() != second.resource());
+  CHECK(copy.resource() == first.resource());
+  counting_resource resource(first.resource());
+  CHECK(first.with_resource(&resource).resource() == &resource);
+  first.with_resource(&resource).trim();
+}
+
+TEST_CASE("a buffer outlives the policy that it was made with", "[cuda]") {
+  bytes_of_device block;
+  {
+    const cuda_policy exec;
+    block = bytes_of_device(exec, 64);
+  }
+  const cuda_policy later;
+  later.fill_bytes(block.data(), 7, block.bytes());
+  CHECK(wfpg::read_element(later, block.data() + 63) == std::byte(7));
 }
 
 namespace {

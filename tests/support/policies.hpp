@@ -105,7 +105,8 @@ WFPG_HD inline bool alike(wfpg::vec3 a, wfpg::vec3 b) {
 /// Where a policy's memory comes from that was not told otherwise.
 inline wfpg::memory_resource* default_resource() {
 #if defined(__CUDACC__)
-  return wfpg::detail::stream_resource::of(nullptr);
+  static const wfpg::exec::cuda exec;
+  return exec.resource();
 #else
   return std::pmr::get_default_resource();
 #endif

@@ -16,7 +16,6 @@
 #include <thrust/system/cuda/execution_policy.h>
 
 #include <cstddef>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <new>
@@ -46,10 +45,12 @@ inline void check_cuda(cudaError_t code, const char* call) {
   throw cuda_error(call, code);
 }
 
-/// Device memory from a pool of its own, ordered on a stream. The pool keeps what is given back: the driver
-/// takes milliseconds for memory that is new.
-class stream_resource : public memory_resource {
+/// Device memory from a pool of its own on the current device, ordered on a stream. The pool keeps what is
+/// given back, since the driver takes milliseconds for new memory. Blocks that are in use keep the resource
+/// alive. Safe for concurrent calls.
+class stream_resource : public memory_resource, public std::enable_shared_from_this<stream_resource> {
  public:
+  /// Shared from the start: see std::make_shared.
   explicit stream_resource(cudaStream_t stream) : stream_(stream) {
     cudaMemPoolProps properties{};
     properties.allocType = cudaMemAllocationTypePinned;
@@ -57,21 +58,19 @@ class stream_resource : public memory_resource {
     check_cuda(cudaGetDevice(&properties.location.id), "cudaGetDevice");
     check_cuda(cudaMemPoolCreate(&pool_, &properties), "cudaMemPoolCreate");
     std::uint64_t kept = ~std::uint64_t(0);
-    check_cuda(cudaMemPoolSetAttribute(pool_, cudaMemPoolAttrReleaseThreshold, &kept),
-               "cudaMemPoolSetAttribute");
+    const cudaError_t code = cudaMemPoolSetAttribute(pool_, cudaMemPoolAttrReleaseThreshold, &kept);
+    if (code != cudaSuccess) cudaMemPoolDestroy(pool_);
+    check_cuda(code, "cudaMemPoolSetAttribute");
   }
+  stream_resource(const stream_resource&) = delete;
+  stream_resource& operator=(const stream_resource&) = delete;
+  /// The device has the memory back once the stream has done what it was given before.
+  ~stream_resource() override { cudaMemPoolDestroy(pool_); }
 
-  /// The one of a stream and the device that is current, for as long as the process lives: the default stream
-  /// is each device's own.
-  static memory_resource* of(cudaStream_t stream) {
-    static std::mutex guard;
-    static std::map<std::pair<int, cudaStream_t>, std::unique_ptr<stream_resource>> made;
-    int device = 0;
-    check_cuda(cudaGetDevice(&device), "cudaGetDevice");
-    const std::lock_guard<std::mutex> lock(guard);
-    std::unique_ptr<stream_resource>& resource = made[{device, stream}];
-    if (!resource) resource = std::make_unique<stream_resource>(stream);
-    return resource.get();
+  /// Waits for the stream, and gives what is not in use back to the device.
+  void trim() {
+    check_cuda(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
+    check_cuda(cudaMemPoolTrimTo(pool_, 0), "cudaMemPoolTrimTo");
   }
 
  private:
@@ -83,13 +82,23 @@ class stream_resource : public memory_resource {
       throw std::bad_alloc();
     }
     check_cuda(code, "cudaMallocFromPoolAsync");
+    const std::lock_guard<std::mutex> lock(guard_);
+    if (blocks_++ == 0) self_ = shared_from_this();
     return block;
   }
-  void do_deallocate(void* block, std::size_t, std::size_t) override { cudaFreeAsync(block, stream_); }
+  void do_deallocate(void* block, std::size_t, std::size_t) override {
+    cudaFreeAsync(block, stream_);
+    std::shared_ptr<stream_resource> last;  // which ends after the lock
+    const std::lock_guard<std::mutex> lock(guard_);
+    if (--blocks_ == 0) last.swap(self_);
+  }
   bool do_is_equal(const memory_resource& other) const noexcept override { return this == &other; }
 
   cudaStream_t stream_;
   cudaMemPool_t pool_ = nullptr;
+  std::mutex guard_;
+  std::size_t blocks_ = 0;                 // in use
+  std::shared_ptr<stream_resource> self_;  // while there are any
 };
 
 inline __device__ std::size_t count_of(std::size_t n) {
@@ -153,16 +162,23 @@ class cuda {
   /// What for_each_block() calls with.
   using block = wfpg::detail::cuda_block<warps_per_block>;
 
-  /// `resource` hands out device memory, ordered on the stream, and outlives what is allocated; null stands
-  /// for a pool of the stream's own on the current device. Throws cuda_error, where there is no device to
-  /// begin with.
+  /// `resource` hands out device memory, ordered on the stream, and outlives what is allocated. Null: the
+  /// policy makes a pool on the current device, which its copies share and which lives as long as they and
+  /// their buffers do. Throws cuda_error, where there is no device to begin with.
   explicit cuda(cudaStream_t stream = nullptr, memory_resource* resource = nullptr)
-      : stream_(stream), resource_(resource ? resource : wfpg::detail::stream_resource::of(stream)) {}
+      : stream_(stream),
+        pool_(resource ? nullptr : std::make_shared<wfpg::detail::stream_resource>(stream)),
+        resource_(resource ? resource : pool_.get()) {}
 
   /// Where device memory comes from.
   memory_resource* resource() const { return resource_; }
-  /// The same stream, with memory from elsewhere.
+  /// A policy on this stream with memory from elsewhere. Null: a new pool.
   cuda with_resource(memory_resource* resource) const { return cuda(stream_, resource); }
+  /// Waits for the work before it, and gives memory that the policy's pool keeps for later back to the
+  /// device. Does nothing where the memory is a caller's. Throws cuda_error.
+  void trim() const {
+    if (pool_) pool_->trim();
+  }
   /// What all calls are ordered on.
   cudaStream_t stream() const { return stream_; }
 
@@ -292,6 +308,7 @@ class cuda {
   }
 
   cudaStream_t stream_;
+  std::shared_ptr<wfpg::detail::stream_resource> pool_;  // null where the memory is a caller's
   memory_resource* resource_;
 };
 
