@@ -18,6 +18,7 @@
 #include <wfpg/detail/kept_field.hpp>
 #include <wfpg/detail/learnt_radiance.hpp>
 #include <wfpg/detail/serve_rays.hpp>
+#include <wfpg/detail/thrust.hpp>
 #include <wfpg/guide_view.hpp>
 #include <wfpg/radiance_field.hpp>
 

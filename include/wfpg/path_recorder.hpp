@@ -11,6 +11,7 @@
 #include <wfpg/detail/learnt_radiance.hpp>
 #include <wfpg/detail/math.hpp>
 #include <wfpg/detail/recorded_runs.hpp>
+#include <wfpg/detail/thrust.hpp>
 #include <wfpg/exitance_cache.hpp>
 #include <wfpg/mis.hpp>
 #include <wfpg/octahedral_map.hpp>

@@ -20,6 +20,7 @@
 #include <wfpg/detail/recorded_share.hpp>
 #include <wfpg/detail/sarsa_learning.hpp>
 #include <wfpg/detail/serve_rays.hpp>
+#include <wfpg/detail/thrust.hpp>
 #include <wfpg/guide.hpp>
 #include <wfpg/mis.hpp>
 #include <wfpg/sarsa_options.hpp>

@@ -111,7 +111,7 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
 
   launch(d::count_items{});
   launch(d::mark_first_items{});
-  launch(d::count_fragments{});
+  launch(d::find_runs{});
   launch(d::emit_fragments{});
   launch(d::check_samples{});
   launch(d::emit_samples{});

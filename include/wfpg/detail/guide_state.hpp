@@ -6,6 +6,7 @@
 #include <wfpg/detail/kept_state.hpp>
 #include <wfpg/detail/light_state.hpp>
 #include <wfpg/detail/section_file.hpp>
+#include <wfpg/detail/thrust.hpp>
 #include <wfpg/path_guider.hpp>
 
 #include <thrust/fill.h>

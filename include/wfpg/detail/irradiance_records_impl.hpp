@@ -1,6 +1,7 @@
 // Implementation of irradiance_records.hpp.
 #pragma once
 
+#include <wfpg/detail/thrust.hpp>
 #include <wfpg/irradiance_records.hpp>
 
 #include <thrust/count.h>

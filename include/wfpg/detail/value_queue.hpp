@@ -7,6 +7,7 @@
 #include <wfpg/buffer.hpp>
 #include <wfpg/detail/atomic.hpp>
 #include <wfpg/detail/math.hpp>
+#include <wfpg/detail/thrust.hpp>
 
 #include <thrust/fill.h>
 
