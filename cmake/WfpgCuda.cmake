@@ -1,8 +1,9 @@
 # The CUDA compiler, where there is one: enables the language and sets WFPG_HAS_CUDA, and wfpg_add_cuda_options()
-# gives a target what all of the project's CUDA programs have in common. WFPG_CUDA_ARCHITECTURES chooses what is
-# compiled for.
-set(WFPG_CUDA_ARCHITECTURES 75 90 CACHE STRING "Compute capabilities that CUDA programs are compiled for, a list")
-set(CMAKE_CUDA_ARCHITECTURES "${WFPG_CUDA_ARCHITECTURES}")
+# gives a target what all of the project's CUDA programs have in common. CMAKE_CUDA_ARCHITECTURES, or CUDAARCHS in the
+# environment, chooses what is compiled for.
+if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES AND NOT DEFINED ENV{CUDAARCHS})
+  set(CMAKE_CUDA_ARCHITECTURES 75 90)
+endif()
 
 find_program(WFPG_NVCC nvcc HINTS ENV CUDA_HOME PATHS /usr/local/cuda /opt/cuda PATH_SUFFIXES bin)
 mark_as_advanced(WFPG_NVCC)
