@@ -1,7 +1,8 @@
 // A folder that lives as long as the test.
 #pragma once
 
-#include <cstdint>
+#include <unistd.h>
+
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -15,7 +16,7 @@ class temporary_folder {
   temporary_folder() {
     static int count = 0;
     path_ = std::filesystem::temp_directory_path() /
-            ("wfpg_io_" + std::to_string(std::uintptr_t(this)) + "_" + std::to_string(count++));
+            ("wfpg_io_" + std::to_string(getpid()) + "_" + std::to_string(count++));
     std::filesystem::create_directories(path_);
   }
   ~temporary_folder() {
@@ -25,6 +26,7 @@ class temporary_folder {
   temporary_folder(const temporary_folder&) = delete;
   temporary_folder& operator=(const temporary_folder&) = delete;
 
+  const std::filesystem::path& path() const { return path_; }
   std::string file(const std::string& name) const { return (path_ / name).string(); }
 
   std::string write(const std::string& name, const std::string& content) const {
@@ -35,6 +37,12 @@ class temporary_folder {
  private:
   std::filesystem::path path_;
 };
+
+/// How many entries a folder has.
+inline std::size_t files_in(const temporary_folder& folder) {
+  const std::filesystem::directory_iterator entries(folder.path());
+  return static_cast<std::size_t>(std::distance(begin(entries), end(entries)));
+}
 
 /// The bytes of a file.
 inline std::string content_of(const std::string& path) {

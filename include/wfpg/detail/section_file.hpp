@@ -11,12 +11,15 @@
 #include <wfpg/types.hpp>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <istream>
 #include <ostream>
+#include <random>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -83,9 +86,12 @@ class section_writer {
     for (int i = 0; i < 3; ++i) put(v[i]);
   }
   template <class T>
+  void put_all(const T* values, std::size_t n) {
+    for (std::size_t i = 0; i < n; ++i) put(values[i]);
+  }
+  template <class T>
   void put_all(const std::vector<T>& values) {
-    bytes_.reserve(bytes_.size() + values.size() * sizeof(T));
-    for (const T& value : values) put(value);
+    put_all(values.data(), values.size());
   }
   /// A length and so many bytes.
   void put_text(std::string_view text) {
@@ -244,22 +250,53 @@ class file_reader {
   std::uint64_t read_ = 0;
 };
 
-/// Has a file written by `write(std::ostream&)` under a temporary name beside it, and then renamed: who opens
-/// it finds what was there before or all of the new one. Throws file_error; what `write` throws.
+/// The file that a path names, through symbolic links, which may dangle. Throws file_error where links go
+/// round and where something that is no regular file is there.
+inline std::filesystem::path file_behind(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  fs::path file = path;
+  for (int links = 0; fs::is_symlink(fs::symlink_status(file, error)); ++links) {
+    if (links == 40) throw file_error(path, "is a symbolic link that leads nowhere");
+    file = file.parent_path() / fs::read_symlink(file, error);
+  }
+  if (fs::exists(file, error) && !fs::is_regular_file(file, error))
+    throw file_error(path, "is there and is not a file");
+  return file;
+}
+
+/// Makes an empty file beside another, under a name that no other process has. Throws file_error.
+inline std::filesystem::path make_partial(const std::filesystem::path& file, const std::string& name) {
+  std::random_device random;
+  for (int tries = 0; tries < 100; ++tries) {
+    std::filesystem::path partial = file;
+    partial += "." + std::to_string(random()) + ".partial";
+    if (std::FILE* const made = std::fopen(partial.c_str(), "wbx")) {  // fails where it is there
+      std::fclose(made);
+      return partial;
+    }
+    if (errno != EEXIST) break;
+  }
+  throw file_error(name, std::string("cannot be written: ") + std::strerror(errno));
+}
+
+/// Replaces a file by what `write(std::ostream&)` writes: whoever opens it finds the old one or all of the
+/// new one. The new one is written under a name of its own beside it, keeps the old one's permissions, and
+/// symbolic links stay links. Throws file_error; what `write` throws.
 template <class Write>
 void replace_file(const std::string& path, const Write& write) {
   namespace fs = std::filesystem;
   std::error_code error;
-  if (fs::exists(path, error) && !fs::is_regular_file(path, error))
-    throw file_error(path, "is there and is not a file");
-  const std::string partial = path + ".partial";
+  const fs::path file = file_behind(path), partial = make_partial(file, path);
   try {
     std::ofstream out(partial, std::ios::binary);
     if (!out) throw file_error(path, "cannot be written");
     write(out);
     out.close();
-    if (!out) throw file_error(path, "cannot be written");
-    fs::rename(partial, path, error);
+    if (!out) throw file_error(path, "cannot be written: the disk may be full");
+    const fs::file_status old = fs::status(file, error);
+    if (fs::exists(old)) fs::permissions(partial, old.permissions(), error);
+    fs::rename(partial, file, error);
     if (error) throw file_error(path, "cannot be written: " + error.message());
   } catch (...) {
     fs::remove(partial, error);
