@@ -245,9 +245,9 @@ TEST_CASE("guide files that are cut off, altered or foreign are told apart", "[g
   for (const std::string& foreign : {std::string(), std::string("\x89PNG\r\n\x1a\n................"),
                                      std::string(1000, '\0'), std::string("glTF"), bytes.substr(1)})
     CHECK(fault(foreign, options) == "wfpg: the guide is not a guide file");
-  CHECK(fault(with_version(bytes, 3), options) ==
-        "wfpg: the guide is of version 3, expected 2 or older: a newer wfpg wrote it");
-  CHECK(fault(with_version(bytes, 1), options) == "wfpg: the guide is of version 1, expected 2");
+  CHECK(fault(with_version(bytes, 4), options) ==
+        "wfpg: the guide is of version 4, expected 3 or older: a newer wfpg wrote it");
+  CHECK(fault(with_version(bytes, 2), options) == "wfpg: the guide is of version 2, expected 3");
   for (const std::size_t at : {8u, 11u, 12u}) {
     std::string altered = bytes;
     altered[at] = static_cast<char>(altered[at] ^ 1);
@@ -425,7 +425,7 @@ TEST_CASE("guide files replace one another whole", "[guide_file]") {
   const wfpg::path_guider<one_policy> guider = trained(exec, options);
   wfpg::save_guide(guider, path);
   CHECK(content_of(path) == saved(guider));
-  CHECK_FALSE(std::filesystem::exists(path + ".partial"));
+  CHECK(files_in(folder) == 1);
   CHECK(saved(wfpg::load_guide(exec, path, options)) == saved(guider));
 
   const auto fault_of = [&](auto call) -> std::string {
@@ -445,17 +445,8 @@ TEST_CASE("guide files replace one another whole", "[guide_file]") {
   CHECK(load(folder.write("more", content_of(path) + "x")) ==
         "wfpg: " + folder.file("more") + " goes on after its end");
   const auto save = [&](const std::string& to) { return fault_of([&] { wfpg::save_guide(guider, to); }); };
-  CHECK(save(folder.file("none/a.guide")) == "wfpg: " + folder.file("none/a.guide") + " cannot be written");
-  CHECK(save(folder.file("")) == "wfpg: " + folder.file("") + " is there and is not a file");
-  CHECK(save("/dev/null") == "wfpg: /dev/null is there and is not a file");
-  CHECK_THROWS_AS(wfpg::detail::replace_file(path,
-                                             [](std::ostream& out) {
-                                               out << "half";
-                                               throw std::runtime_error("fails on request");
-                                             }),
-                  std::runtime_error);
-  CHECK(content_of(path) == saved(guider));
-  CHECK_FALSE(std::filesystem::exists(path + ".partial"));
+  CHECK(save(folder.file("none/a.guide")) ==
+        "wfpg: " + folder.file("none/a.guide") + " cannot be written: No such file or directory");
   std::istringstream with_more(saved(guider) + "tail");
   wfpg::load_guide(exec, with_more, options);
   std::string left;

@@ -269,8 +269,14 @@ TEST_CASE("a rendering begins with the guide of another one", "[renderer][state]
     const auto progress = [&begun](const render_progress& p) { begun = p.begun; };
     CHECK(same_bits(render::render(world, rest, progress).picture, whole.picture));
     CHECK(begun == Approx(0.4));
+    scene turned = world;  // another camera: the same light
+    turned.view.position += vec3(0.01f);
+    CHECK(fault([&] { render::render(turned, options, {}); }).empty());
     options.octree_resolution = 64;
     CHECK(contains(fault([&] { render::render(world, options, {}); }), "option octree_resolution 32"));
+    options.octree_resolution = 32;
+    CHECK(contains(fault([&] { render::render(make_builtin_scene("cornell-box"), options, {}); }),
+                   folder.file("guide") + " is of another scene: it was saved with scene_tag "));
   }
 }
 

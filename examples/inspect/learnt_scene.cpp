@@ -78,7 +78,7 @@ struct learnt_scene::state {
         lights_by_power(exec, scene),
         accelerated(exec, scene, geometry.view()),
         camera(scene.view, options.width, options.height),
-        guider(render::begin_guider(exec, {geometry.view().positions, geometry.view().triangles},
+        guider(render::begin_guider(exec, scene, {geometry.view().positions, geometry.view().triangles},
                                     render::guider_options_of(options, lights.shares()), options, "")) {}
 
   void learn(const render::progress_callback& progress) {

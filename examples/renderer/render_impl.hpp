@@ -241,8 +241,8 @@ render_result render_on(const Exec& exec, const scene& scene, const render_optio
           });
         } else {
           const stopwatch build;
-          wfpg::path_guider<Exec> guider =
-              begin_guider(exec, mesh, guider_options_of(options, lights.shares()), options, result.guide);
+          wfpg::path_guider<Exec> guider = begin_guider(
+              exec, scene, mesh, guider_options_of(options, lights.shares()), options, result.guide);
           building.add("octree", build.seconds());
           result.report.octree.build_seconds = build.seconds();
           // A guide that is loaded has counted another rendering's, one of a state this one's.

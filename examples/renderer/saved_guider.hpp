@@ -2,6 +2,7 @@
 #pragma once
 
 #include "render.hpp"
+#include "scene_checksum.hpp"
 
 #include <wfpg/guide_file.hpp>
 
@@ -10,12 +11,16 @@
 
 namespace render {
 
-/// A guider over a scene's triangles: in the state that a guide file's bytes hold, where a rendering goes on,
-/// or a file that options name, and else one that knows nothing yet. Throws wfpg::file_error.
+/// A guider over a scene's triangles, which `mesh` has on the device: in the state of a guide file's bytes
+/// where a rendering goes on, or of the file that options name; else it knows nothing yet. Throws
+/// wfpg::file_error, also where the guide is of another scene.
 template <class Exec>
-wfpg::path_guider<Exec> begin_guider(const Exec& exec, const wfpg::triangle_mesh_view& mesh,
-                                     const wfpg::guider_options& guided, const render_options& options,
-                                     const std::string& saved) {
+wfpg::path_guider<Exec> begin_guider(const Exec& exec, const scene& scene,
+                                     const wfpg::triangle_mesh_view& mesh, wfpg::guider_options guided,
+                                     const render_options& options, const std::string& saved) {
+  const bool on_disk =
+      options.keep_guide || options.keep_state || !options.load_guide.empty() || !options.resume.empty();
+  if (on_disk) guided.scene_tag = checksum_without_camera(scene);
   if (!options.load_guide.empty()) return wfpg::load_guide(exec, options.load_guide, guided);
   if (options.resume.empty()) return wfpg::path_guider<Exec>(exec, mesh, guided);
   std::istringstream bytes(saved);

@@ -72,13 +72,23 @@ class scene_hash {
   std::uint64_t hash_ = wfpg::detail::checksum({});
 };
 
+scene_hash hash_without_camera(const scene& s) {
+  scene_hash hash;
+  hash.add_all(s.positions, s.normals, s.uvs, s.triangles, s.triangle_materials, s.materials, s.textures,
+               s.punctual_lights, s.environment, s.sky);
+  return hash;
+}
+
 }  // namespace
 
 std::uint64_t checksum_of(const scene& s) {
-  scene_hash hash;
-  hash.add_all(s.positions, s.normals, s.uvs, s.triangles, s.triangle_materials, s.materials, s.textures,
-               s.punctual_lights, s.view, s.environment, s.sky);
+  scene_hash hash = hash_without_camera(s);
+  hash.add_all(s.view);
   return hash.value();
+}
+
+std::uint64_t checksum_without_camera(const scene& s) {
+  return hash_without_camera(s).value();
 }
 
 }  // namespace render

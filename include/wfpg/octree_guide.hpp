@@ -59,6 +59,9 @@ struct guider_options : sampling_options {
   /// that deposits by itself sets it, and may do so in any sample.
   std::size_t deposit_capacity = 0;
   std::size_t caster_buffer_bytes = std::size_t(16) << 20;  ///< for the cones of a batch caster in flight
+  /// A host's number for its scene, such as a checksum: load_guide() refuses a guide that was saved with
+  /// another.
+  std::uint64_t scene_tag = 0;
 };
 
 /// A guide as guide.hpp describes them. Movable, not copyable.

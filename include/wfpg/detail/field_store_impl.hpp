@@ -108,6 +108,9 @@ field_store<Exec>::field_store(const Exec& exec, const sparse_voxel_octree_view&
   wanted_through_ = buffer<std::uint32_t, Exec>(exec, wanted_.size());
   exec.fill_bytes(table_.data(), 0xff, table_.bytes());
   exec.fill_bytes(settled_.data(), 0, settled_.bytes());
+  exec.fill_bytes(words_.data(), 0, words_.bytes());  // files are written from copies of whole buffers
+  exec.fill_bytes(hits_.data(), 0, hits_.bytes());
+  exec.fill_bytes(learnt_.data(), 0, learnt_.bytes());
   ::thrust::fill_n(exec.thrust(), wanted_.data(), wanted_.size(), detail::no_key);
 }
 

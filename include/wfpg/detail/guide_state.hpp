@@ -11,15 +11,18 @@
 
 #include <thrust/fill.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <iterator>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace wfpg::detail {
 
-inline constexpr file_kind guide_file_kind{{"\x89wfpgG\n\x1a", 8}, 2, "a guide file"};
+inline constexpr file_kind guide_file_kind{{"\x89wfpgG\n\x1a", 8}, 3, "a guide file"};
 
 /// An option that decides how a guider's state is laid out.
 struct shaping_option {
@@ -41,12 +44,17 @@ inline std::vector<shaping_option> shaping_options(const guider_options& options
 
 inline section_writer options_to_bytes(const guider_options& options, std::uint32_t resolution) {
   section_writer bytes;
+  bytes.put(options.scene_tag);
   for (const shaping_option& option : shaping_options(options, resolution)) bytes.put(option.value);
   return bytes;
 }
 
 inline void check_options(file_reader& file, const guider_options& options) {
   section_reader bytes = file.section("options");
+  const auto scene = bytes.get<std::uint64_t>();
+  if (scene != options.scene_tag)
+    file.fail("is of another scene: it was saved with scene_tag " + std::to_string(scene) +
+              ", the guider's is " + std::to_string(options.scene_tag));
   for (const shaping_option& option : shaping_options(options, options.octree_resolution)) {
     const auto saved = bytes.get<std::uint32_t>();
     if (saved != option.value)
@@ -104,6 +112,22 @@ voxel_fragments<Exec> fragments_from_bytes(const Exec& exec, section_reader byte
                    fragment_surface{pack_direction(vec3(0.0f, 0.0f, 1.0f)), 1.0f});
   fragments.grid = grid;
   return fragments;
+}
+
+/// Whether a file's fragments, one a leaf, are those of a mesh: the same cube, and all but one leaf in 100
+/// the same, since devices and compilers round touching voxels differently.
+template <class Exec>
+bool is_octree_of(const Exec& exec, const voxel_fragments<Exec>& saved, const voxel_fragments<Exec>& mesh) {
+  const float near = 1.0e-4f * saved.grid.side;
+  if (fabsf(saved.grid.side - mesh.grid.side) > near ||
+      glm::distance(saved.grid.origin, mesh.grid.origin) > near)
+    return false;
+  const std::vector<morton_code> leaves = saved.codes.to_host(exec);
+  std::vector<morton_code> found = mesh.codes.to_host(exec), common;
+  std::sort(found.begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  std::set_intersection(leaves.begin(), leaves.end(), found.begin(), found.end(), std::back_inserter(common));
+  return 100 * common.size() >= 99 * max(leaves.size(), found.size());
 }
 
 /// At least 0, and finite as a float; by bits, since compilers may assume that of every number.
@@ -212,11 +236,16 @@ struct state_access {
     file.end();
   }
 
+  /// `mesh`: what the octree must be of; null where that is not known.
   template <class Exec>
-  static path_guider<Exec> load(const Exec& exec, file_reader& file, const guider_options& options) {
+  static path_guider<Exec> load(const Exec& exec, file_reader& file, const guider_options& options,
+                                const triangle_mesh_view* mesh) {
     check_options(file, options);
-    path_guider<Exec> guider(
-        exec, fragments_from_bytes(exec, file.section("octree"), options.octree_resolution), options);
+    voxel_fragments<Exec> fragments =
+        fragments_from_bytes(exec, file.section("octree"), options.octree_resolution);
+    if (mesh && !is_octree_of(exec, fragments, voxelize(exec, *mesh, options.octree_resolution)))
+      file.fail("is of another scene: its octree is not that of the triangles");
+    path_guider<Exec> guider(exec, std::move(fragments), options);
     octree_guide<Exec>& guide = guider.guide_;
     restore(guider.exec_, file.section("cache"), guide.cache_);
     restore_counts(file.section("counts"), guider);

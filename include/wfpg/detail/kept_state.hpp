@@ -1,6 +1,7 @@
 // Kept fields to and from bytes: which node each leaf's rays belong to, and the slots in use with what their
 // cells hold. All that finds slots is made anew when the next sample begins.
-// Memory: the bytes of the fields in use.
+// Memory: a copy of the whole pool, and the bytes of the fields in use. The pool is copied in three pieces,
+// since a device takes microseconds for each copy.
 #pragma once
 
 #include <wfpg/detail/section_file.hpp>
@@ -24,11 +25,17 @@ struct place_marks {
   }
 };
 
-/// A slot in use, as a file has it. Cells are there once it has been built: its fraction is positive then.
+/// A slot in use, as a file has it. It has cells once it has been built: its fraction is positive then.
 struct saved_slot {
   std::uint32_t index = 0;
   field_slot slot;
   resident_field field;
+
+  bool is_built() const { return field.fraction > 0.0f; }
+};
+
+/// The cells of all slots, on the host.
+struct pool_copy {
   std::vector<std::uint32_t> words, hits;
   std::vector<std::uint16_t> learnt;  // empty where fields do not learn
 };
@@ -96,8 +103,12 @@ struct store_state {
     bytes.put(std::uint32_t(store.learns()));
     const std::vector<field_slot> slots = store.slots_.to_host(exec);
     const std::vector<resident_field> fields = store.fields_.to_host(exec);
+    pool_copy pool = empty_pool(store);
+    copy_pool(store, pool,
+              [&](auto* host, const auto& cells) { exec.copy_to_host(host, cells.data(), cells.bytes()); });
     for (std::size_t i = 0; i < slots.size(); ++i)
-      if (slots[i].key != no_key) put(exec, store, i, slots[i], fields[i], bytes);
+      if (slots[i].key != no_key)
+        put({static_cast<std::uint32_t>(i), slots[i], fields[i]}, store, pool, bytes);
     return bytes;
   }
 
@@ -115,17 +126,21 @@ struct store_state {
     std::vector<field_slot> slots(store.capacity_);
     std::vector<resident_field> fields(store.capacity_);
     std::vector<std::uint32_t> keys;
+    pool_copy pool = empty_pool(store);
     for (std::size_t first = 0; bytes.left() > 0;) {
-      const saved_slot saved = take(bytes, store, first, learnt);
+      const saved_slot saved = take(bytes, store, first);
       first = std::size_t(saved.index) + 1;
       slots[saved.index] = saved.slot;
       fields[saved.index] = saved.field;
       keys.push_back(saved.slot.key);
-      upload(exec, saved, store);
+      if (saved.is_built()) take_cells(bytes, store, saved.index, learnt, pool);
     }
     std::sort(keys.begin(), keys.end());
     bytes.require(std::adjacent_find(keys.begin(), keys.end()) == keys.end(), "has a field twice");
     state.free = static_cast<std::uint32_t>(store.capacity_ - keys.size());
+    copy_pool(store, pool, [&](const auto* host, const auto& cells) {
+      exec.copy_from_host(cells.data(), host, cells.bytes());
+    });
     exec.copy_from_host(store.slots_.data(), slots.data(), store.slots_.bytes());
     exec.copy_from_host(store.fields_.data(), fields.data(), store.fields_.bytes());
     exec.copy_from_host(store.state_.data(), &state, sizeof state);
@@ -134,35 +149,47 @@ struct store_state {
  private:
   static_assert(sizeof(cone_hit) == 4 && sizeof(rough_mean) == 2, "files hold them as words");
 
-  template <class Word, class Exec, class T>
-  static void put_cells(const Exec& exec, const buffer<T, Exec>& of_all, std::size_t cells, std::size_t slot,
-                        section_writer& bytes) {
-    std::vector<Word> words(cells);
-    exec.copy_to_host(words.data(), of_all.data() + slot * cells, cells * sizeof(T));
-    bytes.put_all(words);
+  template <class Exec>
+  static pool_copy empty_pool(const field_store<Exec>& store) {
+    return {std::vector<std::uint32_t>(store.words_.size()), std::vector<std::uint32_t>(store.hits_.size()),
+            std::vector<std::uint16_t>(store.learns() ? store.learnt_.size() : 0)};
+  }
+
+  /// copy(host, buffer) for each part of the pool.
+  template <class Exec, class Copy>
+  static void copy_pool(const field_store<Exec>& store, pool_copy& pool, const Copy& copy) {
+    copy(pool.words.data(), store.words_);
+    copy(pool.hits.data(), store.hits_);
+    if (store.learns()) copy(pool.learnt.data(), store.learnt_);
+  }
+
+  /// Appends a slot's part of what a pool has, `n` a slot.
+  template <class Word>
+  static void put_part(const std::vector<Word>& of_all, std::size_t n, std::size_t slot,
+                       section_writer& bytes) {
+    bytes.put_all(of_all.data() + slot * n, n);
   }
 
   /// The ray that a build was to start from is not there: the wave that it was of has ended.
   template <class Exec>
-  static void put(const Exec& exec, const field_store<Exec>& store, std::size_t i, const field_slot& slot,
-                  const resident_field& field, section_writer& bytes) {
-    bytes.put(static_cast<std::uint32_t>(i));
-    bytes.put(slot.key);
-    bytes.put(slot.last_used);
-    bytes.put(slot.last_built);
-    bytes.put(slot.builds);
-    bytes.put(field.normal);
-    bytes.put(field.fraction);
-    if (!(field.fraction > 0.0f)) return;
-    put_cells<std::uint32_t>(exec, store.words_, store.words_a_field(), i, bytes);
-    put_cells<std::uint32_t>(exec, store.hits_, store.cells_a_field(), i, bytes);
-    if (store.learns()) put_cells<std::uint16_t>(exec, store.learnt_, store.cells_a_field(), i, bytes);
+  static void put(const saved_slot& s, const field_store<Exec>& store, const pool_copy& pool,
+                  section_writer& bytes) {
+    bytes.put(s.index);
+    bytes.put(s.slot.key);
+    bytes.put(s.slot.last_used);
+    bytes.put(s.slot.last_built);
+    bytes.put(s.slot.builds);
+    bytes.put(s.field.normal);
+    bytes.put(s.field.fraction);
+    if (!s.is_built()) return;
+    put_part(pool.words, store.words_a_field(), s.index, bytes);
+    put_part(pool.hits, store.cells_a_field(), s.index, bytes);
+    if (store.learns()) put_part(pool.learnt, store.cells_a_field(), s.index, bytes);
   }
 
-  /// The next slot in use, `first` or one after it.
+  /// The next slot in use, `first` or one after it, up to its cells.
   template <class Exec>
-  static saved_slot take(section_reader& bytes, const field_store<Exec>& store, std::size_t first,
-                         bool learnt) {
+  static saved_slot take(section_reader& bytes, const field_store<Exec>& store, std::size_t first) {
     saved_slot s;
     s.index = bytes.get<std::uint32_t>();
     bytes.require(s.index >= first, "has slots out of order");
@@ -174,13 +201,26 @@ struct store_state {
     s.field.normal = bytes.get_vec3();
     s.field.fraction = bytes.get<float>();
     check(bytes, s, store.tree_.node_count(), store.sample_);
-    if (!(s.field.fraction > 0.0f)) return s;
-    const std::size_t cells = store.cells_a_field();
-    s.words = bytes.get_all<std::uint32_t>(store.words_a_field());
-    s.hits = bytes.get_all<std::uint32_t>(cells);
-    if (learnt) s.learnt = bytes.get_all<std::uint16_t>(cells);
-    check_cells(bytes, s, store.options_.resolution, store.tree_.node_count());
     return s;
+  }
+
+  /// The cells of a slot, into its part of the pool.
+  template <class Exec>
+  static void take_cells(section_reader& bytes, const field_store<Exec>& store, std::size_t slot, bool learnt,
+                         pool_copy& pool) {
+    const std::size_t cells = store.cells_a_field();
+    const auto words = bytes.get_all<std::uint32_t>(store.words_a_field());
+    const auto hits = bytes.get_all<std::uint32_t>(cells);
+    check_cells(bytes, words, hits, store.options_.resolution, store.tree_.node_count());
+    place(words, slot, pool.words);
+    place(hits, slot, pool.hits);
+    if (!learnt) return;
+    const auto values = bytes.get_all<std::uint16_t>(cells);
+    if (store.learns()) place(values, slot, pool.learnt);
+  }
+  template <class Word>
+  static void place(const std::vector<Word>& words, std::size_t slot, std::vector<Word>& of_all) {
+    std::copy(words.begin(), words.end(), of_all.begin() + static_cast<std::ptrdiff_t>(slot * words.size()));
   }
 
   static void check(const section_reader& bytes, const saved_slot& s, std::uint32_t nodes,
@@ -195,30 +235,15 @@ struct store_state {
     bytes.require(s.field.fraction > 0.0f || s.slot.builds == 0, "has a field without cells");
   }
 
-  static void check_cells(const section_reader& bytes, const saved_slot& s, std::uint32_t resolution,
+  static void check_cells(const section_reader& bytes, const std::vector<std::uint32_t>& words,
+                          const std::vector<std::uint32_t>& hits, std::uint32_t resolution,
                           std::uint32_t nodes) {
-    bytes.require(is_distribution(s.words, resolution), "has a field that is no distribution");
-    for (const std::uint32_t word : s.hits) {
+    bytes.require(is_distribution(words, resolution), "has a field that is no distribution");
+    for (const std::uint32_t word : hits) {
       cone_hit hit;
       std::memcpy(static_cast<void*>(&hit), &word, sizeof word);
       bytes.require(hit.is_sound(nodes), "has a cone that hit no node");
     }
-  }
-
-  template <class Exec>
-  static void upload(const Exec& exec, const saved_slot& s, field_store<Exec>& store) {
-    if (s.words.empty()) return;
-    put_back(exec, s, s.words, store.words_);
-    put_back(exec, s, s.hits, store.hits_);
-    if (!store.learns()) return;
-    const std::vector<std::uint16_t> nothing(s.hits.size(), 0);
-    put_back(exec, s, s.learnt.empty() ? nothing : s.learnt, store.learnt_);
-  }
-  template <class Exec, class Word, class T>
-  static void put_back(const Exec& exec, const saved_slot& s, const std::vector<Word>& words,
-                       buffer<T, Exec>& of_all) {
-    static_assert(sizeof(Word) == sizeof(T));
-    exec.copy_from_host(of_all.data() + s.index * words.size(), words.data(), words.size() * sizeof(T));
   }
 };
 
