@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -211,7 +212,31 @@ WFPG_TEST_CASE("field sampler: directions have the reported density", "[field_sa
   CHECK(family.accepted());
 }
 
-WFPG_TEST_CASE("field sampler: a sampled direction's density is its cell's, bit for bit", "[field_sampler]") {
+WFPG_TEST_CASE("field sampler: whatever a coordinate is, it has a cell", "[field_sampler]") {
+  const Exec exec;
+  const float nan = std::numeric_limits<float>::quiet_NaN(),
+              infinity = std::numeric_limits<float>::infinity();
+  const std::vector<float> coordinates = {nan,     -nan, infinity, -infinity, 3.0e38f, -3.0e38f, 1.0f,
+                                          1.0001f, 0.5f, -0.0f,    -1.0e-7f,  0.0f,    0.99f};
+  for (std::uint32_t resolution : resolutions) {
+    const wfpg::buffer<float, Exec> asked(exec, coordinates);
+    const wfpg::buffer<std::uint32_t, Exec> found(exec, coordinates.size());
+    const auto from = const_view(asked);
+    const auto to = found.view();
+    exec.for_each(coordinates.size(), [=] WFPG_HD(std::size_t i) {
+      to[i] = grid_distribution(nullptr, resolution).cell_along(from[i]);
+    });
+    const std::vector<std::uint32_t> cells = found.to_host(exec);
+    for (std::size_t i = 0; i < 2; ++i) CHECK(cells[i] < resolution);
+    for (std::size_t i : {2, 4, 6, 7}) CHECK(cells[i] == resolution - 1);
+    for (std::size_t i : {3, 5, 9, 10, 11}) CHECK(cells[i] == 0);
+    CHECK(cells[8] == resolution / 2);
+    CHECK(cells[12] == static_cast<std::uint32_t>(0.99f * static_cast<float>(resolution)));
+  }
+}
+
+WFPG_TEST_CASE("field sampler: a sampled direction's density is its cell's, bit for bit",
+               "[field_sampler][bits]") {
   const Exec exec;
   for (std::uint32_t resolution : resolutions)
     for (std::uint32_t k = 0; k < std::uint32_t(field_kind::count); ++k) {

@@ -40,10 +40,10 @@ struct stored_queries {
 
 /// As same_draws() has it.
 bool nearly(float a, float b) {
-  return loops_on_host ? a == b : std::fabs(a - b) <= 1.0e-3f * b;
+  return same_operations_same_bits ? a == b : std::fabs(a - b) <= 1.0e-3f * b;
 }
 std::size_t excepted(std::size_t rays) {
-  return loops_on_host ? 0 : rays / 100;
+  return same_operations_same_bits ? 0 : rays / 100;
 }
 
 WFPG_TEST_CASE("path guider: queries are answered with the density that sampling has", "[path_guider]") {

@@ -324,7 +324,7 @@ fragments from_samples(const Exec& exec, const std::vector<surface_fragment>& sa
 /// The same direction, packed by a policy and by the host: to the bit, or to the next step of the packing
 /// where a GPU rounds otherwise.
 bool same_packed(std::uint32_t a, std::uint32_t b) {
-  if (loops_on_host) return a == b;
+  if (same_operations_same_bits) return a == b;
   return glm::distance(wfpg::unpack_direction(a), wfpg::unpack_direction(b)) < 2.0e-4f;
 }
 

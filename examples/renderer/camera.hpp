@@ -10,7 +10,10 @@ namespace render {
 class pinhole {
  public:
   pinhole(const camera& view, int width, int height)
-      : position_(view.position), forward_(glm::normalize(view.forward)), width_(width), height_(height) {
+      : position_(view.position),
+        forward_(glm::normalize(view.forward)),
+        width_(static_cast<std::uint32_t>(width)),
+        height_(static_cast<std::uint32_t>(height)) {
     const vec3 right = glm::normalize(glm::cross(forward_, view.up));
     const float half_height = std::tan(0.5f * view.vertical_fov);
     down_ = -half_height * glm::cross(right, forward_);

@@ -1,11 +1,14 @@
 // What the library throws from host calls. Nothing is printed and nothing ends the process.
 #pragma once
 
+#include <wfpg/detail/math.hpp>
+
 #include <cstddef>
 #include <new>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 
 namespace wfpg {
 
@@ -49,9 +52,11 @@ class file_error : public std::runtime_error {
 
 namespace detail {
 
-/// Throws std::invalid_argument "wfpg: NAME is VALUE, expected WHAT" unless `holds`.
+/// Throws std::invalid_argument "wfpg: NAME is VALUE, expected WHAT" unless `holds`, and for numbers that are
+/// not finite, of which a compiler may take any comparison to hold.
 template <class T>
 void require(bool holds, const char* name, const T& value, const char* expected) {
+  if constexpr (std::is_floating_point_v<T>) holds = holds && is_finite(value);
   if (holds) return;
   std::ostringstream text;
   text << "wfpg: " << name << " is " << value << ", expected " << expected;

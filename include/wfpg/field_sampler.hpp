@@ -129,11 +129,13 @@ class grid_distribution {
     return sample_in_row(b, row, u.x, weight);
   }
 
-  /// The cell along one side of the square that a coordinate in [0,1] lies in; the first one's of NaN.
+  /// The cell along one side of the square that a coordinate in [0,1] lies in; of any other, too, one of
+  /// them.
   WFPG_HD std::uint32_t cell_along(float coordinate) const {
-    const auto last = static_cast<float>(resolution_ - 1);
-    const float along = coordinate * static_cast<float>(resolution_);
-    return static_cast<std::uint32_t>(detail::min(detail::max(0.0f, along), last));  // of NaN, max gives 0
+    const auto end = static_cast<float>(resolution_);
+    const float along = coordinate * end;
+    if (detail::is_in_range(along, end)) return static_cast<std::uint32_t>(along);
+    return along < 0.0f ? 0u : resolution_ - 1u;
   }
   /// The density at a point, per unit of the square's area.
   WFPG_HD float pdf(vec2 uv) const { return density_of(weight(cell_along(uv.x), cell_along(uv.y))); }

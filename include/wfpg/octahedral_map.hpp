@@ -67,7 +67,7 @@ WFPG_HD inline vec3 square_to_sphere(vec2 uv) {
   return {d.x, d.y, -d.z};
 }
 
-/// The inverse of square_to_sphere, for unit directions.
+/// The inverse of square_to_sphere, for unit directions. With -ffast-math up to 1e-7 outside [0,1]².
 WFPG_HD inline vec2 sphere_to_square(vec3 d) {
   vec2 p = detail::hemisphere_to_diamond({d.x, d.y, fabsf(d.z)});
   if (d.z < 0.0f) p = {copysignf(1.0f - fabsf(p.y), p.x), copysignf(1.0f - fabsf(p.x), p.y)};
@@ -85,7 +85,8 @@ WFPG_HD inline float square_to_hemisphere_z(vec2 uv) {
   return 1.0f - r * r;
 }
 
-/// The inverse of square_to_hemisphere, for unit directions with z >= 0.
+/// The inverse of square_to_hemisphere, for unit directions with z >= 0. With -ffast-math up to 1e-7 outside
+/// [0,1]².
 WFPG_HD inline vec2 hemisphere_to_square(vec3 d) {
   const vec2 p = detail::hemisphere_to_diamond(d);
   return {0.5f * (p.x + p.y) + 0.5f, 0.5f * (p.x - p.y) + 0.5f};

@@ -198,9 +198,9 @@ class sparse_voxel_octree_view {
   WFPG_HD node_id nearest_neighbour(vec3 p) const {
     const vec3 g = grid_.to_grid(p);
     const auto last = static_cast<float>(grid_.resolution);
-    const bool near = g.x >= -1.0f && g.x < last + 1.0f && g.y >= -1.0f && g.y < last + 1.0f &&
-                      g.z >= -1.0f && g.z < last + 1.0f;
-    if (!near) return invalid_node;
+    const vec3 from_border = g + 1.0f;
+    for (int axis = 0; axis < 3; ++axis)
+      if (!detail::is_in_range(from_border[axis], last + 2.0f)) return invalid_node;
     node_id best = invalid_node;
     float best_distance = 1.0e30f;
     for (int i = 0; i < 27; ++i) {

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <wfpg/buffer.hpp>
+#include <wfpg/detail/math.hpp>
 #include <wfpg/morton.hpp>
 #include <wfpg/types.hpp>
 
@@ -38,11 +39,12 @@ struct voxel_grid {
   /// World space to voxels: [0, resolution)³ inside the cube.
   WFPG_HD vec3 to_grid(vec3 p) const { return (p - origin) * (static_cast<float>(resolution) / side); }
 
-  /// The voxel that holds p; false where p is outside the cube.
+  /// The voxel that holds p; false where p is outside the cube, or not finite.
   WFPG_HD bool voxel_of(vec3 p, uvec3& voxel) const {
     const vec3 g = to_grid(p);
     const auto last = static_cast<float>(resolution);
-    if (!(g.x >= 0.0f && g.x < last && g.y >= 0.0f && g.y < last && g.z >= 0.0f && g.z < last)) return false;
+    if (!(detail::is_in_range(g.x, last) && detail::is_in_range(g.y, last) && detail::is_in_range(g.z, last)))
+      return false;
     voxel = uvec3(g);
     return true;
   }

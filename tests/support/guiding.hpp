@@ -173,7 +173,7 @@ inline bool same_bits(const std::vector<wfpg::sampled_direction>& a,
 /// and where a cone lies on a voxel's border its field reads another voxel: nearly the same, but for a few.
 inline bool same_draws(const std::vector<wfpg::sampled_direction>& a,
                        const std::vector<wfpg::sampled_direction>& b) {
-  if (loops_on_host) return same_bits(a, b);
+  if (same_operations_same_bits) return same_bits(a, b);
   std::size_t closely = 0;
   for (std::size_t i = 0; i < a.size() && i < b.size(); ++i)
     closely += a[i].technique == b[i].technique && glm::distance(a[i].direction, b[i].direction) < 1.0e-3f &&

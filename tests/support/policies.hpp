@@ -93,13 +93,23 @@ using host_policy = one_policy;
 constexpr bool loops_on_host = true;
 #endif
 
-/// Whether two kernels gave the same number by the same floating-point operations: to the bit on a host, and
-/// nearly where the compiler fuses multiplications and additions by what surrounds them.
+/// Whether a host's compiler may calculate as real numbers do.
+#if defined(__FAST_MATH__)
+constexpr bool fast_math = true;
+#else
+constexpr bool fast_math = false;
+#endif
+
+/// Whether the same floating-point operations give the same bits wherever they are written: not where the
+/// compiler fuses or reorders them by what surrounds them.
+constexpr bool same_operations_same_bits = loops_on_host && !fast_math;
+
+/// Whether two kernels gave the same number by the same floating-point operations: to the bit, or nearly.
 WFPG_HD inline bool alike(float a, float b) {
-  return loops_on_host ? a == b : std::fabs(a - b) <= 2.0e-6f * std::fabs(b);
+  return same_operations_same_bits ? a == b : std::fabs(a - b) <= 2.0e-6f * std::fabs(b);
 }
 WFPG_HD inline bool alike(wfpg::vec3 a, wfpg::vec3 b) {
-  return loops_on_host ? a == b : glm::distance(a, b) <= 2.0e-6f * glm::length(b);
+  return same_operations_same_bits ? a == b : glm::distance(a, b) <= 2.0e-6f * glm::length(b);
 }
 
 /// Where a policy's memory comes from that was not told otherwise.

@@ -206,7 +206,7 @@ inline wfpg::testing::check_report check_unbiased(const tile_means& truth, const
     if (constant && std::fabs(difference) > 1.0e-5 * truth.mean(tile))
       return {wfpg::detail::sentence("tile ", tile, " without noise: observed ", tested.mean(tile),
                                      ", expected ", truth.mean(tile))};
-    if (!(std::fabs(t) < 6.0))  // also of what is not finite
+    if (!wfpg::detail::is_finite(t) || std::fabs(t) >= 6.0)
       return {wfpg::detail::sentence("tile ", tile, ": observed ", tested.mean(tile), ", expected ",
                                      truth.mean(tile), ", ", t, " standard errors apart")};
     if (constant) continue;

@@ -2,6 +2,12 @@
 // instructions that only some processors have. Includes nothing of the library.
 #pragma once
 
+#if !defined(__GNUC__)
+#error "wfpg: compile with GCC, Clang, or nvcc beside one of them; other compilers are not supported"
+#elif !defined(__cpp_exceptions)
+#error "wfpg: compile without -fno-exceptions; host calls report errors by exceptions"
+#endif
+
 #include <cstdint>
 
 #if defined(__CUDACC__)
@@ -16,10 +22,8 @@
 #define WFPG_VECTORIZE
 #elif defined(__clang__)
 #define WFPG_VECTORIZE _Pragma("clang loop vectorize(enable)")
-#elif defined(__GNUC__)
-#define WFPG_VECTORIZE _Pragma("GCC ivdep")
 #else
-#define WFPG_VECTORIZE
+#define WFPG_VECTORIZE _Pragma("GCC ivdep")
 #endif
 
 namespace wfpg::detail {

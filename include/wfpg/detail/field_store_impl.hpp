@@ -60,8 +60,7 @@ const kept_field_options& field_store<Exec>::checked(const kept_field_options& o
   require(o.resolution >= 2 && o.resolution <= 128, "kept.resolution", o.resolution, "in [2, 128]");
   require(o.recast >= 1, "kept.recast", o.recast, "at least 1");
   require(o.idle_samples >= 1, "kept.idle_samples", o.idle_samples, "at least 1");
-  require(detail::is_finite(o.cone_samples) && o.cone_samples > 0.0f, "kept.cone_samples", o.cone_samples,
-          "positive and finite");
+  require(o.cone_samples > 0.0f, "kept.cone_samples", o.cone_samples, "positive and finite");
   const std::size_t slots = o.budget_bytes / bytes_a_slot(o.resolution, o.learn);
   require(slots < (1u << 30), "kept.budget_bytes", o.budget_bytes, "less than 2^30 slots");
   require(!o.learn || slots * o.resolution * o.resolution < 0xffffffffull, "kept.budget_bytes",

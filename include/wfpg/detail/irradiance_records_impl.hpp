@@ -214,8 +214,9 @@ detail::emitter_set irradiance_records<Exec, Smooth>::weigh(const Exec& exec,
                                                             buffer<std::uint64_t, Exec>& weights) const {
   const detail::power_of_emitter power{emitters_};
   const ::thrust::counting_iterator<std::size_t> first(0);
-  const float greatest = ::thrust::transform_reduce(exec.thrust(), first, first + emitters_.size(), power,
-                                                    0.0f, ::thrust::maximum<float>());
+  const float greatest =
+      ::thrust::transform_reduce(exec.thrust(), first, first + static_cast<std::ptrdiff_t>(emitters_.size()),
+                                 power, 0.0f, ::thrust::maximum<float>());
   detail::emitter_set result;
   if (!(greatest > 0.0f)) return result;
   exec.for_each(emitters_.size(), detail::weigh_emitters{power, greatest, weights.data()});

@@ -41,7 +41,8 @@ class learnt_radiance_view {
   WFPG_HD void write(std::uint32_t entry, std::uint32_t field, vec3 direction, float radiance) const {
     if (!queue_.fits(entry)) return;
     std::uint32_t cell;
-    if (radiance >= 0.0f && detail::is_finite(radiance) && find(field, direction, cell))
+    if (radiance >= 0.0f && detail::is_finite(radiance) && detail::is_finite(direction) &&
+        find(field, direction, cell))
       queue_.write(entry, cell, detail::min(radiance, 1.0e30f));
     else
       queue_.drop(entry);

@@ -25,8 +25,18 @@ WFPG_HD inline float bits_float(std::uint32_t bits) {
 WFPG_HD inline bool is_finite(float x) {
   return (float_bits(x) & 0x7f800000u) != 0x7f800000u;
 }
+WFPG_HD inline bool is_finite(double x) {
+  std::uint64_t bits;
+  memcpy(&bits, &x, sizeof bits);
+  return (bits & 0x7ff0000000000000u) != 0x7ff0000000000000u;
+}
 WFPG_HD inline bool is_finite(vec3 v) {
   return is_finite(v.x) && is_finite(v.y) && is_finite(v.z);
+}
+
+/// In [0, end), for a positive end; by bits, whose order is that of floats where neither is negative.
+WFPG_HD inline bool is_in_range(float x, float end) {
+  return float_bits(x) < float_bits(end) || float_bits(x) == 0x80000000u;
 }
 
 /// How many bits a number has: the least b with x < 2^b.

@@ -32,10 +32,8 @@ const guider_options& octree_guide<Exec>::checked(const guider_options& o) {
           "in [2, 128]");
   require(o.min_field_resolution >= 2 && o.min_field_resolution <= 128, "min_field_resolution",
           o.min_field_resolution, "in [2, 128]");
-  require(detail::is_finite(o.field.filter_alpha) && o.field.filter_alpha >= 0.0f, "field.filter_alpha",
-          o.field.filter_alpha, "finite, at least 0");
-  require(detail::is_finite(o.field.floor) && o.field.floor >= 0.0f, "field.floor", o.field.floor,
-          "finite, at least 0");
+  require(o.field.filter_alpha >= 0.0f, "field.filter_alpha", o.field.filter_alpha, "finite, at least 0");
+  require(o.field.floor >= 0.0f, "field.floor", o.field.floor, "finite, at least 0");
   if (o.fields == field_lifetime::kept)
     detail::require_product_resolution(o.product_resolution, "kept.resolution", o.kept.resolution);
   else

@@ -33,7 +33,7 @@ const sarsa_grid_options& sarsa_grid<Exec>::checked(const sarsa_grid_options& o)
   require_even("normal_resolution", o.normal_resolution);
   require(o.step >= 1, "step", o.step, "at least 1");
   require(o.learning_rate >= 0.0f && o.learning_rate <= 1.0f, "learning_rate", o.learning_rate, "in [0, 1]");
-  require(detail::is_finite(o.floor) && o.floor >= 0.0f, "floor", o.floor, "finite, at least 0");
+  require(o.floor >= 0.0f, "floor", o.floor, "finite, at least 0");
   return o;
 }
 

@@ -212,7 +212,8 @@ class sphere_bins {
     const std::vector<float> values = density(directions);
     for (std::size_t n = first; n < nodes_.size(); ++n) {
       double mean = 0.0;
-      for (int i = 0; i < 9; ++i) mean += weight[i / 3] * weight[i % 3] * double(values[9 * (n - first) + i]);
+      for (std::size_t i = 0; i < 9; ++i)
+        mean += weight[i / 3] * weight[i % 3] * double(values[9 * (n - first) + i]);
       nodes_[n].expected = samples_ * nodes_[n].cell.solid_angle() * mean;
     }
   }

@@ -233,7 +233,8 @@ inline void require_fragment_count(std::uint64_t n) {
 template <class Exec>
 bounds3 bounds_of(const Exec& exec, triangle_mesh_view mesh) {
   const ::thrust::counting_iterator<std::size_t> first(0);
-  return ::thrust::transform_reduce(exec.thrust(), first, first + mesh.triangles.size(),
+  return ::thrust::transform_reduce(exec.thrust(), first,
+                                    first + static_cast<std::ptrdiff_t>(mesh.triangles.size()),
                                     triangle_bounds{triangle_reader{mesh, {}}}, bounds3{}, bounds_union());
 }
 
@@ -330,9 +331,9 @@ voxel_fragments<Exec> fragments_from_samples(const Exec& exec, array_view<const 
   const std::size_t n = samples.size();
   detail::require_fragment_count(n);
   const ::thrust::counting_iterator<std::size_t> first(0);
-  const bounds3 box = bounds.empty() ? ::thrust::transform_reduce(exec.thrust(), first, first + n,
-                                                                  detail::sample_bounds{samples}, bounds3{},
-                                                                  detail::bounds_union())
+  const bounds3 box = bounds.empty() ? ::thrust::transform_reduce(
+                                           exec.thrust(), first, first + static_cast<std::ptrdiff_t>(n),
+                                           detail::sample_bounds{samples}, bounds3{}, detail::bounds_union())
                                      : bounds;
   const voxel_grid grid = detail::grid_around(box, resolution);
 
