@@ -47,7 +47,8 @@ class buffer {
     return *this;
   }
   ~buffer() {
-    if (data_) resource_->deallocate(data_, bytes(), alignment);
+    // Not by data_: Thrust hands null to memmove for empty ranges, by which compilers take it for not null.
+    if (size_ > 0) resource_->deallocate(data_, bytes(), alignment);
   }
 
   /// Exchanges memory with another.
