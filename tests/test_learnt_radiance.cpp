@@ -229,6 +229,30 @@ WFPG_TEST_CASE("learnt radiance: nonsense, and what is of no field, is dropped",
   CHECK(sums[1] > 0x1.fp63f);  // the most that a mean can be
 }
 
+/// One value in one call, and three in several.
+template <class Exec>
+void tell(const Exec& exec, const wfpg::learnt_radiance_view& view) {
+  exec.for_each(100, [=] WFPG_HD(std::size_t) {
+    view.deposit(0, up, 1.0f);
+    const std::uint32_t first = view.reserve(3);
+    for (std::uint32_t i = 0; i < 3; ++i) view.write(first + i, i, up, 1.0f);
+    for (std::uint32_t i = 0; i < 3; ++i) view.count(first + i);
+  });
+}
+
+WFPG_TEST_CASE("learnt radiance: an empty view learns nothing, whatever it is told", "[learnt_radiance]") {
+  const Exec exec;
+  tell(exec, {});
+  auto options = slots_of(16, 10, 4, false);
+  const kept_box<Exec> does_not_learn(options, wfpg::guiding_mode::oriented, 0, 1000);
+  CHECK(does_not_learn.store.learnt().empty());
+  tell(exec, does_not_learn.store.learnt());
+  options = slots_of(16, 10, 4, true);
+  const kept_box<Exec> no_room(options);  // for values
+  CHECK(no_room.store.learnt().empty());
+  tell(exec, no_room.store.learnt());
+}
+
 /// The share of a field's directions in the cell around one.
 template <class Exec>
 double share_around(const kept_box<Exec>& box, const wfpg::guide_view& view, vec3 direction) {

@@ -60,15 +60,16 @@ class exact_sum {
   int shift_;
 };
 
-/// What a kernel sees of a queue.
+/// What a kernel sees of a queue. A default one has room for nothing.
 class value_queue_view {
  public:
   /// The first of n entries in a row. Each that fits is then written or dropped, and then counted: writing
   /// all of a thread's first lets a processor overlap look-ups, which the atomics of counting would put in
   /// order.
   WFPG_HD std::uint32_t reserve(std::uint32_t n) const {
-    // Asked first, so that what comes to a full queue does not count on until the counter begins again.
-    if (atomic_load(queued_) >= capacity_) return capacity_;
+    // Asked first, so that what comes to a full queue does not count on until the counter begins again. A
+    // default view has no counter.
+    if (capacity_ == 0 || atomic_load(queued_) >= capacity_) return capacity_;
     return atomic_add(queued_, n);
   }
   WFPG_HD bool fits(std::uint32_t entry) const { return entry < capacity_; }
