@@ -191,6 +191,23 @@ WFPG_TEST_CASE("leaf means are those of the deposits", "[exitance_cache]") {
   CHECK(worst < 1.0e-6);
 }
 
+WFPG_TEST_CASE("every deposit of a leaf counts alike, however many there are", "[exitance_cache]") {
+  const vec3 z(0, 0, 1), p(1.5f);
+  cached_scene<Exec> scene(fragments_in_grid<Exec>({{{1, 1, 1}, z, 1.0f}}), 70000);
+  const node_id leaf = scene.leaf_at(p);
+  double sum = 0.0, count = 0.0;
+  for (const std::size_t deposits : {5000, 300, 70000, 5000, 1}) {
+    const double value = 1.0 + count;  // later ones are larger: none is to count for less or more
+    deposit_all(scene, std::vector<deposit>(deposits, {p, z, static_cast<float>(value)}));
+    scene.cache.update(scene.exec);
+    sum += static_cast<double>(deposits) * value;
+    count += static_cast<double>(deposits);
+    INFO(count << " deposits");
+    CHECK(static_cast<double>(scene.read(leaf, z)) == Approx(sum / count).epsilon(1.0e-6));
+  }
+  CHECK(scene.cache.dropped(scene.exec).total() == 0);
+}
+
 WFPG_TEST_CASE("sides match between parent and child by direction", "[exitance_cache]") {
   const vec3 z(0, 0, 1);
   cached_scene<Exec> scene(fragments_in_grid<Exec>({{{0, 0, 0}, z, 10.0f}, {{1, 0, 0}, -z, 1.0f}}), 10);

@@ -408,4 +408,24 @@ WFPG_TEST_CASE(
   }
 }
 
+WFPG_TEST_CASE("field store: a leaf of thousands of rays is a bin, and one of a few less is not",
+               "[field_store]") {
+  const lit_box<Exec> box(patch_light, 16);
+  const wfpg::sparse_voxel_octree_view tree = box.tree.view();
+  const wfpg::node_id crowded = tree.first_leaf(), other = tree.node_count() - 1;
+  const wfpg::buffer<std::uint32_t, Exec> pressure(box.exec, std::vector<std::uint32_t>{1});
+  for (const std::uint32_t enough : {4096u, 10000u, 65536u, 70000u}) {
+    std::vector<wfpg::node_id> rays(70000, crowded);
+    rays.resize(70000 + enough - 1, other);
+    const wfpg::buffer<wfpg::node_id, Exec> leaves(box.exec, rays);
+    wfpg::detail::bin_marks<Exec> marks(box.exec, tree, {1, 2 * enough});
+    box.exec.for_each(rays.size(), count_at{marks.view(), const_view<wfpg::node_id>(leaves)});
+    marks.mark(box.exec, 1, 100000, pressure.data());
+    const auto bins = evaluate(box.exec, tree.leaf_count(), bin_of_leaf{marks.view(), tree.first_leaf()});
+    INFO(enough << " rays are enough");
+    CHECK(bins.front() == crowded);
+    CHECK(tree.level_of(bins.back()) == 1);
+  }
+}
+
 }  // namespace

@@ -189,6 +189,20 @@ WFPG_TEST_CASE("the leaf level takes part in marking", "[spatial_binner]") {
   CHECK(host[1].size == 64);
 }
 
+WFPG_TEST_CASE("a leaf of thousands of rays is a bin, and one of a few less is not", "[spatial_binner]") {
+  const sphere_tree<Exec> scene(16);
+  const octree_view tree = scene.tree.view();
+  const std::vector<node_record> nodes = nodes_of(scene.exec, tree);
+  const vec3 crowded = nodes[tree.first_leaf()].bounds.centre(), other = nodes.back().bounds.centre();
+  std::vector<ray_to_bin> rays(70000, ray_to_bin{crowded, wfpg::orientation_any, true});
+  for (const std::uint32_t enough : {4096u, 10000u, 65536u, 70000u}) {
+    rays.resize(70000);
+    rays.resize(70000 + enough - 1, {other, wfpg::orientation_any, true});
+    wfpg::spatial_binner<Exec> binner(scene.exec, tree, {1, enough}, rays.size());
+    check_bins(scene.exec, binner, tree, rays, {1, enough});
+  }
+}
+
 WFPG_TEST_CASE("rays without a bin", "[spatial_binner]") {
   const sphere_tree<Exec> scene(16);
   const octree_view tree = scene.tree.view();
