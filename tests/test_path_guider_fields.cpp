@@ -344,10 +344,22 @@ WFPG_TEST_CASE("path guider: what was learnt of lights is forgotten with all lig
       box.guider.end_sample();
       box.guider.begin_sample();
     };
+    const auto learn = [&] {
+      const wfpg::guide_view view = box.guider.prepare(wave.get(), box_caster{});
+      box.exec.for_each(300, find_light{box.guider.lights(), box.guider.learnt(), view, at, direction});
+    };
     box.guider.begin_sample();
     const knowledge before = known();
-    const wfpg::guide_view view = box.guider.prepare(wave.get(), box_caster{});
-    box.exec.for_each(300, find_light{box.guider.lights(), box.guider.learnt(), view, at, direction});
+    const auto check_forgotten = [&] {
+      box.guider.forget_light();
+      for (int sample = 0; sample < 2; ++sample) {
+        next_sample();
+        const knowledge after = known();
+        for (int g = 0; g < 3; ++g) CHECK(after.chances[g] == before.chances[g]);
+        CHECK(after.density == before.density);
+      }
+    };
+    learn();
     next_sample();
     known();  // fields see what they learnt once they are refreshed
     next_sample();
@@ -355,13 +367,9 @@ WFPG_TEST_CASE("path guider: what was learnt of lights is forgotten with all lig
     CHECK(learnt.chances[2] > 2.0f * before.chances[2]);
     CHECK(learnt.chances[0] < 0.7f * before.chances[0]);
     if (lifetime == field_lifetime::kept) CHECK(learnt.density > 10.0f * before.density);
-    box.guider.forget_light();
-    for (int sample = 0; sample < 2; ++sample) {
-      next_sample();
-      const knowledge after = known();
-      for (int g = 0; g < 3; ++g) CHECK(after.chances[g] == before.chances[g]);
-      CHECK(after.density == before.density);
-    }
+    check_forgotten();
+    learn();
+    check_forgotten();  // what the sample has found so far, too
   }
 }
 

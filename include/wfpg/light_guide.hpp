@@ -127,7 +127,7 @@ class light_guide {
   void begin_sample(std::uint32_t seed) { view_.runs_.seed = seed; }
   /// Learns what was deposited. O(choices + nodes · groups).
   void end_sample(const Exec& exec);
-  /// Forgets what was learnt.
+  /// Forgets what was learnt, and what was deposited since.
   void forget(const Exec& exec);
 
   /// Bytes that are kept across samples.
@@ -239,6 +239,7 @@ template <class Exec>
 void light_guide<Exec>::forget(const Exec& exec) {
   if (view_.empty()) return;
   exec.fill_bytes(means_.data(), 0, means_.bytes());
+  queue_.clear(exec);
   choose(exec);
 }
 
