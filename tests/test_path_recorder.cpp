@@ -412,6 +412,45 @@ WFPG_TEST_CASE("fields learn the environment, dark or not", "[path_recorder]") {
   CHECK(r.dropped() == 0);
 }
 
+/// What a recorded path is, and the z of the direction that leads on from its vertex 1.
+struct path_in_numbers {
+  std::uint32_t vertices, surfaces;
+  float z;
+};
+
+WFPG_TEST_CASE("the environment is no surface, and the cache gets nothing for it", "[path_recorder]") {
+  for (const bool included : {true, false}) {
+    learning<Exec> r(included);
+    write_vertices(r, 0, {vec3(1.0f), vec3(0.5f), vec3(0.25f)});  // three surfaces
+    r.radiance(0, 2, vec3(0.25f));
+    r.finish();
+    CHECK(r.leaving(2) == Approx(1.0f));
+    CHECK(r.leaving(1) == Approx(0.5f));
+
+    write_vertices(r, 0, {vec3(1.0f), vec3(0.5f)});  // two surfaces; the third vertex is the environment
+    r.scatter(1, 2, {0.6f, 0.0f, -0.8f});
+    r.escape(2, vec3(0.25f));
+    r.emission(0, 2, vec3(5.0f));
+    const wfpg::path_recorder_view paths = r.view();
+    const path_in_numbers path = evaluate(r.scene.exec, [=] WFPG_HD() {
+      const wfpg::recorded_path recorded(paths, 0);
+      vec3 direction(0.0f);
+      const bool leads = recorded.leads(1, direction);
+      return path_in_numbers{recorded.vertices(), recorded.surfaces(), leads ? direction.z : 0.0f};
+    });
+    CHECK(path.vertices == 3);
+    CHECK(path.surfaces == 2);
+    CHECK(path.z == Approx(-0.8f).epsilon(1e-3));
+    r.finish();
+    INFO("included " << included);
+    CHECK(r.leaving(2) == Approx(1.0f));  // where the third surface was
+    CHECK(r.leaving(1) == Approx((0.5f + 5.0f / 0.5f) / 2.0f));
+    CHECK(r.leaving(0) == Approx((0.25f + 5.0f) / 2.0f));
+    CHECK(r.scene.cache.dropped(r.scene.exec).total() == 0);
+    CHECK(r.dropped() == 0);
+  }
+}
+
 WFPG_TEST_CASE("fields learn no emission where it is left out", "[path_recorder]") {
   learning<Exec> r(false);
   write_vertices(r, 0, {vec3(1.0f)});
