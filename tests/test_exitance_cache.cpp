@@ -4,14 +4,18 @@
 #include "support/octree_nodes.hpp"
 #include "support/policies.hpp"
 #include "support/random_meshes.hpp"
+#include "support/section_bytes.hpp"
 
+#include <wfpg/detail/guide_state.hpp>
 #include <wfpg/exitance_cache.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -341,7 +345,65 @@ WFPG_TEST_CASE("the order of deposits does not change a bit", "[exitance_cache]"
   CHECK((first == of_first_policy(first)));
 }
 
-TEST_CASE("2^32 deposits in one voxel lose nothing", "[exitance_cache]") {
+/// A voxel whose upper side has received `count` deposits, of mean `mean`: set through the bytes that guide
+/// files hold of a cache.
+template <class Exec>
+class busy_voxel {
+ public:
+  busy_voxel(double mean, std::uint32_t count)
+      : scene_(fragments_in_grid<Exec>({{{1, 1, 1}, z, 1.0f}}), 1000) {
+    std::string bytes = state();
+    std::uint64_t mean_bits;
+    std::memcpy(&mean_bits, &mean, sizeof mean);
+    set_number(bytes, leaf(), 8, mean_bits);
+    set_number(bytes, leaf() + 8, 4, count);
+    wfpg::detail::state_access::restore(scene_.exec, {"a cache", "cache", bytes}, scene_.cache);
+  }
+
+  void add(const std::vector<float>& values) {
+    std::vector<deposit> deposits;
+    for (const float value : values) deposits.push_back({vec3(1.5f), z, value});
+    deposit_all(scene_, deposits);
+    scene_.cache.update(scene_.exec);
+  }
+  double mean() const { return double(scene_.read(scene_.leaf_at(vec3(1.5f)), z)); }
+  std::uint64_t count() const { return number_in(state(), leaf() + 8, 4); }
+  std::uint64_t dropped() const { return scene_.cache.dropped(scene_.exec).total(); }
+
+ private:
+  const vec3 z{0.0f, 0.0f, 1.0f};
+
+  std::string state() const {
+    return wfpg::detail::state_access::to_bytes(scene_.exec, scene_.cache).bytes();
+  }
+  /// Where the leaf's first side is: behind two bytes a node and one an inner node.
+  std::size_t leaf() const { return 3 * std::size_t(scene_.tree.node_count()) - scene_.tree.leaf_count(); }
+
+  cached_scene<Exec> scene_;
+};
+
+WFPG_TEST_CASE("2^32 deposits in one voxel lose nothing", "[exitance_cache]") {
+  constexpr std::uint64_t most = 0xffffffffu;
+  for (const std::uint32_t before : {0x7ffffffcu, 0xfffffff0u, 0xfffffffbu, 0xfffffffeu, 0xffffffffu}) {
+    busy_voxel<Exec> voxel(2.0, before);
+    CHECK(voxel.mean() == 2.0);
+    CHECK(voxel.count() == before);
+    long double sum = 2.0L * before, count = before;
+    for (int round = 0; round < 4; ++round) {
+      std::vector<float> values(5, 0x1p31f);  // each moves the mean by about a half
+      values.resize(5 + 300 * (round % 2), 0.0f);
+      voxel.add(values);
+      for (const float value : values) sum += static_cast<long double>(value);
+      count += static_cast<long double>(values.size());
+      INFO(before << " deposits before, round " << round);
+      CHECK(voxel.mean() == Approx(static_cast<double>(sum / count)).epsilon(1.0e-6));
+      CHECK(voxel.count() == std::min(most, static_cast<std::uint64_t>(count)));
+    }
+    CHECK(voxel.dropped() == 0);
+  }
+}
+
+TEST_CASE("a mean counts up to 2^32 - 1 values, in batches of any size", "[exitance_cache]") {
   double mean = 0.0;
   std::uint32_t count = 0;
   const std::uint64_t half = 1ull << 31;
