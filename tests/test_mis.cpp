@@ -1,5 +1,5 @@
-// Multiple importance sampling: the heuristics, and the mixture of a field and a BSDF, whose density has to
-// be how often it draws a direction.
+// Multiple importance sampling: the heuristics, and the mixture of a field and a BSDF of one lobe or two,
+// whose density has to be how often it draws a direction.
 #include "support/evaluate.hpp"
 #include "support/fields.hpp"
 #include "support/policies.hpp"
@@ -20,9 +20,10 @@ using wfpg::sampling_technique;
 
 namespace {
 
+template <class Surface>
 struct draw_mixture {
   guide_mixture mixture;
-  test_surface surface;
+  Surface surface;
   std::uint64_t seed;
   wfpg::array_view<sampled_direction> drawn;
   WFPG_HD void operator()(std::size_t i) const {
@@ -32,20 +33,24 @@ struct draw_mixture {
   }
 };
 
-template <class Exec>
-std::vector<sampled_direction> draw(const Exec& exec, const guide_mixture& mixture,
-                                    const test_surface& surface, std::size_t n, std::uint64_t seed) {
+template <class Exec, class Surface>
+std::vector<sampled_direction> draw(const Exec& exec, const guide_mixture& mixture, const Surface& surface,
+                                    std::size_t n, std::uint64_t seed) {
   const wfpg::buffer<sampled_direction, Exec> drawn(exec, n);
-  exec.for_each(n, draw_mixture{mixture, surface, seed, drawn.view()});
+  exec.for_each(n, draw_mixture<Surface>{mixture, surface, seed, drawn.view()});
   return drawn.to_host(exec);
 }
 
 /// What a mixture says of the density of directions.
+template <class Surface>
 struct mixture_pdf {
   guide_mixture mixture;
-  test_surface surface;
+  Surface surface;
   WFPG_HD float operator()(vec3 direction) const { return mixture.pdf(surface, direction); }
 };
+template <class Surface>
+mixture_pdf(guide_mixture, Surface) -> mixture_pdf<Surface>;
+
 struct field_pdf {
   directional_field field;
   WFPG_HD float operator()(vec3 direction) const { return field.pdf(direction); }
@@ -216,6 +221,144 @@ WFPG_TEST_CASE("MIS: a BSDF whose sampling fails ends the path", "[mis]") {
     } else {
       CHECK(alike(drawn[i].pdf, asked[i]));
     }
+}
+
+/// A cosine and a lobe about the mirrored direction. One of the two is chosen by probability, and the density
+/// is the sum. It does not tell that it has parts.
+struct two_lobes {
+  static constexpr float narrow_share = 0.4f;
+
+  test_bsdf wide, narrow;
+
+  WFPG_HD explicit two_lobes(vec3 normal)
+      : wide{bsdf_kind::lambert, normal}, narrow{bsdf_kind::glossy, normal} {}
+
+  WFPG_HD bool is_delta() const { return false; }
+  WFPG_HD bool transmits() const { return false; }
+  WFPG_HD float eval(vec3 outgoing, vec3 incident) const {
+    return 0.3f * wide.eval(outgoing, incident) + 0.6f * narrow.eval(outgoing, incident);
+  }
+  WFPG_HD float pdf(vec3 outgoing, vec3 incident) const {
+    return (1.0f - narrow_share) * wide.pdf(outgoing, incident) +
+           narrow_share * narrow.pdf(outgoing, incident);
+  }
+  WFPG_HD wfpg::bsdf_sample sample(vec3 outgoing, vec2 u) const {
+    const bool is_narrow = u.x < narrow_share;
+    const float rest = is_narrow ? u.x / narrow_share : (u.x - narrow_share) / (1.0f - narrow_share);
+    wfpg::bsdf_sample drawn = (is_narrow ? narrow : wide).sample(outgoing, {std::fmin(rest, 0.999999f), u.y});
+    if (drawn.pdf > 0.0f) drawn.pdf = pdf(outgoing, drawn.direction);
+    return drawn;
+  }
+};
+
+/// Tells how narrow the lobe is, so that it is guided less.
+struct told_lobes : two_lobes {
+  using two_lobes::two_lobes;
+  WFPG_HD wfpg::glossy_part glossy(vec3) const { return {narrow_share, 0.2f}; }
+};
+
+/// Also draws each of its lobes alone.
+struct separate_lobes : told_lobes {
+  using told_lobes::told_lobes;
+  WFPG_HD wfpg::bsdf_sample sample_part(bool glossy, vec3 outgoing, vec2 u) const {
+    return (glossy ? narrow : wide).sample(outgoing, u);
+  }
+  WFPG_HD float pdf_part(bool glossy, vec3 outgoing, vec3 incident) const {
+    return (glossy ? narrow : wide).pdf(outgoing, incident);
+  }
+};
+
+static_assert(wfpg::is_bsdf_v<two_lobes> && !wfpg::has_glossy_part_v<two_lobes>);
+static_assert(wfpg::is_bsdf_v<told_lobes> && !wfpg::has_separate_parts_v<told_lobes>);
+static_assert(wfpg::is_bsdf_v<separate_lobes> && wfpg::has_separate_parts_v<separate_lobes>);
+
+float sky(vec3 d) {
+  return 0.2f + std::exp(3.0f * glm::dot(d, glm::normalize(vec3(0.1f, 0.3f, 0.9f))) - 2.0f);
+}
+
+/// Light of the sky that a surface reflects, by the midpoint rule.
+template <class Bsdf>
+double reflected(const wfpg::surface<Bsdf>& s) {
+  constexpr int rows = 400, columns = 800;
+  const double pi = 3.14159265358979323846;
+  double sum = 0.0;
+  for (int i = 0; i < rows * columns; ++i) {
+    const double z = 2.0 * (i / columns + 0.5) / rows - 1.0, turn = 2.0 * pi * (i % columns + 0.5) / columns;
+    const double r = std::sqrt(1.0 - z * z);
+    const vec3 d(r * std::cos(turn), r * std::sin(turn), z);
+    if (s.bsdf.transmits() || glm::dot(d, s.normal) > 0.0f)
+      sum += double(sky(d)) * double(s.bsdf.eval(s.outgoing, d));
+  }
+  return sum * 4.0 * pi / (rows * columns);
+}
+
+/// How many standard errors the estimate lies off the exact value, with densities less what `missing` says of
+/// a direction.
+template <class Bsdf, class Missing>
+double deviation(const wfpg::surface<Bsdf>& s, const std::vector<sampled_direction>& drawn, double exact,
+                 const Missing& missing) {
+  double sum = 0.0, squares = 0.0;
+  for (const sampled_direction& d : drawn) {
+    double value = 0.0;
+    if (d.technique != sampling_technique::none)
+      value = double(sky(d.direction)) * double(s.bsdf.eval(s.outgoing, d.direction)) /
+              double(d.pdf - missing(d.direction));
+    sum += value;
+    squares += value * value;
+  }
+  const double n = double(drawn.size()), mean = sum / n;
+  return (mean - exact) / std::sqrt((squares / n - mean * mean) / n);
+}
+
+/// A mixture of fields and a BSDF of two lobes: its frequencies, its shares, and what it estimates. A density
+/// that lacks one of the lobes would be found.
+template <class Bsdf, class Exec>
+void check_two_lobes(const Exec& exec, chi_square_family& family) {
+  constexpr std::size_t samples = 40000;
+  const vec3 outgoing = glm::normalize(up + vec3(0.25f, 0.0f, 0.1f));  // no part of the lobe is cut off
+  const wfpg::surface<Bsdf> s{{}, up, up, outgoing, Bsdf(up), true};
+  const double exact = reflected(s);
+  const built_field<Exec> built(exec, field_values(field_kind::noise, 16, 3), 16, 0.05f);
+  for (const guide_mixture& mixture : {guide_mixture{directional_field(built.grid()), 0.3f},
+                                       guide_mixture{directional_field(built.grid(), up), 0.7f}}) {
+    const auto drawn = draw(exec, mixture, s, samples, 21 + family.size());
+    INFO("fraction " << mixture.fraction);
+    if (!mixture.field.hemisphere()) {
+      std::vector<drawn_direction> directions;
+      for (const sampled_direction& d : drawn) directions.push_back({d.direction, d.pdf});
+      sampler_check_options options;
+      options.moments = false;
+      const auto report = check_sampler(directions, densities_by{exec, mixture_pdf{mixture, s}}, options);
+      INFO(report.message);
+      CHECK(report);
+      family.add(report.frequencies, "BSDF " + std::to_string(family.size()));
+    }
+
+    const wfpg::mixture_shares shares = mixture.shares_of(s);
+    CHECK(shares.guide + shares.glossy + shares.smooth == Approx(1.0f));
+    const double guide = double(shares.guide), guided = double(count(drawn, sampling_technique::guide));
+    CHECK(std::abs(guided / samples - guide) <= 4.0 * std::sqrt(guide * (1.0 - guide) / samples));
+
+    CHECK(std::abs(deviation(s, drawn, exact, [](vec3) { return 0.0f; })) < 4.0);
+    const bool apart = shares.glossy > 0.0f;
+    const float narrow = apart ? shares.glossy : shares.smooth * Bsdf::narrow_share;
+    const float wide = apart ? shares.smooth : shares.smooth * (1.0f - Bsdf::narrow_share);
+    const auto of_narrow = [&](vec3 d) { return narrow * s.bsdf.narrow.pdf(outgoing, d); };
+    const auto of_wide = [&](vec3 d) { return wide * s.bsdf.wide.pdf(outgoing, d); };
+    CHECK(deviation(s, drawn, exact, of_narrow) > 8.0);
+    CHECK(deviation(s, drawn, exact, of_wide) > 8.0);
+  }
+}
+
+WFPG_TEST_CASE("MIS: of a BSDF of two lobes the density is that of both, and estimates have no bias",
+               "[mis]") {
+  const Exec exec;
+  chi_square_family family;
+  check_two_lobes<two_lobes>(exec, family);
+  check_two_lobes<told_lobes>(exec, family);
+  check_two_lobes<separate_lobes>(exec, family);
+  INFO(family.message());
+  CHECK(family.accepted());
 }
 
 }  // namespace
