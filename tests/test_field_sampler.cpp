@@ -235,6 +235,113 @@ WFPG_TEST_CASE("field sampler: whatever a coordinate is, it has a cell", "[field
   }
 }
 
+/// Rectangles of equal solid angle above a normal: rows along it, columns about it.
+struct rectangles_above {
+  static constexpr std::uint32_t rows = 8, columns = 16, count = rows * columns;
+  static constexpr float full_turn = 6.28318531f;
+
+  vec3 normal, tangent, bitangent;
+
+  explicit rectangles_above(vec3 n)
+      : normal(n),
+        tangent(glm::normalize(glm::cross(n, vec3(0.3f, 0.9f, 0.1f)))),
+        bitangent(glm::cross(n, tangent)) {}
+
+  WFPG_HD std::uint32_t of(vec3 d) const {
+    const float turn = std::atan2(glm::dot(d, bitangent), glm::dot(d, tangent)) / full_turn;
+    const float row = wfpg::detail::max(glm::dot(d, normal), 0.0f) * float(rows);
+    const float column = (turn < 0.0f ? turn + 1.0f : turn) * float(columns);
+    return wfpg::detail::min(std::uint32_t(row), rows - 1) * columns +
+           wfpg::detail::min(std::uint32_t(column), columns - 1);
+  }
+  /// A direction from (row, column), not whole numbers.
+  WFPG_HD vec3 direction(float row, float column) const {
+    const float z = row / float(rows), turn = full_turn * column / float(columns);
+    const float r = std::sqrt(1.0f - z * z);
+    return z * normal + r * std::cos(turn) * tangent + r * std::sin(turn) * bitangent;
+  }
+};
+
+struct rectangle_of_sample {
+  directional_field field;
+  rectangles_above rectangles;
+  std::uint64_t seed;
+  WFPG_HD std::uint32_t operator()(std::size_t i) const {
+    return rectangles.of(field.sample(random_point(seed, i)));
+  }
+};
+
+/// The integral of a field's density over each rectangle, from a random point in each of n² parts: edges of
+/// cells that lie along a rectangle's would spoil the midpoint rule.
+struct integrate_rectangle {
+  directional_field field;
+  rectangles_above rectangles;
+  WFPG_HD double operator()(std::size_t i) const {
+    constexpr std::uint32_t n = 100;
+    double sum = 0.0;
+    for (std::uint32_t k = 0; k < n * n; ++k) {
+      const vec2 inside =
+          (vec2(float(k % n), float(k / n)) + random_point(wfpg::detail::hash(1, i), k)) / float(n);
+      sum += double(field.pdf(rectangles.direction(float(i / rectangles_above::columns) + inside.y,
+                                                   float(i % rectangles_above::columns) + inside.x)));
+    }
+    return sum / (n * n) * double(rectangles_above::full_turn) / rectangles_above::count;
+  }
+};
+
+/// Parts of the hemisphere, of which the smallest is an eighth.
+constexpr bool (*parts_of_hemisphere[])(std::uint32_t row, std::uint32_t column) = {
+    [](std::uint32_t row, std::uint32_t) { return row >= 4; },
+    [](std::uint32_t row, std::uint32_t) { return row == 0; },
+    [](std::uint32_t row, std::uint32_t) { return row == 7; },
+    [](std::uint32_t, std::uint32_t column) { return column < 8; },
+    [](std::uint32_t row, std::uint32_t column) { return row < 4 && column >= 12; },
+    [](std::uint32_t row, std::uint32_t column) { return (row + column) % 2 == 0; }};
+
+WFPG_TEST_CASE("field sampler: on hemispheres a density that is off by 2% in a part is found",
+               "[field_sampler]") {
+  const Exec exec;
+  constexpr std::size_t samples = 3 << 20, at_once = samples / 3;
+  chi_square_family family;
+  for (const field_kind kind : {field_kind::uniform, field_kind::noise}) {
+    const vec3 normal = kind == field_kind::uniform ? vec3(0.0f, 0.0f, 1.0f) : tilted;
+    const built_field<Exec> built(exec, field_values(kind, 16, 33), 16, 0.1f);
+    const directional_field field(built.grid(), normal);
+    const rectangles_above rectangles(normal);
+    INFO(name_of(kind, 16, 33));
+
+    double integral = 0.0;
+    std::vector<double> expected =
+        evaluate(exec, rectangles_above::count, integrate_rectangle{field, rectangles});
+    for (const double share : expected) integral += share;
+    CHECK(integral == Approx(1.0).margin(5.0e-4));
+    for (double& share : expected) share *= double(samples) / integral;
+    if (kind == field_kind::uniform)
+      for (const double count : expected) CHECK(count == Approx(samples / rectangles_above::count));
+
+    std::vector<double> observed(rectangles_above::count, 0.0);
+    for (std::uint64_t chunk = 0; chunk < samples / at_once; ++chunk)
+      for (const std::uint32_t i :
+           evaluate(exec, at_once, rectangle_of_sample{field, rectangles, wfpg::detail::hash(50, chunk)}))
+        observed[i] += 1.0;
+    family.add(chi_square_test(observed, expected), name_of(kind, 16, 33));
+
+    for (const auto part : parts_of_hemisphere)
+      for (const double factor : {0.98, 1.02}) {
+        std::vector<double> wrong = expected;
+        double sum = 0.0;
+        for (std::uint32_t i = 0; i < wrong.size(); ++i) {
+          if (part(i / rectangles_above::columns, i % rectangles_above::columns)) wrong[i] *= factor;
+          sum += wrong[i];
+        }
+        for (double& count : wrong) count *= double(samples) / sum;
+        CHECK(chi_square_test(observed, wrong).p < 1.0e-6);
+      }
+  }
+  INFO(family.message());
+  CHECK(family.accepted());
+}
+
 WFPG_TEST_CASE("field sampler: a sampled direction's density is its cell's, bit for bit",
                "[field_sampler][bits]") {
   const Exec exec;
