@@ -82,6 +82,78 @@ WFPG_TEST_CASE("product sampler: of light everywhere and a Lambertian cosines ar
   }
 }
 
+/// Lambertian, and tells that no part of it is narrow.
+struct matte_bsdf : test_bsdf {
+  WFPG_HD wfpg::glossy_part glossy(vec3) const { return {}; }
+};
+
+/// Radiance that varies slowly.
+double glow(vec3 d) {
+  const double along = 1.0 + double(glm::dot(d, glm::normalize(vec3(0.7f, 0.5f, -0.4f))));
+  return 0.2 + along * along;
+}
+
+/// What cells of a field over the hemisphere above `up`, or over the sphere, hold of it: with the cosine over
+/// a hemisphere, as the guide's fields do.
+std::vector<float> cells_of_glow(std::uint32_t n, bool hemisphere) {
+  const directional_field domain = hemisphere ? directional_field(wfpg::grid_distribution(nullptr, n), up)
+                                              : directional_field(wfpg::grid_distribution(nullptr, n));
+  std::vector<float> values;
+  for (std::uint32_t i = 0; i < n * n; ++i) {
+    const vec3 d = domain.direction((vec2(float(i % n), float(i / n)) + 0.5f) / float(n));
+    values.push_back(float(glow(d)) * (hemisphere ? glm::dot(d, up) : 1.0f));
+  }
+  return values;
+}
+
+/// What a Lambertian surface reflects of it from each block: probabilities.
+std::vector<double> reflected_glow(const directional_field& field, std::uint32_t p, vec3 normal) {
+  constexpr std::uint32_t n = 32;  // of the midpoint rule, along a block's side
+  std::vector<double> blocks(p * p, 0.0);
+  double sum = 0.0;
+  for (std::uint32_t i = 0; i < p * p * n * n; ++i) {
+    const std::uint32_t x = i % (p * n), y = i / (p * n);
+    const vec3 d = field.direction((vec2(float(x), float(y)) + 0.5f) / float(p * n));
+    const double light = glow(d) * std::max(double(glm::dot(d, normal)), 0.0);
+    blocks[y / n * p + x / n] += light;
+    sum += light;
+  }
+  for (double& block : blocks) block /= sum;
+  return blocks;
+}
+
+/// By how much a product's blocks differ from that: the share of directions that are drawn elsewhere.
+template <class Exec, class Bsdf>
+double misplaced(bool hemisphere, vec3 normal) {
+  constexpr product_size size{32, 8};
+  wfpg::surface<Bsdf> surface;
+  surface.geometric_normal = surface.normal = normal;
+  surface.outgoing = glm::normalize(normal + 0.5f * toward_eye);
+  surface.bsdf.normal = normal;
+  const made_product<Exec, Bsdf> made(Exec(), size, cells_of_glow(size.field, hemisphere), hemisphere,
+                                      surface, 1, 10);
+  std::vector<double> difference = reflected_glow(made.field(), size.product, normal);
+  const std::vector<double> cells = made.cells();
+  constexpr std::uint32_t side = size.field / size.product;
+  for (std::uint32_t i = 0; i < cells.size(); ++i)
+    difference[i / size.field / side * size.product + i % size.field / side] -= cells[i];
+  double sum = 0.0;
+  for (const double d : difference) sum += 0.5 * std::fabs(d);
+  return sum;
+}
+
+WFPG_TEST_CASE("product sampler: the cosine counts once, also where the field has it", "[product_sampler]") {
+  for (const bool hemisphere : {false, true})
+    for (const vec3 normal : {up, glm::normalize(up + vec3(0.4f, 0.0f, -0.3f))}) {
+      const double lambert = misplaced<Exec, test_bsdf>(hemisphere, normal);
+      const double matte = misplaced<Exec, matte_bsdf>(hemisphere, normal);
+      INFO("hemisphere " << hemisphere << ", the field's normal " << (normal == up) << ": misplaced "
+                         << lambert << ", told as matte " << matte);
+      CHECK(lambert < 0.02);
+      CHECK(matte < 0.02);
+    }
+}
+
 }  // namespace
 
 TEST_CASE("product sampler: a default product is empty", "[product_sampler]") {
