@@ -120,6 +120,25 @@ WFPG_TEST_CASE("fields without room, invalidated or without light go on to the b
   }
 }
 
+WFPG_TEST_CASE("fields that wait for their cones are counted in a loaded guide, too", "[guide_file]") {
+  const Exec exec;
+  guider_options options = small_options();
+  options.octree_resolution = 32;
+  options.kept.budget_bytes *= 100;
+  options.kept.max_wave_cones = 3 * 16;  // three births a wave
+  wfpg::path_guider<Exec> first = trained(exec, options, 2);
+  const wfpg::kept_field_statistics counted = first.statistics().kept;
+  REQUIRE(2 * counted.live < counted.capacity);  // no birth was refused for want of a slot
+  REQUIRE(counted.refused > 0);
+  wfpg::path_guider<Exec> second = loaded(exec, saved(first), options);
+  CHECK(second.statistics().kept.refused == counted.refused);
+  CHECK(same_counts(first.statistics(), second.statistics()));
+  CHECK(saved(second) == saved(first));
+  CHECK(trace_paths(exec, second, 3, paths, box_caster()) ==
+        trace_paths(exec, first, 3, paths, box_caster()));
+  CHECK(same_counts(first.statistics(), second.statistics()));
+}
+
 WFPG_TEST_CASE("a guide that not all samples teach any more goes on to the bit", "[guide_file]") {
   const Exec exec;
   guider_options options = small_options();
