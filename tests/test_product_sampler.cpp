@@ -154,6 +154,61 @@ WFPG_TEST_CASE("product sampler: the cosine counts once, also where the field ha
     }
 }
 
+/// Reflects and transmits alike, where a direction lies in the far half of its block; P blocks along a side
+/// of the sphere's square.
+struct half_black_bsdf : test_bsdf {
+  std::uint32_t blocks = 8;
+
+  WFPG_HD bool transmits() const { return true; }
+  WFPG_HD float eval(vec3, vec3 incident) const {
+    const float along = wfpg::sphere_to_square(incident).x * static_cast<float>(blocks);
+    return along - std::floor(along) > 0.5f ? 0.3f : 0.0f;
+  }
+};
+
+WFPG_TEST_CASE("product sampler: a block that is black at one point alone is drawn", "[product_sampler]") {
+  constexpr product_size size{16, 8};
+  wfpg::surface<half_black_bsdf> surface;
+  surface.geometric_normal = surface.normal = up;
+  surface.outgoing = toward_eye;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const made_product<Exec, half_black_bsdf> made(
+        Exec(), size, field_values(field_kind::uniform, size.field, 1), false, surface, seed, 10);
+    std::size_t black = 0;
+    for (const double share : made.cells()) black += share > 0.0 ? 0 : 1;
+    CHECK(black == 0);  // of a block's two points one is in the half that is not
+  }
+}
+
+/// Scatters to both sides of the surface as a Lambertian one does to its own.
+struct two_sided_bsdf : test_bsdf {
+  WFPG_HD bool transmits() const { return true; }
+  WFPG_HD float eval(vec3, vec3 incident) const {
+    return std::fabs(glm::dot(normal, incident)) / (2.0f * wfpg::detail::pi);
+  }
+};
+
+WFPG_TEST_CASE("product sampler: what goes through a surface counts as what it reflects",
+               "[product_sampler]") {
+  constexpr product_size size{32, 8};
+  wfpg::surface<two_sided_bsdf> surface;
+  surface.geometric_normal = surface.normal = surface.bsdf.normal = up;
+  surface.outgoing = toward_eye;
+  const made_product<Exec, two_sided_bsdf> made(Exec(), size, cells_of_glow(size.field, false), false,
+                                                surface, 1, 10);
+  const std::vector<double> cells = made.cells();
+  double drawn = 0.0, below = 0.0, all = 0.0;  // below the surface: of the product, and of the light
+  for (std::uint32_t i = 0; i < cells.size(); ++i) {
+    const vec3 d = made.field().direction((vec2(float(i % size.field), float(i / size.field)) + 0.5f) /
+                                          float(size.field));
+    const double light = glow(d) * std::fabs(double(glm::dot(d, up)));
+    drawn += glm::dot(d, up) < 0.0f ? cells[i] : 0.0;
+    below += glm::dot(d, up) < 0.0f ? light : 0.0;
+    all += light;
+  }
+  CHECK(drawn == Approx(below / all).margin(0.02));
+}
+
 }  // namespace
 
 TEST_CASE("product sampler: a default product is empty", "[product_sampler]") {

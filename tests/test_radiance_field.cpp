@@ -250,4 +250,31 @@ WFPG_TEST_CASE("radiance field: every ray gets a field, above its own horizon wh
   }
 }
 
+float equal_walls(std::uint32_t, float, float) {
+  return 2.0f;
+}
+
+WFPG_TEST_CASE("radiance field: of light everywhere hemispheres carry the cosine, and spheres do not",
+               "[radiance_field]") {
+  const lit_box<Exec> box(equal_walls);
+  auto wave = wall_surfaces(400, 2);
+  for (std::size_t i = 0; i < wave.size(); i += 4) wave[i].bsdf.kind = bsdf_kind::glass;
+  const made_fields made = make_fields(box, wave, guiding_mode::oriented, box_caster{}, 0);
+  for (std::size_t i = 0; i < made.fields.size(); ++i) {
+    const wfpg::grid_distribution grid(made.words.data() + i * wfpg::grid_distribution::words(8), 8);
+    const bool hemisphere = made.fields[i].hemisphere();
+    double high = 0.0, expected = 0.0, all = 0.0;  // above 30 degrees, of all above the horizon
+    for (std::uint32_t cell = 0; cell < 64; ++cell) {
+      const double z = wfpg::square_to_hemisphere_z((vec2(float(cell % 8), float(cell / 8)) + 0.5f) / 8.0f);
+      const double light = hemisphere ? z : 1.0;
+      all += light;
+      if (z <= 0.5) continue;
+      expected += light;
+      high += double(grid.weight(cell % 8, cell / 8)) / double(grid.total());
+    }
+    INFO("hemisphere " << hemisphere);
+    CHECK(high == Approx(expected / all).margin(0.1));  // the filter blurs; the other would be 0.2 away
+  }
+}
+
 }  // namespace

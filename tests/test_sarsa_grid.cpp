@@ -141,6 +141,20 @@ WFPG_TEST_CASE("sarsa grid: light is drawn where it is, by the optimal share", "
   CHECK(shares[3] > 0.5 * shares[2]);  // eps is 1/2 at most
 }
 
+WFPG_TEST_CASE("sarsa grid: of light everywhere samplers of the hemisphere draw the cosine", "[sarsa]") {
+  const Exec exec;
+  const vec3 normal(0.0f, 1.0f, 0.0f);
+  for (const sarsa_sampler sampler : {sarsa_sampler::hemisphere_inversion, sarsa_sampler::rejection}) {
+    const sarsa_guider<Exec> guider = taught(exec, sampler, {spot, 2.0f});  // no spot is so narrow
+    double high = 0.0;
+    for (const drawn_direction& d :
+         evaluate(exec, 20000, draw_directions{guider.guide().view(), normal, false}))
+      high += glm::dot(d.direction, normal) > 0.5f ? 1.0 / 20000.0 : 0.0;
+    INFO(name_of(sampler));
+    CHECK(high == Approx(0.75).margin(0.05));  // 0.5 without the cosine
+  }
+}
+
 WFPG_TEST_CASE("sarsa grid: reruns give the same bits", "[sarsa]") {
   const Exec exec;
   for (const sarsa_update update : sarsa_updates) {
