@@ -247,7 +247,10 @@ TEST_CASE("inspect: what cannot be is named before anything is rendered", "[insp
   CHECK(contains(error({"cornell-box", "--pixel", "0,0", "--max-depth", "1"}), "max_depth is 1"));
   CHECK(contains(error({"nowhere", "--pixel", "0,0"}), "SCENE is nowhere"));
   const std::string file = folder.write("file", "x");
-  CHECK(run({"cornell-box", "--pixel", "0,0", "--size", "8x8", "--spp", "1", "-o", file}).code == 2);
+  const outcome taken = run({"cornell-box", "--pixel", "0,0", "--size", "8x8", "--spp", "1", "-o", file});
+  CHECK(taken.code == 2);
+  CHECK(contains(taken.log, "wfpg-inspect: --output: " + file + " is no folder to write to: "));
+  CHECK_FALSE(contains(taken.log, "learning"));
 }
 
 TEST_CASE("inspect: the octree is an OpenVDB file, or what is missing is said", "[inspect]") {

@@ -5,6 +5,7 @@
 #include "support/measurements.hpp"
 #include "support/renderer_io.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <sstream>
 #include <string>
@@ -152,6 +153,28 @@ TEST_CASE("failures are one message and exit code 2", "[quality]") {
   CHECK(contains(message_of({"--crop", "10,10,16x16"}), "--crop"));
   CHECK(run({"--help"}).code == 0);
   CHECK(run({}).code == 2);
+}
+
+TEST_CASE("folders that cannot be written to and crops are refused before the first sample", "[quality]") {
+  temporary_folder folder;
+  const std::string file = folder.write("file", "x");
+  std::filesystem::create_directories(folder.file("taken/results.md"));
+  const auto message_of = [](const strings& arguments) {
+    const outcome refused = run(arguments);
+    CHECK(refused.code == 2);
+    CHECK(count_of(refused.log, "\n") == 1);
+    return refused.log;
+  };
+  const auto with = [&](const std::string& option, const std::string& value) {
+    strings arguments = tiny(folder);
+    *(std::find(arguments.begin(), arguments.end(), option) + 1) = value;
+    return message_of(arguments);
+  };
+  CHECK(message_of(tiny(folder, {"--crop", "10,10,16x16"})) ==
+        "wfpg-quality: --crop is not within the 16 x 16 pixels of cornell-box\n");
+  CHECK(contains(with("--output", file), "--output: " + file + " is no folder to write to: "));
+  CHECK(contains(with("--cache", file + "/in"), "--cache: " + file + "/in is no folder to write to: "));
+  CHECK(contains(with("--output", folder.file("taken")), "results.md is there and is not a file"));
 }
 
 TEST_CASE("seconds are a budget too", "[quality]") {

@@ -121,8 +121,7 @@ TEST_CASE("PNG: what is written is read again, and what is not is an error", "[r
   CHECK(bytes.substr(1, 3) == "PNG");
   CHECK(bytes.substr(bytes.size() - 8, 4) == "IEND");
   for (const std::string& nowhere : {folder.file("none/a.png"), std::string("/dev/full")})
-    CHECK(contains(error_of([&] { render::write_png(nowhere, grey(4, 3, 0.5f), 1.0f); }),
-                   nowhere + ": cannot be written"));
+    CHECK(contains(error_of([&] { render::write_png(nowhere, grey(4, 3, 0.5f), 1.0f); }), nowhere));
 }
 
 TEST_CASE("The sRGB curve goes both ways", "[renderer][png]") {

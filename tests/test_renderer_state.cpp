@@ -1,6 +1,7 @@
 // Renderings that are interrupted and go on, and guides that renderings leave to one another.
 #include "builtin_scenes.hpp"
 #include "interruption.hpp"
+#include "output_files.hpp"
 #include "render.hpp"
 #include "render_state.hpp"
 #include "scene_checksum.hpp"
@@ -85,11 +86,11 @@ TEST_CASE("a rendering that is stopped and goes on gives the picture of one that
       const render_result first = stopped(world, options, 3);
       CHECK((first.is_stopped && first.report.spp == 3));
       options.resume = folder.file("state");
-      write_bytes(options.resume, first.state);
+      render::write_file(options.resume, first.state);
       options.where = where == device::cpu ? device::seq : device::cpu;
       const render_result second = stopped(world, options, 4);
       CHECK((second.is_stopped && second.report.spp == 7));
-      write_bytes(options.resume, second.state);
+      render::write_file(options.resume, second.state);
       options.where = where;
       const render_result third = render::render(world, options, {});
       CHECK((!third.is_stopped && third.report.spp == 11));
@@ -113,7 +114,7 @@ TEST_CASE("a rendering that is complete goes on to more samples, and has nothing
   options.keep_state = true;
   const render_result part = render::render(world, options, {});
   options.resume = folder.file("state");
-  write_bytes(options.resume, part.state);
+  render::write_file(options.resume, part.state);
   const render_result again = render::render(world, options, {});
   CHECK(again.report.spp == 4);
   CHECK(same_bits(again.picture, part.picture));
@@ -153,7 +154,7 @@ TEST_CASE("a rendering does not go on as another one", "[renderer][state]") {
   const render_options options = small({"ajar"}, 5);
   const render_result part = stopped(world, options, 2);
   const std::string path = folder.file("state");
-  write_bytes(path, part.state);
+  render::write_file(path, part.state);
   const auto refused = [&](const std::string& difference, auto change) {
     render_options other = options;
     other.resume = path;
@@ -249,7 +250,7 @@ TEST_CASE("a rendering begins with the guide of another one", "[renderer][state]
     const render_result cold = render::render(world, options, {});
     CHECK(cold.report.cones_per_segment == 0.0);
     options.load_guide = folder.file("guide");
-    write_bytes(options.load_guide, teacher.guide);
+    render::write_file(options.load_guide, teacher.guide);
     CHECK(combination_of(options) == wfpg::sample_combination::constant);
     const render_result warm = render::render(world, options, {});
     CHECK(warm.report.spp == 1);
@@ -260,7 +261,7 @@ TEST_CASE("a rendering begins with the guide of another one", "[renderer][state]
 
     options.spp = 5;
     const render_result whole = render::render(world, options, {});
-    write_bytes(folder.file("state"), stopped(world, options, 2).state);
+    render::write_file(folder.file("state"), stopped(world, options, 2).state);
     render_options rest = options;
     rest.load_guide.clear();
     rest.resume = folder.file("state");

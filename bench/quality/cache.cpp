@@ -1,7 +1,7 @@
 // Files of the cache.
 #include "cache.hpp"
 
-#include <unistd.h>
+#include "output_files.hpp"
 
 #include <ostream>
 #include <stdexcept>
@@ -12,7 +12,7 @@ namespace quality {
 namespace fs = std::filesystem;
 
 run_cache::run_cache(fs::path directory, std::ostream& log) : directory_(std::move(directory)), log_(log) {
-  fs::create_directories(directory_);
+  render::prepare_folder("--cache", directory_);
 }
 
 fs::path run_cache::path_of(const run_key& key, const char* extension) const {
@@ -32,13 +32,9 @@ cache_entry run_cache::load(const run_key& key) const {
 }
 
 void run_cache::store(const run_key& key, const cache_entry& entry) const {
-  if (entry.picture) {
-    const fs::path unfinished = picture_path(key).string() + ".part" + std::to_string(getpid());
-    render::write_exr(unfinished.string(), *entry.picture);
-    fs::rename(unfinished, picture_path(key));
-  }
+  if (entry.picture) render::write_exr(picture_path(key).string(), *entry.picture);
   const json file{{"key", key.content}, {"has_picture", entry.picture.has_value()}, {"result", entry.result}};
-  write_whole(path_of(key, ".json"), file.dump(1) + "\n");
+  render::write_file(path_of(key, ".json").string(), file.dump(1) + "\n");
 }
 
 void run_cache::warn(const run_key& key, const std::string& reason) const {

@@ -29,8 +29,8 @@ struct cache_entry {
 /// when it is complete; the JSON is last. One that is damaged is warned of and counts as absent.
 class run_cache {
  public:
-  /// Makes the directory. Warnings go to `log`, which outlives the cache. Throws
-  /// std::filesystem::filesystem_error.
+  /// Makes the directory. Warnings go to `log`, which outlives the cache. Throws std::invalid_argument where
+  /// files cannot be made in it.
   run_cache(std::filesystem::path directory, std::ostream& log);
 
   /// Whether it looks finished; find may still see damage.

@@ -8,6 +8,8 @@
 #include "summary.hpp"
 #include "tiles.hpp"
 
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 namespace quality {
@@ -106,6 +108,15 @@ json single_json(const settings& given, const std::vector<single_samples>& singl
   return object;
 }
 
+void check_crop(const settings& given, const scene_choice& scene) {
+  if (!given.crop) return;
+  const window& w = *given.crop;
+  const render::render_options& options = scene.options;
+  if (w.left + w.width > options.width || w.top + w.height > options.height)
+    throw std::invalid_argument("--crop is not within the " + std::to_string(options.width) + " x " +
+                                std::to_string(options.height) + " pixels of " + scene.title);
+}
+
 }  // namespace
 
 std::vector<planned_run> scene_plan::all() const {
@@ -118,6 +129,7 @@ std::vector<planned_run> scene_plan::all() const {
 }
 
 scene_plan plan_scene(const settings& given, const scene_choice& scene) {
+  check_crop(given, scene);
   scene_plan plan{scene, identity_of(scene), {}, {}, {}};
   plan.reference = plan_reference(scene, plan.identity, given.reference_spp, given.reference_chunk);
   const std::string hash = plan.reference.hash();

@@ -27,7 +27,7 @@ struct scene_plan {
   std::vector<planned_run> all() const;
 };
 
-/// `scene` is complete.
+/// `scene` is complete. Throws std::invalid_argument where a crop is not within its pictures.
 scene_plan plan_scene(const settings& given, const scene_choice& scene);
 
 /// Does what is planned, writes pictures and plots to the output directory, and returns what results.json

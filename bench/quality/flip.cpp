@@ -1,6 +1,7 @@
 // The script flip.py, which the build embeds, and what it answers.
 #include "flip.hpp"
 
+#include "output_files.hpp"
 #include "system.hpp"
 
 #include <unistd.h>
@@ -49,8 +50,8 @@ std::optional<std::vector<std::optional<double>>> flip_errors(
   json list = json::array();
   for (const auto& [reference, test] : pairs)
     list.push_back({fs::absolute(reference).string(), fs::absolute(test).string()});
-  write_whole(files.file(".py"), flip_script);
-  write_whole(files.file(".pairs.json"), list.dump());
+  render::write_file(files.file(".py").string(), flip_script);
+  render::write_file(files.file(".pairs.json").string(), list.dump());
   if (!output_of("python3 " + quoted(files.file(".py")) + " " + quoted(files.file(".pairs.json")) + " " +
                  quoted(files.file(".errors.json"))))
     return std::nullopt;

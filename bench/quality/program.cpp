@@ -4,6 +4,7 @@
 #include "builtin_scenes.hpp"
 #include "comparison.hpp"
 #include "markdown.hpp"
+#include "output_files.hpp"
 #include "summary.hpp"
 
 #include <CLI/CLI.hpp>
@@ -55,12 +56,14 @@ json describe(const settings& given) {
 }
 
 void write_results(const settings& given, const json& results) {
-  write_whole(given.output / "results.json", results.dump(1) + "\n");
-  write_whole(given.output / "results.md", markdown_of(results));
+  render::write_file((given.output / "results.json").string(), results.dump(1) + "\n");
+  render::write_file((given.output / "results.md").string(), markdown_of(results));
 }
 
 void measure_all(const settings& given, std::ostream& log) {
-  std::filesystem::create_directories(given.output);
+  render::prepare_folder("--output", given.output);
+  render::check_outputs({{"--output", (given.output / "results.json").string(), ""},
+                         {"--output", (given.output / "results.md").string(), ""}});
   const run_cache cache(given.cache, log);
   try_methods(given);
   const std::vector<scene_plan> plans = plan_scenes(given, log);
@@ -88,7 +91,7 @@ int run_program(const std::vector<std::string>& arguments, std::ostream& out, st
   try {
     if (const std::optional<settings> given = parse_settings(arguments, out)) measure_all(*given, log);
   } catch (const std::exception& error) {
-    log << "wfpg-quality: " << error.what() << '\n';
+    log << "wfpg-quality: " << render::reason_of(error) << '\n';
     return failure;
   }
   return 0;

@@ -4,7 +4,6 @@
 #include "pictures.hpp"
 
 #include <map>
-#include <stdexcept>
 
 namespace quality {
 namespace {
@@ -84,13 +83,7 @@ std::vector<render::image> scene_files::pictures_of(const std::vector<measured_r
 
 window scene_files::crop_window(const std::vector<measured_run>& runs) const {
   const int width = truth_.picture.width, height = truth_.picture.height;
-  if (given_.crop) {
-    const window& w = *given_.crop;
-    if (w.left + w.width > width || w.top + w.height > height)
-      throw std::invalid_argument("--crop is not within the " + std::to_string(width) + " x " +
-                                  std::to_string(height) + " pixels of " + scene_.title);
-    return w;
-  }
+  if (given_.crop) return *given_.crop;
   const render::image picture = pictures_of(runs, 0)[baseline_of(given_.methods)];
   return worst_window(render::reinhard_errors(picture, truth_.picture), width, height);
 }

@@ -1,12 +1,9 @@
 // Hashes, files, processes, the machine.
 #include "system.hpp"
 
-#include "whole_file.hpp"
-
 #include <wfpg/version.hpp>
 
 #include <sys/utsname.h>
-#include <unistd.h>
 
 #include <cstdint>
 #include <cstdio>
@@ -65,12 +62,6 @@ std::string content_of(const std::filesystem::path& path) {
   std::string content((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   if (file.bad()) throw std::runtime_error(path.string() + ": cannot be read");
   return content;
-}
-
-void write_whole(const std::filesystem::path& path, const std::string& content) {
-  const std::string unfinished = path.string() + ".part" + std::to_string(getpid());
-  render::write_whole_file(unfinished, content);
-  std::filesystem::rename(unfinished, path);
 }
 
 std::optional<std::string> output_of(const std::string& command) {

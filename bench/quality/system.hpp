@@ -17,10 +17,6 @@ std::string hash_of(const std::string& bytes);
 /// All bytes of a file. Throws std::runtime_error that names the path.
 std::string content_of(const std::filesystem::path& path);
 
-/// Writes to another name, then renames: a reader finds all of it or nothing. Throws std::runtime_error that
-/// names the path.
-void write_whole(const std::filesystem::path& path, const std::string& content);
-
 /// What a shell command prints, or nothing where it fails.
 std::optional<std::string> output_of(const std::string& command);
 

@@ -5,9 +5,9 @@
 #include "octree_pictures.hpp"
 #include "octree_vdb.hpp"
 #include "option_names.hpp"
+#include "output_files.hpp"
 #include "page.hpp"
 #include "progress_bar.hpp"
-#include "whole_file.hpp"
 
 #include <wfpg/error.hpp>
 
@@ -29,6 +29,14 @@ void check(const inspection& asked) {
   require(asked.reference_spp >= 2, "reference_spp", asked.reference_spp, "at least 2");
   require(asked.histogram >= 1, "histogram", asked.histogram, "at least 1");
   if (!asked.vdb.empty()) require_vdb();
+}
+
+/// Makes the page's folder, and checks that files can be written before there is anything to write.
+void check_files(const inspection& asked) {
+  render::prepare_folder("--output", asked.output);
+  render::check_outputs({{"--output", (asked.output / "index.html").string(), ""},
+                         {"--output", (asked.output / "numbers.json").string(), ""},
+                         {"--vdb", asked.vdb, ""}});
 }
 
 /// A bar for one stage.
@@ -180,7 +188,7 @@ std::string note_of(const learnt_scene& learnt, std::uint32_t pixel) {
 }
 
 void write_numbers(const picture_folder& folder, const json& numbers) {
-  render::write_whole_file((folder.path() / "numbers.json").string(), numbers.dump(2) + '\n');
+  render::write_file((folder.path() / "numbers.json").string(), numbers.dump(2) + '\n');
 }
 
 }  // namespace
@@ -189,7 +197,7 @@ void run(const render::scene& scene, const inspection& asked_of, std::ostream& l
   inspection asked = asked_of;
   asked.learning = render::completed(scene, asked.learning);
   check(asked);
-  std::filesystem::create_directories(asked.output);
+  check_files(asked);
   log << "wfpg-inspect: learning\n";
   const learnt_scene learnt(scene, asked.learning, shown_progress().callback());
   const auto pixel = static_cast<std::uint32_t>(asked.y * asked.learning.width + asked.x);

@@ -21,9 +21,9 @@ struct inspection {
 };
 
 /// Writes pictures, numbers.json and index.html into the output folder, which is made. Stages and warnings go
-/// to `log`, progress to stderr. Throws std::invalid_argument for what cannot be right, a pixel outside of
-/// the picture among it, before anything is rendered; what render::render throws; std::runtime_error where a
-/// file cannot be written.
+/// to `log`, progress to stderr. Throws std::invalid_argument for what cannot be right, such as a pixel
+/// outside of the picture or a folder that cannot be written to, before anything is rendered; what
+/// render::render throws; std::runtime_error where a file cannot be written.
 void run(const render::scene& scene, const inspection& asked, std::ostream& log);
 
 }  // namespace inspect

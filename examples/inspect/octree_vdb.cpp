@@ -1,11 +1,14 @@
 // Leaves into grids.
 #include "octree_vdb.hpp"
 
+#include <wfpg/detail/section_file.hpp>
 #include <wfpg/spatial_binner.hpp>
 
+#include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
+#include <ostream>
 #include <stdexcept>
 #include <vector>
 
@@ -65,9 +68,8 @@ void require_vdb() {}
 void write_vdb(const learnt_scene& learnt, const std::string& path) {
   openvdb::initialize();
   try {
-    openvdb::io::File file(path);
-    file.write(grids_of(learnt));
-    file.close();
+    wfpg::detail::replace_file(path,
+                               [&](std::ostream& out) { openvdb::io::Stream(out).write(grids_of(learnt)); });
   } catch (const openvdb::Exception& error) {
     throw std::runtime_error(path + ": cannot be written: " + error.what());
   }

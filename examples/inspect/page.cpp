@@ -1,7 +1,7 @@
 // HTML by hand; pictures are in it as base64 (RFC 4648).
 #include "page.hpp"
 
-#include "whole_file.hpp"
+#include "output_files.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -108,10 +108,10 @@ void write_page(const picture_folder& folder, const page& shown) {
       body += std::string(f.starts_row ? "<br>" : "") + "<figure>" + embedded(folder, f.file, f.caption) +
               "<figcaption>" + escaped(f.caption) + "</figcaption></figure>\n";
   }
-  render::write_whole_file((folder.path() / "index.html").string(),
-                           "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"><title>" +
-                               escaped(shown.title) + "</title><style>" + style +
-                               "</style></head>\n<body>\n" + body + "</body>\n</html>\n");
+  render::write_file((folder.path() / "index.html").string(),
+                     "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"><title>" +
+                         escaped(shown.title) + "</title><style>" + style + "</style></head>\n<body>\n" +
+                         body + "</body>\n</html>\n");
 }
 
 }  // namespace inspect

@@ -2,6 +2,7 @@
 #include "program.hpp"
 
 #include "inspection.hpp"
+#include "output_files.hpp"
 #include "render_arguments.hpp"
 
 #include <CLI/CLI.hpp>
@@ -63,6 +64,7 @@ void inspect_scene(arguments& given, std::ostream& out, std::ostream& log) {
 int run_program(int argc, const char* const* argv, std::ostream& out, std::ostream& log) {
   arguments given;
   CLI::App app{"Shows the field that guides a pixel's samples, beside the light that arrives there."};
+  render::report_in_one_line(app, "wfpg-inspect");
   add_options(app, given);
   try {
     app.parse(argc, argv);
@@ -74,7 +76,7 @@ int run_program(int argc, const char* const* argv, std::ostream& out, std::ostre
     inspect_scene(given, out, log);
     return 0;
   } catch (const std::exception& error) {
-    log << "wfpg-inspect: " << error.what() << '\n';
+    log << "wfpg-inspect: " << render::reason_of(error) << '\n';
     return failure;
   }
 }

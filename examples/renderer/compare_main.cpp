@@ -1,6 +1,7 @@
 // wfpg-compare: prints how far a picture is from a reference. Exit code 0, or 2 with a message on failure.
 #include "image_io.hpp"
 #include "metrics.hpp"
+#include "render_arguments.hpp"
 #include "stats_json.hpp"
 
 #include <CLI/CLI.hpp>
@@ -34,6 +35,7 @@ int main(int argc, char** argv) {
   std::string test, reference;
   bool json = false;
   CLI::App app{"Prints the error of a picture against a reference of the same size."};
+  render::report_in_one_line(app, "wfpg-compare");
   app.add_option("A", test, "the picture to judge, OpenEXR")->required();
   app.add_option("REF", reference, "the reference, OpenEXR")->required();
   app.add_flag("--json", json, "print one JSON object; an infinite error is null");

@@ -4,10 +4,10 @@
 #include "builtin_scenes.hpp"
 #include "image_io.hpp"
 #include "metrics.hpp"
+#include "output_files.hpp"
 #include "plot.hpp"
 #include "progress_bar.hpp"
 #include "render.hpp"
-#include "whole_file.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -218,7 +218,7 @@ nlohmann::ordered_json run_scene(const demo_scene& demo, const demo_device& on,
 }
 
 void run(const std::filesystem::path& directory, const demo_device& on) {
-  std::filesystem::create_directories(directory);
+  render::prepare_folder("DIRECTORY", directory);
   nlohmann::ordered_json summary = nlohmann::ordered_json::array();
   for (const demo_scene& demo : demo_scenes) summary.push_back(run_scene(demo, on, directory));
 
@@ -237,7 +237,7 @@ void run(const std::filesystem::path& directory, const demo_device& on) {
       "were made. cones: a path segment. Pictures, left to right %sreference,\n"
       "and plots of error over time: %s\n",
       shown.c_str(), directory.string().c_str());
-  render::write_whole_file((directory / "summary.json").string(), summary.dump(2) + '\n');
+  render::write_file((directory / "summary.json").string(), summary.dump(2) + '\n');
 }
 
 }  // namespace

@@ -2,11 +2,14 @@
 // the path in front.
 #include "image_io.hpp"
 
-#include "whole_file.hpp"
+#include "output_files.hpp"
+
+#include <wfpg/detail/section_file.hpp>
 
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfIO.h>
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <stb_image.h>
@@ -17,6 +20,7 @@
 #include <cstdint>
 #include <fstream>
 #include <memory>
+#include <ostream>
 #include <stdexcept>
 #include <string>
 
@@ -79,6 +83,20 @@ image read_exr_pixels(const std::string& path) {
   return picture;
 }
 
+/// A stream as OpenEXR writes to it. It throws nothing, since OpenEXR's destructors write too: who has the
+/// stream asks it at the end.
+class exr_stream : public Imf::OStream {
+ public:
+  exr_stream(std::ostream& out, const std::string& path) : Imf::OStream(path.c_str()), out_(out) {}
+
+  void write(const char bytes[], int size) override { out_.write(bytes, size); }
+  std::uint64_t tellp() override { return static_cast<std::uint64_t>(std::streamoff(out_.tellp())); }
+  void seekp(std::uint64_t at) override { out_.seekp(static_cast<std::streamoff>(at)); }
+
+ private:
+  std::ostream& out_;
+};
+
 /// A file as stb_image reads it, which takes what is missing at its end for zeros: that it asked for more is
 /// noted.
 struct noted_file {
@@ -111,6 +129,19 @@ image read_hdr(const std::string& path) {
   for (std::size_t i = 0; i < picture.pixels.size(); ++i)
     picture.pixels[i] = {pixels.get()[3 * i], pixels.get()[3 * i + 1], pixels.get()[3 * i + 2]};
   return picture;
+}
+
+void write_exr_pixels(std::ostream& out, const std::string& path, const image& picture) {
+  require_consistent(picture);
+  Imf::Header header(picture.width, picture.height);
+  for (const char* name : channel_names) header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+  const Imath::Box2i window = header.dataWindow();
+  // The frame buffer's type has no const; an output file only reads from it.
+  float* first = const_cast<float*>(&picture.pixels[0].x);
+  exr_stream stream(out, path);
+  Imf::OutputFile file(stream, header);
+  file.setFrameBuffer(frame_buffer(first, window));
+  file.writePixels(picture.height);
 }
 
 std::string encoded_png(const image& picture, float exposure) {
@@ -160,18 +191,14 @@ environment_map read_environment(const std::string& path) try {
   throw with_path(path, reason);
 }
 
-void write_exr(const std::string& path, const image& picture) try {
-  require_consistent(picture);
-  Imf::Header header(picture.width, picture.height);
-  for (const char* name : channel_names) header.channels().insert(name, Imf::Channel(Imf::FLOAT));
-  const Imath::Box2i window = header.dataWindow();
-  // The frame buffer's type has no const; an output file only reads from it.
-  float* first = const_cast<float*>(&picture.pixels[0].x);
-  Imf::OutputFile file(path.c_str(), header);
-  file.setFrameBuffer(frame_buffer(first, window));
-  file.writePixels(picture.height);
-} catch (const std::exception& reason) {
-  throw with_path(path, reason);
+void write_exr(const std::string& path, const image& picture) {
+  wfpg::detail::replace_file(path, [&](std::ostream& out) {
+    try {
+      write_exr_pixels(out, path, picture);
+    } catch (const std::exception& reason) {
+      throw with_path(path, reason);
+    }
+  });
 }
 
 void write_png(const std::string& path, const image& picture, float exposure) {
@@ -181,7 +208,7 @@ void write_png(const std::string& path, const image& picture, float exposure) {
   } catch (const std::exception& reason) {
     throw with_path(path, reason);
   }
-  write_whole_file(path, encoded);
+  write_file(path, encoded);
 }
 
 image side_by_side(const std::vector<image>& pictures, int gap) {

@@ -26,11 +26,13 @@ image read_exr(const std::string& path);
 /// std::runtime_error that names the path and the reason, also of radiance that is negative or not finite.
 environment_map read_environment(const std::string& path);
 
-/// Writes R, G and B as 32-bit float. Throws std::runtime_error that names the path and the reason.
+/// Replaces a file by an OpenEXR picture, R, G and B as 32-bit float; a failure leaves the old file. Throws
+/// std::runtime_error that names the path and the reason.
 void write_exr(const std::string& path, const image& picture);
 
-/// Writes 8-bit sRGB: values times `exposure`, clamped to [0, 1], through the sRGB curve. NaN becomes black.
-/// Throws std::runtime_error that names the path and the reason.
+/// Replaces a file by a PNG picture, 8-bit sRGB: values times `exposure`, clamped to [0, 1], through the sRGB
+/// curve. NaN becomes black. A failure leaves the old file. Throws std::runtime_error that names the path and
+/// the reason.
 void write_png(const std::string& path, const image& picture, float exposure = 1.0f);
 
 /// Pictures from left to right with `gap` >= 0 white columns between them; lower ones are filled up in white.

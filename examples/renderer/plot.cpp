@@ -1,7 +1,7 @@
 // SVG by hand: a frame, decades as grid lines, curves with their names at their ends.
 #include "plot.hpp"
 
-#include "whole_file.hpp"
+#include "output_files.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -174,7 +174,7 @@ void write_svg(const std::string& path, const plot& drawn) {
   for (std::size_t i = 0; i < drawn.curves.size(); ++i)
     svg << draw(drawn.curves[i], x, y, colours[i % (sizeof colours / sizeof colours[0])], labels);
   svg << draw(std::move(labels)) << "</svg>\n";
-  write_whole_file(path, svg.str());
+  write_file(path, svg.str());
 }
 
 }  // namespace render

@@ -82,6 +82,12 @@ void add_records_options(CLI::App& app, wfpg::irradiance_records_options& option
 
 }  // namespace
 
+void report_in_one_line(CLI::App& app, const std::string& program) {
+  app.failure_message([program](const CLI::App*, const CLI::Error& error) {
+    return program + ": " + error.what() + "; --help lists the options\n";
+  });
+}
+
 void add_scene_options(CLI::App& app, scene_arguments& given) {
   app.add_option("SCENE", given.name, "a .glb or .gltf file, or one of: " + listed_builtin_scenes())
       ->required();

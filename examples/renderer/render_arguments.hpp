@@ -18,6 +18,9 @@ struct scene_arguments {
   std::string name, environment;  ///< the environment's file: in place of the scene's own where there is one
 };
 
+/// Errors of the command line become one line, "PROGRAM: MESSAGE".
+void report_in_one_line(CLI::App& app, const std::string& program);
+
 /// Options that write to their last argument, which outlives the parsing; what is not given keeps its value.
 void add_scene_options(CLI::App& app, scene_arguments& given);  ///< SCENE, --environment
 void add_method_options(CLI::App& app,

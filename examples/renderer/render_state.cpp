@@ -151,8 +151,4 @@ render_state read_state(const std::string& path, const scene& scene, const rende
                                  [&](std::istream& in) { return read_state(in, path, scene, options); });
 }
 
-void write_bytes(const std::string& path, const std::string& bytes) {
-  wfpg::detail::replace_file(path, [&](std::ostream& out) { out << bytes; });
-}
-
 }  // namespace render

@@ -42,7 +42,4 @@ render_state read_state(const std::string& path, const scene& scene, const rende
 render_state read_state(std::istream& in, const std::string& name, const scene& scene,
                         const render_options& options);
 
-/// Writes a file under a temporary name beside it, and renames it. Throws wfpg::file_error.
-void write_bytes(const std::string& path, const std::string& bytes);
-
 }  // namespace render

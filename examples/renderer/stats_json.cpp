@@ -1,7 +1,7 @@
 // Reports to JSON.
 #include "stats_json.hpp"
 
-#include "whole_file.hpp"
+#include "output_files.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -78,7 +78,7 @@ void write_stats(const std::string& path, const render_report& report,
   stats["cones_per_segment"] = report.cones_per_segment;
   if (error) stats["error"] = to_json(*error);
 
-  write_whole_file(path, stats.dump(2) + '\n');
+  write_file(path, stats.dump(2) + '\n');
 }
 
 }  // namespace render

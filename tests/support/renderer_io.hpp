@@ -16,6 +16,7 @@ namespace render_test {
 using render::scene;
 using render::vec3;
 using wfpg_test::content_of;
+using wfpg_test::files_in;
 using wfpg_test::temporary_folder;
 
 inline bool contains(const std::string& text, const std::string& part) {
