@@ -246,6 +246,14 @@ TEST_CASE("inspect: what cannot be is named before anything is rendered", "[insp
   CHECK(contains(error({"cornell-box", "--pixel", "0,0", "--device", "seq"}), "device is seq, expected cpu"));
   CHECK(contains(error({"cornell-box", "--pixel", "0,0", "--max-depth", "1"}), "max_depth is 1"));
   CHECK(contains(error({"nowhere", "--pixel", "0,0"}), "SCENE is nowhere"));
+  CHECK(error({"cornell-box", "--pixel", "0,0", "--reference-spp", "1"}) ==
+        "wfpg-inspect: --reference-spp: expected a whole number from 2 to 16777216, not 1; --help lists the "
+        "options\n");
+  CHECK(contains(error({"cornell-box", "--pixel", "0,0", "--histogram", "0"}),
+                 "--histogram: expected a whole number from 1 to 1073741824, not 0"));
+  CHECK(contains(error({"cornell-box", "--pixel", "0,0", "--vdb", ""}), "--vdb: expected a path"));
+  CHECK(contains(error({"cornell-box", "--pixel", "0,0", "--fields", "transient", "--recast", "4"}),
+                 "--recast requires --fields kept"));
   const std::string file = folder.write("file", "x");
   const outcome taken = run({"cornell-box", "--pixel", "0,0", "--size", "8x8", "--spp", "1", "-o", file});
   CHECK(taken.code == 2);

@@ -8,6 +8,7 @@
 
 #include <sstream>
 #include <string>
+#include <vector>
 
 namespace {
 
@@ -105,6 +106,48 @@ TEST_CASE("options: what cannot be right is said", "[quality]") {
        {"--preset", "--scenes", "--methods", "--method", "--spp", "--seconds", "--seeds", "--size",
         "--reference-spp", "--nee", "--device", "--per-sample", "--cache"})
     CHECK(contains(out.str(), option));
+}
+
+TEST_CASE("options: values out of range are refused by a line that names the range", "[quality]") {
+  struct refusal {
+    strings arguments;
+    std::string message;
+  };
+  const std::string seeds = "a whole number from 1 to 1000000", spp = "a whole number from 1 to 1073741824";
+  for (const refusal& one : std::vector<refusal>{
+           {{"--seeds", "1000001"}, "--seeds: expected " + seeds + ", not 1000001"},
+           {{"--seeds", "-1"}, "--seeds: expected " + seeds + ", not -1"},
+           {{"--seeds", "2.5"}, "--seeds: expected " + seeds + ", not 2.5"},
+           {{"--spp", "4,0"}, "--spp: expected " + spp + ", not 0"},
+           {{"--spp", "0x10"}, "--spp: expected " + spp + ", not 0x10"},
+           {{"--seconds", "1,0"}, "--seconds: expected a number above 0, up to 1e+09, not 0"},
+           {{"--seconds", "nan"}, "--seconds: expected a number above 0, up to 1e+09, not nan"},
+           {{"--exposure", "nan"}, "--exposure: expected a number above 0, up to 1e+30, not nan"},
+           {{"--per-sample", "1"}, "--per-sample: expected a whole number from 2 to 1048576, not 1"},
+           {{"--reference-spp", "1"}, "--reference-spp: expected a whole number from 2 to 1073741824, not 1"},
+           {{"--reference-chunk", "0"}, "--reference-chunk: expected " + spp + ", not 0"},
+           {{"--reference-chunk", "1", "--reference-spp", "4000000"},
+            "--reference-chunk: expected at least 2 for --reference-spp 4000000, not 1"},
+           {{"--cache", ""}, "--cache: expected a path, not nothing"},
+           {{"--crop", "-1,2,3x4"},
+            "--crop is -1,2,3x4, expected LEFT,TOP,WIDTHxHEIGHT within the picture, such as 16,32,64x64"},
+           {{"--spp", "4,8,04"}, "two budgets are 4 samples"},
+           {{"--seeds", "10", "--method", "a=--method pt --seed 999995"},
+            "method a: --seed and --seeds are more than 1000000 together"},
+           {{"--method", "a=--method pt --seed -1"},
+            "method a \"--method pt --seed -1\": --seed: expected a whole number from 0 to 999999, not -1"},
+           {{"--method", "a=--method wfpg --field-budget -5M"},
+            "method a \"--method wfpg --field-budget -5M\": --field-budget: expected bytes from 0 to 1TiB, "
+            "such "
+            "as 24MiB, not -5M"},
+           {{"--method", "a=--fields transient --recast 4"},
+            "method a \"--fields transient --recast 4\": --recast requires --fields kept"}})
+    CHECK(refused(one.arguments) == one.message);
+  CHECK(parsed({"--seeds", "010", "--spp", "010"}).budgets[0].spp == 10);
+  CHECK(parsed({"--reference-chunk", "2", "--reference-spp", "4000000"}).reference_chunk == 2);
+  CHECK(parsed({"--seeds", "5", "--method", "a=--method pt --seed 999995"}).seeds == 5);
+  // A method that chooses lights may be measured in a scene without next-event estimation too.
+  CHECK(parsed({"--scenes", "ajar", "cornell-box --nee off", "--method", "a=--light-groups 4"}).seeds == 3);
 }
 
 TEST_CASE("options: a method may have seeds of its own", "[quality]") {

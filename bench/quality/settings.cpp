@@ -1,6 +1,7 @@
 // The command line and its presets.
 #include "settings.hpp"
 
+#include "number_options.hpp"
 #include "render_arguments.hpp"
 
 #include <CLI/CLI.hpp>
@@ -58,6 +59,9 @@ const std::vector<method> known_methods = {
     {"paper", "--method wfpg " + paper_arguments},
     {"paper-product", "--method wfpg-product --product-resolution 8 " + paper_arguments}};
 
+/// Those of references are above.
+constexpr int most_seeds = 1000000;
+
 /// The command line as it is written.
 struct given_arguments {
   std::string preset = "standard";
@@ -97,43 +101,47 @@ void add_measured(CLI::App& app, given_arguments& given) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   app.add_option("--spp", given.spp, "samples a pixel, a list")
       ->delimiter(',')
-      ->check(CLI::Range(1, 1 << 30));
+      ->transform(render::whole_number(1, 1 << 30));
   app.add_option("--seconds", given.seconds, "budgets in seconds, a list; with --spp both")
       ->delimiter(',')
-      ->check(CLI::PositiveNumber);
+      ->transform(render::positive_number(1.0e9));
   app.add_option("--seeds", given.seeds, "renderings of each, of other random numbers")
-      ->check(CLI::Range(1, 1 << 20));
+      ->transform(render::whole_number(1, most_seeds));
   app.add_option("--per-sample", given.per_sample,
                  "measure each of the first N samples alone too, and each --combine of wfpg-render; N "
                  "pictures in memory")
-      ->check(CLI::Range(2, 1 << 20));
+      ->transform(render::whole_number(2, 1 << 20));
 }
 
 void add_references_and_files(CLI::App& app, given_arguments& given) {
   app.add_option("--reference-spp", given.reference_spp,
                  "samples of a reference, half by path tracing and half guided")
-      ->check(CLI::Range(2, 1 << 30));
+      ->transform(render::whole_number(2, 1 << 30));
   app.add_option("--reference-chunk", given.reference_chunk,
                  "samples after which a reference in the making is saved (default: 256)")
-      ->check(CLI::Range(1, 1 << 30));
+      ->transform(render::whole_number(1, 1 << 30));
   app.add_option("--output", given.output, "directory of results.json, results.md, pictures and plots")
+      ->transform(render::file_path())
       ->required();
   app.add_option(
-      "--cache", given.cache,
-      "directory of references and finished runs, which a rerun reads (default: wfpg-quality-cache)");
+         "--cache", given.cache,
+         "directory of references and finished runs, which a rerun reads (default: wfpg-quality-cache)")
+      ->transform(render::file_path());
   app.add_option("--crop", given.crop,
                  "LEFT,TOP,WIDTHxHEIGHT of crops (default: where pt's error is greatest)");
   app.add_option("--exposure", given.exposure, "multiplies pictures' values (default: from the reference)")
-      ->check(CLI::PositiveNumber);
+      ->transform(render::positive_number(1.0e30));
 }
 
 window parse_window(const std::string& text) {
   window w;
   char end = 0;
-  if (std::sscanf(text.c_str(), "%6d,%6d,%6dx%6d%c", &w.left, &w.top, &w.width, &w.height, &end) != 4 ||
-      w.left < 0 || w.top < 0 || w.width <= 0 || w.height <= 0)
+  const bool is_window =
+      std::sscanf(text.c_str(), "%6d,%6d,%6dx%6d%c", &w.left, &w.top, &w.width, &w.height, &end) == 4 &&
+      text.find_first_not_of("0123456789,x") == std::string::npos;
+  if (!is_window || w.width == 0 || w.height == 0)
     throw std::invalid_argument("--crop is " + text +
-                                ", expected LEFT,TOP,WIDTHxHEIGHT, such as 16,32,64x64");
+                                ", expected LEFT,TOP,WIDTHxHEIGHT within the picture, such as 16,32,64x64");
   return w;
 }
 
@@ -155,7 +163,7 @@ scene_choice parse_scene(const std::string& text, const render::render_options& 
   if (!fs::is_regular_file(text)) {
     CLI::App app;
     app.add_option("SCENE", scene.source)->required();
-    app.add_option("--environment", scene.environment);
+    app.add_option("--environment", scene.environment)->transform(render::file_path());
     render::add_nee_option(app, scene.options);
     render::add_picture_options(app, scene.options);
     parse_part(app, "scene", text);
@@ -221,6 +229,20 @@ std::string quoted(const std::vector<std::string>& arguments) {
   return result;
 }
 
+/// Two of one name would write the same files.
+void check_budgets(const settings& given) {
+  std::set<std::string> names;
+  for (const budget& allowed : given.budgets)
+    if (!names.insert(title_of(allowed)).second)
+      throw std::invalid_argument("two budgets are " + title_of(allowed));
+  const int half = given.reference_spp - given.reference_spp / 2;
+  if ((half - 1) / given.reference_chunk >= most_seeds)
+    throw std::invalid_argument("--reference-chunk: expected at least " +
+                                std::to_string((half - 1) / most_seeds + 1) + " for --reference-spp " +
+                                std::to_string(given.reference_spp) + ", not " +
+                                std::to_string(given.reference_chunk));
+}
+
 settings completed(given_arguments given) {
   const preset& defaults = presets.at(given.preset);
   settings result;
@@ -249,7 +271,11 @@ settings completed(given_arguments given) {
   result.output = given.output;
   result.cache = given.cache;
   for (const scene_choice& scene : result.scenes)
-    for (const method& sampled : result.methods) options_of(scene, sampled);
+    for (const method& sampled : result.methods)
+      if (options_of(scene, sampled).seed + static_cast<std::uint64_t>(result.seeds) > most_seeds)
+        throw std::invalid_argument("method " + sampled.name + ": --seed and --seeds are more than " +
+                                    std::to_string(most_seeds) + " together");
+  check_budgets(result);
   return result;
 }
 
@@ -300,7 +326,7 @@ render::render_options options_of(const scene_choice& scene, const method& sampl
   render::add_guider_options(app, options);
   render::add_nee_option(app, options);
   render::add_device_option(app, options);
-  app.add_option("--seed", options.seed)->check(CLI::Range(0, 900000));  // below those of references
+  app.add_option("--seed", options.seed)->transform(render::whole_number(0, most_seeds - 1));
   parse_part(app, "method " + sampled.name, sampled.arguments,
              [&] { render::check_render_options(app, options); });
   return options;

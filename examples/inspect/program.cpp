@@ -2,6 +2,7 @@
 #include "program.hpp"
 
 #include "inspection.hpp"
+#include "number_options.hpp"
 #include "output_files.hpp"
 #include "render_arguments.hpp"
 
@@ -34,15 +35,17 @@ void add_options(CLI::App& app, arguments& given) {
          "--pixel", [&given](const std::string& text) { parse_pixel(text, given.asked); },
          "X,Y from the upper left: what its middle hits is looked at")
       ->required();
-  app.add_option("-o,--output", given.output, "folder of the page and its pictures (default: inspection)");
-  app.add_option("--vdb", given.asked.vdb, "the octree's voxels, OpenVDB");
+  app.add_option("-o,--output", given.output, "folder of the page and its pictures (default: inspection)")
+      ->transform(render::file_path());
+  app.add_option("--vdb", given.asked.vdb, "the octree's voxels, OpenVDB")->transform(render::file_path());
   app.add_option("--load-guide", given.asked.learning.load_guide,
-                 "guide to begin with, of the same scene and options");
+                 "guide to begin with, of the same scene and options")
+      ->transform(render::file_path());
   app.add_option("--reference-spp", given.asked.reference_spp,
                  "paths for each of the reference's cells, of which there are about 96 x 96 (default: 256)")
-      ->check(CLI::Range(2, 1 << 24));
+      ->transform(render::whole_number(2, 1 << 24));
   app.add_option("--histogram", given.asked.histogram, "samples in the histogram (default: 1048576)")
-      ->check(CLI::Range(1, 1 << 30));
+      ->transform(render::whole_number(1, 1 << 30));
   render::render_options& options = given.asked.learning;
   render::add_method_options(app, options);
   render::add_device_option(app, options);

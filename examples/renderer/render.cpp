@@ -20,9 +20,6 @@ extern template render_result render_on<embree_scene>(const wfpg::exec::tbb&, co
 
 namespace {
 
-constexpr int largest_side = 32768;
-constexpr int largest_depth = 1024;
-
 /// State on disk is of what can be saved.
 void require_guided_files(const render_options& options) {
   using wfpg::detail::require;
@@ -46,6 +43,8 @@ render_options completed(const scene& scene, render_options options) {
   if (options.max_depth == 0) options.max_depth = scene.max_depth;
   require(options.width > 0 && options.width <= largest_side, "width", options.width, "1 to 32768");
   require(options.height > 0 && options.height <= largest_side, "height", options.height, "1 to 32768");
+  require(std::int64_t(options.width) * options.height <= most_pixels, "width times height",
+          std::int64_t(options.width) * options.height, "at most 2^28");
   require(options.max_depth > 0 && options.max_depth <= largest_depth, "max_depth", options.max_depth,
           "1 to 1024");
   require(options.roulette_depth >= 1 && options.roulette_depth <= 1 << 30, "roulette_depth",

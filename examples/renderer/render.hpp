@@ -32,6 +32,10 @@ enum class checkpoint_times {
 };                                                 ///< after samples 1, 2, 4, 8, ... and the last; all
 enum class device { cpu, omp, seq, cuda, optix };  ///< TBB, OpenMP, one thread, a GPU, and with OptiX
 
+inline constexpr int largest_side = 32768;  ///< pixels
+inline constexpr std::int64_t most_pixels = std::int64_t(1) << 28;
+inline constexpr int largest_depth = 1024;  ///< segments of a path
+
 struct render_options {
   sampling_method method = sampling_method::wfpg;
   guiding mode = guiding::oriented;
@@ -40,7 +44,8 @@ struct render_options {
   device where = device::cpu;
   int spp = 64;          ///< samples a pixel, positive; not used where `seconds` is
   double seconds = 0.0;  ///< time for samples, building not counted; the last may use more; 0: spp decides
-  int width = 0;         ///< pixels, both positive; 0 x 0: the scene's own
+  int width = 0;  ///< pixels, both positive, at most `largest_side`, and `most_pixels` together; 0 x 0: the
+                  ///< scene's own
   int height = 0;
   int max_depth = 0;       ///< segments of a path, positive; 0: the scene's own
   int roulette_depth = 3;  ///< Russian roulette ends no path before this vertex, from 0; 1 to 2^30

@@ -3,6 +3,7 @@
 
 #include "builtin_scenes.hpp"
 #include "interruption.hpp"
+#include "number_options.hpp"
 #include "output_files.hpp"
 #include "progress_bar.hpp"
 #include "render.hpp"
@@ -53,25 +54,30 @@ void check_files(const arguments& given) {
 }
 
 void add_file_options(CLI::App& app, arguments& given) {
-  app.add_option("-o,--output", given.output, "picture, OpenEXR");
-  app.add_option("--png", given.png, "picture, sRGB PNG");
+  app.add_option("-o,--output", given.output, "picture, OpenEXR")->transform(file_path());
+  app.add_option("--png", given.png, "picture, sRGB PNG")->transform(file_path());
   app.add_option("--exposure", given.exposure, "multiplies the PNG's values (default: 1)")
-      ->check(CLI::PositiveNumber)
+      ->transform(positive_number(1.0e30))
       ->needs("--png");
-  app.add_option("--stats", given.stats, "what it cost, JSON");
-  app.add_option("--reference", given.reference, "picture to print the error against, OpenEXR");
+  app.add_option("--stats", given.stats, "what it cost, JSON")->transform(file_path());
+  app.add_option("--reference", given.reference, "picture to print the error against, OpenEXR")
+      ->transform(file_path());
 }
 
 void add_state_options(CLI::App& app, arguments& given) {
   app.add_option("--save-guide", given.save_guide,
-                 "where the guide of wfpg or wfpg-product goes at the end: what it has learnt");
+                 "where the guide of wfpg or wfpg-product goes at the end: what it has learnt")
+      ->transform(file_path());
   CLI::Option* const load = app.add_option("--load-guide", given.options.load_guide,
-                                           "guide for wfpg or wfpg-product to begin with, of the same scene");
+                                           "guide for wfpg or wfpg-product to begin with, of the same scene")
+                                ->transform(file_path());
   app.add_option("--save-state", given.save_state,
                  "where the state of a rendering by pt, wfpg or wfpg-product goes at the end, and when it is "
-                 "interrupted");
+                 "interrupted")
+      ->transform(file_path());
   app.add_option("--resume", given.options.resume,
                  "state of the rendering to go on with; where it goes when that is interrupted")
+      ->transform(file_path())
       ->excludes(load);
 }
 
