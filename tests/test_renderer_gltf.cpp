@@ -172,6 +172,30 @@ TEST_CASE("glTF: what materials become", "[renderer][gltf]") {
   check_close(lamp.emission, {300.0f, 150.0f, 0.0f}, 1e-3f);
 }
 
+TEST_CASE("glTF: lights too bright for sums of floats are refused by name", "[renderer][gltf]") {
+  const auto lamp = [](const std::string& strength) {
+    tiny_gltf tiny;
+    tiny.with("materials", R"([{}, {"name": "lamp", "emissiveFactor": [0, 1, 0.5],
+        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": )" +
+                               strength + "}}}]");
+    return tiny;
+  };
+  CHECK(lamp("3e38").error() ==
+        "material 1 ('lamp') has an emissiveFactor times emissiveStrength of 3e+38, at most 1e+15 is "
+        "supported");
+  CHECK(contains(lamp("1e308").error(), "of 1e+308"));
+  CHECK(lamp("9e14").load().materials[1].emission.y == 9e14f);
+
+  tiny_gltf sky;
+  sky.with("scenes", R"([{"nodes": [0], "extras": {"environment": {"radiance": [0, 0, 3e38]}}}])");
+  CHECK(sky.error() == "an extras.environment.radiance of 3e+38, at most 1e+15 is supported");
+
+  tiny_gltf bulb;
+  bulb.with("extensions", R"({"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 2e38}]}})");
+  bulb.with("nodes", R"([{"mesh": 0, "extensions": {"KHR_lights_punctual": {"light": 0}}}])");
+  CHECK(bulb.error() == "light 0 has an intensity of 2e+38, at most 1e+15 is supported");
+}
+
 TEST_CASE("glTF: what transmits becomes solid or thin", "[renderer][gltf]") {
   const auto read = [](const std::string& roughness, const std::string& extensions) {
     return tiny_gltf()

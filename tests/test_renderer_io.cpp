@@ -111,6 +111,14 @@ TEST_CASE("Environments: OpenEXR and Radiance HDR, and what is wrong with one", 
   CHECK(contains(error(folder.file("negative.exr")), "negative"));
   render::write_exr(folder.file("nan.exr"), grey(2, 1, std::numeric_limits<float>::quiet_NaN()));
   CHECK(contains(error(folder.file("nan.exr")), "finite"));
+  image bright = grey(2, 1, 1.0f);
+  bright.pixels[1].y = 3e38f;
+  render::write_exr(folder.file("bright.exr"), bright);
+  CHECK(error(folder.file("bright.exr")) ==
+        folder.file("bright.exr") + ": has radiance of 3e+38 W/(m^2 sr), at most 1e+15 is supported");
+  bright.pixels[1].y = render::largest_radiance;
+  render::write_exr(folder.file("bright.exr"), bright);
+  CHECK(error(folder.file("bright.exr")) == "nothing was thrown");
 }
 
 TEST_CASE("PNG: what is written is read again, and what is not is an error", "[renderer][png]") {

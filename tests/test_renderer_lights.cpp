@@ -1,6 +1,8 @@
 // How lights are chosen: the alias table's probabilities, and what the lights of a scene are drawn with.
 #include "alias_table.hpp"
+#include "builtin_scenes.hpp"
 #include "lights.hpp"
+#include "render.hpp"
 #include "rng.hpp"
 #include "support/catch.hpp"
 
@@ -8,7 +10,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 namespace {
@@ -234,4 +239,81 @@ TEST_CASE("a choice of groups changes what lights are drawn with, and not what t
     }
   });
   CHECK(found == Approx(expected).epsilon(0.02));
+}
+
+namespace {
+
+/// What the renderer says of a scene.
+std::string error_of(const scene& s) {
+  try {
+    render_options options;
+    options.method = sampling_method::pt;
+    options.spp = 1;
+    render::render(s, options, {});
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+/// A lamp, an open side with a sky, and a point light.
+scene scene_of_lights(float radiance) {
+  scene s = make_builtin_scene("cornell-box");
+  for (material& m : s.materials)
+    if (m.emission != vec3(0.0f)) m.emission = vec3(radiance);
+  punctual_light bulb;
+  bulb.position = {0.3f, 1.2f, 0.5f};
+  bulb.intensity = vec3(radiance);
+  s.punctual_lights = {bulb};
+  s.sky = {4, 2, std::vector<vec3>(8, vec3(radiance))};
+  s.width = s.height = 16;
+  return s;
+}
+
+}  // namespace
+
+TEST_CASE("lights too bright for sums of floats are refused by name", "[renderer][lights]") {
+  scene s = row_of_lamps(1);
+  s.materials[1].emission.y = 3e38f;
+  CHECK(error_of(s) == "wfpg: the emission of scene.materials, element 1 is 3e+38, expected in [0, 1e+15]");
+  s = row_of_lamps(1);
+  s.sky = {2, 1, {vec3(1.0f), vec3(0.0f, 0.0f, 3e38f)}};
+  CHECK(error_of(s) == "wfpg: scene.sky, texel 1 is 3e+38, expected in [0, 1e+15]");
+  s = row_of_lamps(1);
+  s.environment.x = std::numeric_limits<float>::quiet_NaN();
+  CHECK(error_of(s) == "wfpg: scene.environment is nan, expected in [0, 1e+15]");
+  s.environment.x = -1.0f;
+  CHECK(error_of(s) == "wfpg: scene.environment is -1, expected in [0, 1e+15]");
+  s = row_of_lamps(1);
+  s.punctual_lights.resize(3);
+  s.punctual_lights[2].intensity.z = 1e16f;
+  CHECK(error_of(s) ==
+        "wfpg: the intensity of scene.punctual_lights, element 2 is 1e+16, expected in [0, 1e+15]");
+  // Each is usable, and their sum is not: an area of 1e16.
+  s = row_of_lamps(1);
+  s.materials[1].emission = vec3(largest_radiance);
+  for (vec3& p : s.positions) p *= 1e9f;
+  CHECK(error_of(s) ==
+        "wfpg: the sum of radiance times area over all lights is 1e+31, expected at most 1e+30");
+}
+
+TEST_CASE("the brightest lights that are not refused give finite pictures", "[renderer][lights]") {
+  const scene bright = scene_of_lights(largest_radiance), plain = scene_of_lights(1.0f);
+  for (const sampling_method method : {sampling_method::pt, sampling_method::wfpg}) {
+    render_options options;
+    options.method = method;
+    options.spp = 8;
+    options.octree_resolution = 16;
+    const image found = render::render(bright, options, {}).picture;
+    const image expected = render::render(plain, options, {}).picture;
+    double sum = 0.0, expected_sum = 0.0;
+    std::size_t not_finite = 0;
+    for (std::size_t i = 0; i < found.pixels.size(); ++i) {
+      sum += static_cast<double>(wfpg::luminance(found.pixels[i]));
+      expected_sum += static_cast<double>(wfpg::luminance(expected.pixels[i]));
+      not_finite += !wfpg::detail::is_finite(found.pixels[i]);
+    }
+    CHECK(not_finite == 0);
+    CHECK(sum / static_cast<double>(largest_radiance) == Approx(expected_sum).epsilon(0.3));
+  }
 }

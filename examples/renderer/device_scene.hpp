@@ -205,7 +205,7 @@ inline std::vector<float> emitted_luminances(const scene& host) {
 template <class Exec>
 class device_scene {
  public:
-  /// Throws std::invalid_argument where an index of the scene points nowhere.
+  /// Throws std::invalid_argument where an index of the scene points nowhere, or a light is not usable.
   device_scene(const Exec& exec, const scene& host)
       : positions_(exec, host.positions),
         normals_(exec, host.normals),
@@ -252,7 +252,25 @@ class device_scene {
     environment_ = {sky, sky_texels_.view(), sky_table_.view(), total};
   }
 
+  static void check_lights(const scene& host) {
+    const auto check = [](vec3 light, const std::string& name) {
+      for (const float channel : {light.x, light.y, light.z})
+        wfpg::detail::require(is_usable_light(vec3(channel)), name.c_str(), channel, "in [0, 1e+15]");
+    };
+    const auto check_each = [&](const auto& elements, const std::string& name, const auto& light_of) {
+      for (std::size_t i = 0; i < elements.size(); ++i)  // without a string for each
+        if (!is_usable_light(light_of(elements[i]))) check(light_of(elements[i]), name + std::to_string(i));
+    };
+    check(host.environment, "scene.environment");
+    check_each(host.sky.texels, "scene.sky, texel ", [](vec3 texel) { return texel; });
+    check_each(host.materials, "the emission of scene.materials, element ",
+               [](const material& m) { return m.emission; });
+    check_each(host.punctual_lights, "the intensity of scene.punctual_lights, element ",
+               [](const punctual_light& light) { return light.intensity; });
+  }
+
   static void check(const scene& host) {
+    check_lights(host);
     wfpg::detail::require(
         host.sky.texels.size() == std::size_t(host.sky.width) * std::size_t(host.sky.height),
         "scene.sky.texels.size()", host.sky.texels.size(), "width times height");

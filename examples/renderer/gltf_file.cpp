@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <sstream>
 #include <stdexcept>
 
 namespace render::gltf {
@@ -265,6 +266,12 @@ std::vector<std::uint32_t> read_indices(const tinygltf::Model& model, int access
   std::vector<std::uint32_t> values(e.count);
   for (std::size_t i = 0; i < e.count; ++i) values[i] = index_at(e.first + i * e.stride, e.component);
   return values;
+}
+
+std::runtime_error too_bright(const std::string& what, double found) {
+  std::ostringstream text;
+  text << what << " of " << found << ", at most " << largest_radiance << " is supported";
+  return std::runtime_error(text.str());
 }
 
 double number_of(const tinygltf::Value& object, const char* member, double otherwise) {

@@ -7,6 +7,7 @@
 #include <tiny_gltf.h>
 
 #include <cstdint>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,10 @@ std::vector<vec2> read_vec2(const tinygltf::Model& model, int accessor);
 
 /// A SCALAR accessor of 8-, 16- or 32-bit unsigned integers.
 std::vector<std::uint32_t> read_indices(const tinygltf::Model& model, int accessor);
+
+/// The refusal of a light brighter than `largest_radiance` or not finite: "WHAT of X, at most 1e+15 is
+/// supported". `what` names the light and what is too large.
+std::runtime_error too_bright(const std::string& what, double found);
 
 /// A number of an object's member, or `otherwise` where it is missing or no finite number.
 double number_of(const tinygltf::Value& object, const char* member, double otherwise);

@@ -302,7 +302,7 @@ class scene_reader {
       return warn("lights of type '" + source.type + "' are not supported");
     light.position = vec3(to_world[3]);
     light.direction = unit_or(-vec3(to_world[2]), vec3(0.0f));
-    light.intensity = light_intensity(source);
+    light.intensity = light_intensity(source, "light " + std::to_string(int(index)));
     light.cos_inner = float(std::cos(source.spot.innerConeAngle));
     light.cos_outer = float(std::cos(source.spot.outerConeAngle));
     if (!finite(light.position) || light.direction == vec3(0.0f))
@@ -313,14 +313,16 @@ class scene_reader {
     target_.punctual_lights.push_back(light);
   }
 
-  static vec3 light_intensity(const tinygltf::Light& source) {
+  static vec3 light_intensity(const tinygltf::Light& source, const std::string& name) {
     if (!source.color.empty() && source.color.size() != 3)
       throw std::runtime_error("a light's color has not 3 components");
     vec3 intensity(0.0f);
-    for (int c = 0; c < 3; ++c)
-      intensity[c] = float(source.intensity * (source.color.empty() ? 1.0 : source.color[std::size_t(c)]));
-    if (!finite(intensity) || glm::any(glm::lessThan(intensity, vec3(0.0f))))
-      throw std::runtime_error("a light's intensity is not finite or negative");
+    for (int c = 0; c < 3; ++c) {
+      const double channel = source.intensity * (source.color.empty() ? 1.0 : source.color[std::size_t(c)]);
+      if (!(channel >= 0.0)) throw std::runtime_error(name + "'s intensity is negative or no number");
+      if (channel > double(largest_radiance)) throw gltf::too_bright(name + " has an intensity", channel);
+      intensity[c] = float(channel);
+    }
     return intensity;
   }
 
@@ -363,14 +365,16 @@ class scene_reader {
   }
 
   void read_radiance(const tinygltf::Value& value) {
+    const char* const name = "extras.environment.radiance";
     vec3 radiance(0.0f);
     const bool is_colour = value.IsArray() && value.ArrayLen() == 3;
     for (int c = 0; c < 3; ++c) {
       const tinygltf::Value& channel = is_colour ? value.Get(c) : value;
-      radiance[c] = channel.IsNumber() ? float(channel.GetNumberAsDouble()) : -1.0f;
+      const double number = channel.IsNumber() ? channel.GetNumberAsDouble() : -1.0;
+      if (!(number >= 0.0)) return warn(std::string(name) + " is unusable");
+      if (number > double(largest_radiance)) throw gltf::too_bright(std::string("an ") + name, number);
+      radiance[c] = float(number);
     }
-    const bool usable = finite(radiance) && radiance.x >= 0.0f && radiance.y >= 0.0f && radiance.z >= 0.0f;
-    if (!usable) return warn("extras.environment.radiance is unusable");
     target_.environment = radiance;
   }
 

@@ -177,6 +177,12 @@ class material_reader {
  private:
   void warn(const std::string& line) { warn_once(target_.warnings, line); }
 
+  /// Of a material, for messages: its place in the file, and its name where it has one.
+  std::string name_of(const tinygltf::Material& source) const {
+    const std::string place = "material " + std::to_string(&source - model_.materials.data());
+    return source.name.empty() ? place : place + " ('" + source.name + "')";
+  }
+
   void read_base_color(const tinygltf::Material& source, material& result) {
     const tinygltf::PbrMetallicRoughness& pbr = source.pbrMetallicRoughness;
     if (pbr.baseColorFactor.size() < 3) throw std::runtime_error("a baseColorFactor has too few components");
@@ -233,12 +239,15 @@ class material_reader {
   }
 
   void read_emission(const tinygltf::Material& source, material& result) {
-    constexpr double largest = 1e30;
     if (source.emissiveFactor.size() != 3) throw std::runtime_error("an emissiveFactor has not 3 components");
     const double strength =
         extension_number(source, "KHR_materials_emissive_strength", "emissiveStrength", 1.0);
-    for (int c = 0; c < 3; ++c)
-      result.emission[c] = float(limited(source.emissiveFactor[std::size_t(c)] * strength, 0.0, largest));
+    for (int c = 0; c < 3; ++c) {
+      const double channel = source.emissiveFactor[std::size_t(c)] * strength;
+      if (!(channel <= double(largest_radiance)))
+        throw too_bright(name_of(source) + " has an emissiveFactor times emissiveStrength", channel);
+      result.emission[c] = float(std::max(channel, 0.0));
+    }
     const bool emits = result.emission != vec3(0.0f);
     if (emits && source.doubleSided) warn("two-sided emission is not supported: the front side emits");
     if (emits) result.emission_texture = texture_of(source.emissiveTexture, encoding::srgb);

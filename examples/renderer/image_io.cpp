@@ -21,6 +21,7 @@
 #include <fstream>
 #include <memory>
 #include <ostream>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 
@@ -67,6 +68,13 @@ Imf::FrameBuffer frame_buffer(float* first, const Imath::Box2i& window) {
                   Imf::Slice::Make(Imf::FLOAT, first + c, window, sizeof(vec3),
                                    sizeof(vec3) * std::size_t(window.max.x - window.min.x + 1)));
   return buffer;
+}
+
+/// Of few digits.
+std::string in_words(float number) {
+  std::ostringstream text;
+  text << number;
+  return text.str();
 }
 
 std::runtime_error with_path(const std::string& path, const std::exception& reason) {
@@ -182,10 +190,14 @@ image read_exr(const std::string& path) try {
 environment_map read_environment(const std::string& path) try {
   const bool is_hdr = path.size() > 4 && path.compare(path.size() - 4, 4, ".hdr") == 0;
   const image picture = is_hdr ? read_hdr(path) : read_exr_pixels(path);
-  for (const vec3& p : picture.pixels)
+  for (const vec3& p : picture.pixels) {
     for (int c = 0; c < 3; ++c)
       if (!(p[c] >= 0.0f) || std::isinf(p[c]))
         throw std::runtime_error("has radiance that is negative or not finite");
+    if (!is_usable_light(p))
+      throw std::runtime_error("has radiance of " + in_words(std::max(p.x, std::max(p.y, p.z))) +
+                               " W/(m^2 sr), at most " + in_words(largest_radiance) + " is supported");
+  }
   return {picture.width, picture.height, picture.pixels};
 } catch (const std::exception& reason) {
   throw with_path(path, reason);

@@ -160,6 +160,7 @@ struct light_view {
 template <class Exec>
 class light_distribution {
  public:
+  /// Throws std::invalid_argument where the lights' sum is above largest_light_power.
   light_distribution(const Exec& exec, const scene& host, std::uint32_t most_groups = 1)
       : light_distribution(exec, host, group_lights(host, most_groups)) {}
 
@@ -184,7 +185,7 @@ class light_distribution {
         punctual_(exec, host.punctual_lights),
         groups_(exec, grouped.groups),
         triangle_groups_(exec, grouped.triangle_groups),
-        total_power_(static_cast<float>(grouped.total_power)),
+        total_power_(checked(grouped.total_power)),
         radius_(grouped.scene_radius) {
     std::vector<alias_column> table;
     for (const light_group& group : grouped.groups) {
@@ -195,6 +196,12 @@ class light_distribution {
       shares_.push_back(group.share);
     }
     table_ = wfpg::buffer<alias_column, Exec>(exec, table);
+  }
+
+  static float checked(double total_power) {
+    wfpg::detail::require(total_power <= largest_light_power,
+                          "the sum of radiance times area over all lights", total_power, "at most 1e+30");
+    return static_cast<float>(total_power);
   }
 
   wfpg::buffer<std::uint32_t, Exec> lights_;

@@ -80,6 +80,20 @@ struct material {
   vec3 absorption{0.0f};               ///< inside of solids that transmit, 1 / scene unit
 };
 
+/// The largest radiance, intensity or irradiance of a light, each channel, in the units of its field below.
+/// Sums of light are floats, whose largest is 3.4e38. 1e15 leaves a factor of 3e23 for what a path multiplies
+/// it with: the area and solid angle of lights, inverse densities, inverse squared distances, roulette. The
+/// sun's disc has 2e7 W/(m² sr).
+inline constexpr float largest_radiance = 1e15f;
+/// The largest sum over all lights of radiance times area, W/sr: it and its product with a BSDF stay finite.
+inline constexpr double largest_light_power = 1e30;
+
+/// Whether each channel lies in [0, largest_radiance]; false where one is NaN.
+inline bool is_usable_light(vec3 light) {
+  const auto usable = [](float channel) { return channel >= 0.0f && channel <= largest_radiance; };
+  return usable(light.x) && usable(light.y) && usable(light.z);
+}
+
 /// Radiance from all directions, W/(m² sr), row by row from the top; environment.hpp says which is where.
 struct environment_map {
   int width = 0;
