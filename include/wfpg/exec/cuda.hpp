@@ -64,8 +64,12 @@ class stream_resource : public memory_resource, public std::enable_shared_from_t
   }
   stream_resource(const stream_resource&) = delete;
   stream_resource& operator=(const stream_resource&) = delete;
-  /// The device has the memory back once the stream has done what it was given before.
-  ~stream_resource() override { cudaMemPoolDestroy(pool_); }
+  /// Waits for the stream: drivers have crashed where a pool ended before the memory that the stream was
+  /// still to give back to it.
+  ~stream_resource() override {
+    cudaStreamSynchronize(stream_);
+    cudaMemPoolDestroy(pool_);
+  }
 
   /// Waits for the stream, and gives what is not in use back to the device.
   void trim() {
@@ -164,7 +168,8 @@ class cuda {
 
   /// `resource` hands out device memory, ordered on the stream, and outlives what is allocated. Null: the
   /// policy makes a pool on the current device, which its copies share and which lives as long as they and
-  /// their buffers do. Throws cuda_error, where there is no device to begin with.
+  /// their buffers do, as the stream must; the last of them waits for it. Throws cuda_error, where there is
+  /// no device to begin with.
   explicit cuda(cudaStream_t stream = nullptr, memory_resource* resource = nullptr)
       : stream_(stream),
         pool_(resource ? nullptr : std::make_shared<wfpg::detail::stream_resource>(stream)),
