@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -487,4 +488,128 @@ TEST_CASE("glTF: hostile files", "[renderer][gltf][hostile]") {
     tiny.with("materials", R"([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}])");
     CHECK(contains(tiny.error(), "leaves its buffer"));
   }
+}
+
+TEST_CASE("glTF: fields of a wrong type or sign are named", "[renderer][gltf][hostile]") {
+  struct refusal {
+    std::string part, json, message;
+  };
+  const std::string index = ", expected a whole number from 0 to 2^31 - 1",
+                    size = ", expected a whole number from 0 to 2^53",
+                    numbers = ", expected a list of numbers",
+                    indices = ", expected a list of whole numbers from 0 to 2^31 - 1",
+                    number = ", expected a number", objects = ", expected a list of objects";
+  const auto view = [](const std::string& fields) {
+    return R"([{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 6, )" + fields +
+           "}]";
+  };
+  const auto accessor = [](const std::string& fields) {
+    return R"([{"bufferView": 0, "componentType": 5126, "type": "VEC3", )" + fields +
+           R"(}, {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"}])";
+  };
+  const auto primitive = [](const std::string& fields) {
+    return R"([{"primitives": [{"attributes": {"POSITION": 0}, )" + fields + "}]}]";
+  };
+  for (const refusal& one : std::vector<refusal>{
+           {"bufferViews", view(R"("byteOffset": -36)"), "bufferViews[1].byteOffset is -36" + size},
+           {"bufferViews", view(R"("byteOffset": 36.5)"), "bufferViews[1].byteOffset is 36.5" + size},
+           {"bufferViews", view(R"("byteLength": -6)"), "bufferViews[1].byteLength is -6" + size},
+           {"bufferViews", view(R"("byteStride": "2")"), "bufferViews[1].byteStride is \"2\"" + size},
+           {"bufferViews", view(R"("buffer": -1)"), "bufferViews[1].buffer is -1" + index},
+           {"bufferViews", view(R"("buffer": 4294967296)"), "bufferViews[1].buffer is 4294967296" + index},
+           {"bufferViews", R"({"0": {"buffer": 0}})", "bufferViews is {\"0\":{\"buffer\":0}}" + objects},
+           {"bufferViews", "[7]", "bufferViews is [7]" + objects},
+           {"accessors", accessor(R"("count": -3)"), "accessors[0].count is -3" + size},
+           {"accessors", accessor(R"("count": 3, "byteOffset": -4)"), "accessors[0].byteOffset is -4" + size},
+           {"accessors", accessor(R"("count": 3, "byteOffset": null)"),
+            "accessors[0].byteOffset is null" + size},
+           {"scene", "-1", "scene is -1" + index},
+           {"scenes", R"([{"nodes": 0}])", "scenes[0].nodes is 0" + indices},
+           {"nodes", R"([{"mesh": -1}])", "nodes[0].mesh is -1" + index},
+           {"nodes", R"([{"mesh": 0.0}])", "nodes[0].mesh is 0.0" + index},
+           {"nodes", R"([{"mesh": true}])", "nodes[0].mesh is true" + index},
+           {"nodes", R"([{"mesh": 0, "children": [-1]}])", "nodes[0].children is [-1]" + indices},
+           {"nodes", R"([{"mesh": 0, "translation": ["a", 2, 3]}])",
+            "nodes[0].translation is [\"a\",2,3]" + numbers},
+           {"nodes", R"([{"mesh": 0, "translation": 5}])", "nodes[0].translation is 5" + numbers},
+           {"nodes", R"([{"mesh": 0, "rotation": [0, 0, null, 1]}])",
+            "nodes[0].rotation is [0,0,null,1]" + numbers},
+           {"nodes", R"([{"mesh": 0, "scale": [[1], 1, 1]}])", "nodes[0].scale is [[1],1,1]" + numbers},
+           {"nodes", R"([{"mesh": 0, "extensions": {"KHR_lights_punctual": {"light": -1}}}])",
+            "nodes[0].extensions.KHR_lights_punctual.light is -1" + index},
+           {"meshes", primitive(R"("indices": -1)"), "meshes[0].primitives[0].indices is -1" + index},
+           {"meshes", primitive(R"("material": -1)"), "meshes[0].primitives[0].material is -1" + index},
+           {"meshes", primitive(R"("mode": "4")"), "meshes[0].primitives[0].mode is \"4\"" + index},
+           {"meshes", R"([{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": -1}}]}])",
+            "meshes[0].primitives[0].NORMAL is -1" + index},
+           {"meshes", R"([{"primitives": {}}])", "meshes[0].primitives is {}" + objects},
+           {"materials", R"([{"emissiveFactor": ["1", 1, 1]}])",
+            "materials[0].emissiveFactor is [\"1\",1,1]" + numbers},
+           {"materials", R"([{"pbrMetallicRoughness": {"roughnessFactor": "0.5"}}])",
+            "materials[0].pbrMetallicRoughness.roughnessFactor is \"0.5\"" + number},
+           {"materials", R"([{"pbrMetallicRoughness": {"baseColorTexture": {"index": -1}}}])",
+            "materials[0].pbrMetallicRoughness.baseColorTexture.index is -1" + index},
+           {"materials", R"([{"extensions": {"KHR_materials_ior": {"ior": "1.5"}}}])",
+            "materials[0].extensions.KHR_materials_ior.ior is \"1.5\"" + number},
+           {"cameras", R"([{"type": "perspective", "perspective": {"yfov": "1", "znear": 0.1}}])",
+            "cameras[0].perspective.yfov is \"1\"" + number},
+           {"textures", R"([{"source": -1}])", "textures[0].source is -1" + index},
+           {"extensions", R"({"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": "1"}]}})",
+            "extensions.KHR_lights_punctual.lights[0].intensity is \"1\"" + number}}) {
+    CHECK(tiny_gltf().with(one.part, one.json).error() == one.message);
+  }
+  // Extras are anyone's.
+  CHECK(tiny_gltf().with("extras", R"({"index": -1})").load().triangles.size() == 1);
+  CHECK(
+      tiny_gltf().with("materials", R"([{"extras": {"index": -1, "scale": "a"}}])").load().triangles.size() ==
+      1);
+}
+
+TEST_CASE("glTF: files outside of the scene's folder are not read", "[renderer][gltf][hostile]") {
+  const temporary_folder folder;
+  std::filesystem::create_directories(folder.file("scene/textures"));
+  const tiny_gltf tiny;
+  folder.write("x.bin", tiny.buffer);
+  folder.write("scene/textures/a b.bin", tiny.buffer);
+  const auto loaded = [&](const std::string& uri) -> std::string {
+    std::string json = tiny.json();
+    const std::size_t start = json.find("data:application");
+    json.replace(start, json.find('"', start) - start, uri);
+    const std::string path = folder.write("scene/a.gltf", json);
+    try {
+      const scene s = render::load_gltf(path);
+      CHECK(s.triangles.size() == 1);
+    } catch (const std::runtime_error& error) {
+      CHECK(contains(error.what(), path + ": buffers[0].uri is \""));
+      return error.what();
+    }
+    return "";
+  };
+  for (const std::string& uri :
+       {std::string("../x.bin"), std::string("textures/../../x.bin"), std::string("%2e%2e/x.bin"),
+        std::string("..%2Fx.bin"), folder.file("x.bin"), "file://" + folder.file("x.bin")})
+    CHECK(contains(loaded(uri), "expected a file in the scene's folder"));
+  for (const std::string uri : {"none.bin", "textures", "", "x.bin"})
+    CHECK(contains(loaded(uri), "expected a file that is there, in the scene's folder"));
+  // Neither is what happens to lie where the program runs.
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(folder.path());
+  CHECK(contains(loaded("x.bin"), "expected a file that is there"));
+  std::filesystem::current_path(before);
+  CHECK(loaded("textures/a%20b.bin") == "");
+  CHECK(loaded("textures/../textures/a b.bin") == "");
+
+  const std::string image = tiny_gltf().with("images", R"([{"uri": "../a.png"}])").error();
+  CHECK(image == "images[0].uri is \"../a.png\", expected a file in the scene's folder");
+}
+
+TEST_CASE("glTF: a mesh that emits and has no triangles is an error", "[renderer][gltf][hostile]") {
+  tiny_gltf tiny;
+  tiny.with("accessors", R"([{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+                             {"bufferView": 1, "componentType": 5123, "count": 0, "type": "SCALAR"}])");
+  CHECK(tiny.load().triangles.empty());
+  tiny.with("materials", R"([{"emissiveFactor": [1, 1, 1]}])");
+  CHECK(tiny.error() == "mesh 0 emits light and has no triangles");
+  tiny.with("nodes", "[{}]");  // which is not in the scene
+  CHECK(tiny.load().triangles.empty());
 }

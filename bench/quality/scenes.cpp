@@ -2,6 +2,7 @@
 #include "scenes.hpp"
 
 #include "builtin_scenes.hpp"
+#include "gltf_json.hpp"
 #include "image_io.hpp"
 #include "render_arguments.hpp"
 #include "system.hpp"
@@ -14,18 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A URI's file name: %20 and its like are bytes.
-std::string decoded(const std::string& uri) {
-  std::string result;
-  for (std::size_t i = 0; i < uri.size(); ++i) {
-    const bool is_escape =
-        uri[i] == '%' && i + 2 < uri.size() && uri.find_first_not_of("0123456789abcdefABCDEF", i + 1) > i + 2;
-    result += is_escape ? static_cast<char>(std::stoi(uri.substr(i + 1, 2), nullptr, 16)) : uri[i];
-    if (is_escape) i += 2;
-  }
-  return result;
-}
-
 /// The contents of the buffers and images that lie beside a .gltf file.
 std::string referred_content(const fs::path& path, const std::string& content) {
   std::string result;
@@ -34,7 +23,7 @@ std::string referred_content(const fs::path& path, const std::string& content) {
     for (const json& part : document.value(kind, json::array())) {
       const std::string uri = part.value("uri", "");
       if (!uri.empty() && uri.rfind("data:", 0) != 0)
-        result += hash_of(content_of(path.parent_path() / decoded(uri)));
+        result += hash_of(content_of(path.parent_path() / render::gltf::decoded_uri(uri)));
     }
   return result;
 }

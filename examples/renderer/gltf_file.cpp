@@ -1,6 +1,8 @@
 // Files, GLB framing and accessors. tinygltf parses the JSON; what it leaves unchecked is checked here,
-// before (framing, nesting) or after (accessors, buffer views).
+// before (framing, nesting, types of fields) or after (accessors, buffer views).
 #include "gltf_file.hpp"
+
+#include "gltf_json.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -199,9 +201,11 @@ void warn_once(std::vector<std::string>& warnings, const std::string& line) {
 tinygltf::Model read_model(const std::string& path, std::vector<std::string>& warnings) {
   const bytes file = read_bytes(path);
   const bool binary = is_glb(file);
-  require_shallow(binary ? glb_json(file) : byte_range{file.data(), file.size()});
+  const byte_range json = binary ? glb_json(file) : byte_range{file.data(), file.size()};
+  require_shallow(json);
   const std::size_t slash = path.find_last_of('/');
   const std::string folder = slash == std::string::npos ? "" : path.substr(0, slash);
+  check_json({reinterpret_cast<const char*>(json.first), json.size}, folder);
   const auto size = static_cast<unsigned int>(file.size());
 
   tinygltf::TinyGLTF parser;

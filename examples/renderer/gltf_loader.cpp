@@ -187,8 +187,14 @@ class scene_reader {
     if (node.mesh < 0) return;
     if (std::size_t(node.mesh) >= model_.meshes.size())
       throw std::runtime_error("mesh " + std::to_string(node.mesh) + " does not exist");
-    for (const tinygltf::Primitive& primitive : model_.meshes[std::size_t(node.mesh)].primitives)
-      if (is_supported(primitive)) add(read_patch(primitive), to_world, material_of(primitive));
+    for (const tinygltf::Primitive& primitive : model_.meshes[std::size_t(node.mesh)].primitives) {
+      if (!is_supported(primitive)) continue;
+      const std::uint32_t material_index = material_of(primitive);
+      surface_patch patch = read_patch(primitive);
+      if (patch.indices.empty() && target_.materials[material_index].emission != vec3(0.0f))
+        throw std::runtime_error("mesh " + std::to_string(node.mesh) + " emits light and has no triangles");
+      add(std::move(patch), to_world, material_index);
+    }
   }
 
   bool is_supported(const tinygltf::Primitive& primitive) {
