@@ -148,7 +148,7 @@ TEST_CASE("failures are one message and exit code 2", "[quality]") {
   };
   CHECK(contains(message_of({}, "nowhere"), "nowhere"));
   CHECK(contains(message_of({}, folder.file("none.glb")), "none.glb"));
-  CHECK(contains(message_of({"--method", "odd=--octree-resolution 100"}), "method odd: "));
+  CHECK(contains(message_of({"--method", "odd=--method sarsa --sarsa-directions 5"}), "method odd: "));
   CHECK(contains(message_of({"--method", "odd=--combine discard-first", "--spp", "1"}), "method odd: "));
   CHECK(contains(message_of({"--crop", "10,10,16x16"}), "--crop"));
   CHECK(run({"--help"}).code == 0);
