@@ -15,7 +15,8 @@ namespace render {
 /// the first perspective camera (without one: a view of the bounding box from +z); from the scene's extras
 /// `resolution` (width, height) and `environment.radiance` (a number or RGB). What else the file asks for is
 /// left out, with a line in scene::warnings. A scene may have no triangles. Throws std::runtime_error with
-/// path and reason for a file that is missing, damaged, or refers to what it does not contain.
+/// path and reason for a file that is missing, damaged, or refers to what it does not contain or to files
+/// that are not in its folder.
 scene load_gltf(const std::string& path);
 
 }  // namespace render
