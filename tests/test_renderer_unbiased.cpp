@@ -1,6 +1,7 @@
 // Guiding changes the noise of a picture and not its mean: tile means of pt and wfpg agree within their
-// standard errors. Pictures are bit-identical on all policies (test_renderer_render.cpp), so one policy
-// speaks for all.
+// standard errors, and so does the mean of the picture. Of every kind of guiding there is a picture so
+// precise that 1% of bias in indirect light is found. Pictures are bit-identical on all policies
+// (test_renderer_render.cpp), so one policy speaks for all.
 #include "support/catch.hpp"
 #include "support/renderings.hpp"
 
@@ -9,6 +10,7 @@
 
 namespace {
 
+using wfpg_test::check_precisely;
 using wfpg_test::check_rendering;
 using wfpg_test::rendering;
 
@@ -17,6 +19,7 @@ using render::guiding;
 using render::sampling_method;
 constexpr auto wfpg_method = sampling_method::wfpg;
 constexpr auto product_method = sampling_method::wfpg_product;
+constexpr const char* map_scene = "cornell-box with a map";
 
 }  // namespace
 
@@ -25,6 +28,11 @@ TEST_CASE("pictures guided by kept fields have the mean of unguided ones", "[ren
     for (const bool nee : {false, true}) check_rendering({scene, nee});
   check_rendering({"cornell-wall", true});
   check_rendering({"many-lamps", true});  // whose choice is learnt
+  for (const bool nee : {false, true}) {
+    check_rendering({map_scene, nee});
+    check_precisely({"", nee});
+    check_precisely({"", nee, wfpg_method, fields::kept, guiding::plain});
+  }
   check_rendering({"cornell-enclosed", false, wfpg_method, fields::kept, guiding::plain});
   check_rendering({"thin-wall", true, wfpg_method, fields::kept, guiding::plain});
 }
@@ -35,6 +43,7 @@ TEST_CASE("pictures have that mean too once what guides know has settled", "[ren
       rendering what{"cornell-enclosed", nee, method};
       what.settled = true;
       check_rendering(what);
+      check_precisely(what);
     }
 }
 
@@ -42,8 +51,11 @@ TEST_CASE("pictures guided by transient fields have the mean of unguided ones", 
   for (const bool nee : {false, true}) {
     check_rendering({"cornell-enclosed", nee, wfpg_method, fields::transient, guiding::oriented});
     check_rendering({"thin-wall", nee, wfpg_method, fields::transient, guiding::plain});
+    check_precisely({"", nee, wfpg_method, fields::transient, guiding::oriented});
   }
+  check_precisely({"", true, wfpg_method, fields::transient, guiding::plain});
   check_rendering({"many-lamps", true, wfpg_method, fields::transient, guiding::oriented});
+  check_rendering({map_scene, true, wfpg_method, fields::transient, guiding::oriented});
 }
 
 TEST_CASE("pictures guided by fields of the octree's cones have the mean of unguided ones",
@@ -53,6 +65,7 @@ TEST_CASE("pictures guided by fields of the octree's cones have the mean of ungu
       rendering what{"thin-wall", true, wfpg_method, lifetime};
       what.through = through;
       check_rendering(what);
+      if ((through == render::cones::march) == (lifetime == fields::kept)) check_precisely(what);
     }
   rendering what{"cornell-enclosed", false, product_method};
   what.through = render::cones::trace;
@@ -65,12 +78,16 @@ TEST_CASE("pictures guided by products have the mean of unguided ones", "[render
   for (const bool nee : {false, true}) {
     check_rendering({"cornell-enclosed", nee, product_method, fields::transient, guiding::oriented});
     check_rendering({"thin-wall", nee, product_method, fields::transient, guiding::plain});
+    check_precisely({"", nee, product_method});
+    check_precisely({"", nee, product_method, fields::transient, guiding::oriented});
   }
+  check_rendering({map_scene, true, product_method});
 }
 
 TEST_CASE("pictures guided by a SARSA grid have the mean of unguided ones", "[renderer][unbiased]") {
   for (const char* scene : {"ajar", "glossy-room"})
     for (const bool nee : {false, true}) check_rendering({scene, nee, sampling_method::sarsa});
+  for (const bool nee : {false, true}) check_precisely({"", nee, sampling_method::sarsa});
   rendering what{"cornell-enclosed", true, sampling_method::sarsa};
   // Each with another: test_sarsa_grid_light.cpp has all pairs.
   const auto updates = render::sarsa_update_names();
@@ -83,7 +100,10 @@ TEST_CASE("pictures guided by a SARSA grid have the mean of unguided ones", "[re
 }
 
 TEST_CASE("pictures guided by irradiance records have the mean of unguided ones", "[renderer][unbiased]") {
-  for (const bool nee : {false, true}) check_rendering({"cornell-enclosed", nee, sampling_method::records});
+  for (const bool nee : {false, true}) {
+    check_rendering({"cornell-enclosed", nee, sampling_method::records});
+    check_precisely({"", nee, sampling_method::records});
+  }
 }
 
 TEST_CASE("a furnace guided by products has its radiance within 0.5%", "[renderer][unbiased]") {

@@ -160,6 +160,8 @@ TEST_CASE("statistics: tiles of two renderers", "[statistics]") {
   check_names(check_unbiased(truth, rendered(1.2, 3)), {"standard errors apart"});
   // Too little for a single tile, whose mean has a standard error of 2%.
   check_names(check_unbiased(truth, rendered(1.02, 4)), {"tiles together"});
+  // And too little for their squares.
+  check_names(check_unbiased(truth, rendered(1.007, 4)), {"the picture", "standard errors apart"});
 }
 
 TEST_CASE("statistics: a tile that is not finite is no unbiased one", "[statistics]") {
@@ -188,6 +190,39 @@ TEST_CASE("statistics: what failed by chance is made anew, and what is biased fa
   CHECK(factors == std::vector<int>{1, 1, 4});
   check_names(check_renderers_unbiased(truth, tested(1.2, 1.2)), {"standard errors apart"});
   // Too little for the first check, and not for the second.
-  CHECK(check_renderers_unbiased(truth, tested(1.01, 1.01)));
+  CHECK(check_renderers_unbiased(truth, tested(1.004, 1.004)));
+  check_names(check_renderers_unbiased(truth, tested(1.2, 1.004)), {"the picture"});
   check_names(check_renderers_unbiased(truth, tested(1.2, 1.01)), {"tiles together"});
+}
+
+TEST_CASE("statistics: a bias in a picture's mean is found as often as it is to be", "[statistics]") {
+  // The bias that found_bias() says, of either sign, is found in 99% of pairs; one is found in 0.4% without.
+  int found = 0, by_chance = 0;
+  constexpr int pairs = 200;
+  for (int i = 0; i < pairs; ++i) {
+    const auto seed = static_cast<std::uint64_t>(10 * i + 100);
+    const tile_means truth = rendered(1.0, seed), tested = rendered(1.0, seed + 1);
+    const double bias = (i % 2 == 0 ? 1.0 : -1.0) * found_bias(truth, tested);
+    const std::vector<double> dark(tested.size(), 0.0);
+    found += !check_unbiased(truth, tested.scaled_beyond(dark, 1.0 + bias));
+    const double difference = std::fabs(tested.picture_mean() - truth.picture_mean());
+    by_chance += difference >= picture_threshold * picture_error(truth, tested);
+  }
+  CHECK(found >= 194);    // 198 expected, 1% of fewer
+  CHECK(by_chance <= 4);  // 0.8 expected, 0.2% of more
+}
+
+TEST_CASE("statistics: a picture whose indirect light is scaled", "[statistics]") {
+  tile_means tested(2), expected(2);
+  for (const double x : {1.0, 1.5, 3.0}) {
+    tested.add({1.0 + x, 2.0 + 4.0 * x});
+    expected.add({1.0 + 1.5 * x, 2.0 + 6.0 * x});
+  }
+  const tile_means scaled = tested.scaled_beyond({1.0, 2.0}, 1.5);
+  for (std::size_t tile = 0; tile < 2; ++tile) {
+    CHECK(scaled.mean(tile) == Approx(expected.mean(tile)));
+    CHECK(scaled.variance_of_mean(tile) == Approx(expected.variance_of_mean(tile)));
+  }
+  CHECK(scaled.picture_mean() == Approx(expected.picture_mean()));
+  CHECK(scaled.variance_of_picture_mean() == Approx(expected.variance_of_picture_mean()));
 }

@@ -1,15 +1,17 @@
 // Small renderings of the built-in scenes, and the means of their tiles over independent seeds.
 #pragma once
 
-#include "builtin_scenes.hpp"
 #include "option_names.hpp"
 #include "render.hpp"
+#include "support/bright_room.hpp"
 #include "support/catch.hpp"
 #include "support/statistics.hpp"
 
 #include <wfpg/types.hpp>
 
+#include <cstddef>
 #include <cstdint>
+#include <future>
 #include <map>
 #include <string>
 #include <tuple>
@@ -19,7 +21,7 @@ namespace wfpg_test {
 
 inline constexpr int tiles = 8;        // along a side
 inline constexpr int tile_pixels = 4;  // along a tile's side
-inline constexpr int renderings = 24;  // independent, of each method
+inline constexpr int renderings = 24;  // independent, of each method, as a rule
 
 /// What a rendering is of, and how.
 struct rendering {
@@ -33,6 +35,19 @@ struct rendering {
   wfpg::sarsa_sampler sampler = wfpg::sarsa_sampler::mixed_rejection;
   render::cones through = render::cones::scene;
   bool settled = false;  ///< so long that in its second half fewer waves make fields and fewer samples teach
+  bool precise = false;  ///< of more samples, see check_precisely()
+
+  /// Independent renderings: fewer of those that are so long that they have little noise.
+  int count() const { return precise && settled ? renderings * 2 / 3 : renderings; }
+  /// Samples a pixel of one rendering.
+  int samples() const {
+    if (!precise) return settled ? 64 : 12;
+    if (method == render::sampling_method::pt) return nee ? 96 : 192;  // made once for all checks
+    if (settled) return 64;
+    const bool noisy = mode == render::guiding::plain || method == render::sampling_method::records;
+    if (noisy) return nee ? 64 : 128;
+    return nee && method != render::sampling_method::sarsa ? 24 : 32;
+  }
 
   render::render_options options() const {
     render::render_options options;
@@ -44,7 +59,7 @@ struct rendering {
     options.where = where;
     options.width = options.height = tiles * tile_pixels;
     options.max_depth = 6;
-    options.spp = settled ? 64 : 12;
+    options.spp = samples();
     options.octree_resolution = 32;
     if (settled) {  // leaves, and values, that want no more than a part of the paths
       options.octree_resolution = 16;
@@ -99,36 +114,72 @@ inline std::vector<double> tiles_of(const render::image& picture) {
   return result;
 }
 
-/// The first `factor` * `renderings` seeds from `first_seed` on: those of other seeds are independent.
-inline tile_means render_tiles(const rendering& what, std::uint64_t first_seed, int factor) {
+/// The tiles of renderings with `count` seeds from `first_seed` on: those of other seeds are independent.
+/// Waves as small as these keep one core of a CPU busy, so that two pictures are rendered at once.
+inline tile_means render_tiles(const render::render_options& options, const std::string& scene,
+                               std::uint64_t first_seed, int count) {
+  const render::scene world = make_test_scene(scene);
+  std::vector<std::vector<double>> pictures(static_cast<std::size_t>(count));
+  const bool alone = options.where != render::device::cpu || render::is_openpgl(options.method);
+  const std::size_t at_once = alone ? 1 : 2;
+  const auto render_from = [&](std::size_t first) {
+    render::render_options own = options;
+    for (std::size_t i = first; i < pictures.size(); i += at_once) {
+      own.seed = first_seed + i;
+      pictures[i] = tiles_of(render::render(world, own, {}).picture);
+    }
+  };
+  std::vector<std::future<void>> others;
+  for (std::size_t i = 1; i < at_once; ++i) others.push_back(std::async(std::launch::async, render_from, i));
+  render_from(0);
+  for (std::future<void>& other : others) other.get();
   tile_means result(tiles * tiles);
-  const render::scene world = render::make_builtin_scene(what.scene);
-  render::render_options options = what.options();
-  for (int i = 0; i < factor * renderings; ++i) {
-    options.seed = first_seed + static_cast<std::uint64_t>(i);
-    result.add(tiles_of(render::render(world, options, {}).picture));
-  }
+  for (const std::vector<double>& picture : pictures) result.add(picture);
   return result;
 }
 
-/// Of path tracing on the CPU, made once.
-inline const tile_means& unguided_tiles(const std::string& scene, bool nee, int factor) {
-  static std::map<std::tuple<std::string, bool, int>, tile_means> made;
-  const auto found = made.find({scene, nee, factor});
+/// Of path tracing on the CPU, made once. `max_depth` 2: direct light alone; 0: all.
+inline const tile_means& unguided_tiles(const rendering& like, int factor, int max_depth = 0) {
+  static std::map<std::tuple<std::string, bool, bool, int, int>, tile_means> made;
+  const auto key = std::make_tuple(like.scene, like.nee, like.precise, factor, max_depth);
+  const auto found = made.find(key);
   if (found != made.end()) return found->second;
-  const rendering unguided{scene, nee, render::sampling_method::pt};
+  rendering unguided{like.scene, like.nee, render::sampling_method::pt};
+  unguided.precise = like.precise;
+  render::render_options options = unguided.options();
+  if (max_depth > 0) options.max_depth = max_depth;
   const auto first_seed = static_cast<std::uint64_t>(1000 * factor);
-  return made.emplace(std::make_tuple(scene, nee, factor), render_tiles(unguided, first_seed, factor))
-      .first->second;
+  return made.emplace(key, render_tiles(options, like.scene, first_seed, factor * renderings)).first->second;
 }
 
-/// Checks that the mean of what is rendered is path tracing's on the CPU.
-inline void check_rendering(const rendering& what) {
-  const wfpg::testing::check_report report = check_renderers_unbiased(
-      [&](int factor) { return unguided_tiles(what.scene, what.nee, factor); },
-      [&](int factor) { return render_tiles(what, static_cast<std::uint64_t>(500 * (factor - 1)), factor); });
+/// Checks that the mean of what is rendered is path tracing's on the CPU, and gives what was.
+inline tile_means check_rendering(const rendering& what) {
+  const auto render = [&](int factor) {
+    const auto first_seed = static_cast<std::uint64_t>(500 * (factor - 1));
+    return render_tiles(what.options(), what.scene, first_seed, factor * what.count());
+  };
+  const tile_means once = render(1);
+  const wfpg::testing::check_report report =
+      check_renderers_unbiased([&](int factor) { return unguided_tiles(what, factor); },
+                               [&](int factor) { return factor == 1 ? once : render(factor); });
   INFO(what.name() << ": " << report.message);
   CHECK(report);
+  return once;
+}
+
+/// Checks that in the bright room, with so many samples that 1% of bias in indirect light is found with
+/// probability 0.99: the standard error says so, and the check rejects what has that bias planted.
+inline void check_precisely(rendering what) {
+  what.scene = "bright-room";
+  what.precise = true;
+  const tile_means tested = check_rendering(what);
+  const tile_means& truth = unguided_tiles(what, 1);
+  const tile_means& direct = unguided_tiles(what, 1, 2);
+  std::vector<double> direct_light;
+  for (std::size_t i = 0; i < direct.size(); ++i) direct_light.push_back(direct.mean(i));
+  INFO(what.name());
+  CHECK(found_bias(truth, tested) <= 0.01 * (truth.picture_mean() - direct.picture_mean()));
+  CHECK_FALSE(check_unbiased(truth, tested.scaled_beyond(direct_light, 1.01)));
 }
 
 }  // namespace wfpg_test

@@ -168,34 +168,82 @@ sampler_report check_sampler(const std::vector<drawn_direction>& drawn, const De
   return sampler_check<Density>(drawn, pdf, options).run();
 }
 
-/// Means of a picture's tiles over independent renderings of one method, each with its own variance.
+/// Means of a picture's tiles, and of the whole picture, over independent renderings of one method, each with
+/// its own variance.
 class tile_means {
  public:
-  explicit tile_means(std::size_t tiles) : sums_(tiles), squares_(tiles) {}
+  explicit tile_means(std::size_t tiles) : tiles_(tiles) {}
 
   /// The tiles of one rendering.
   void add(const std::vector<double>& tiles) {
     ++renderings_;
-    for (std::size_t i = 0; i < sums_.size(); ++i) {
-      sums_[i] += tiles[i];
-      squares_[i] += tiles[i] * tiles[i];
-    }
+    for (std::size_t i = 0; i < tiles_.size(); ++i) tiles_[i].add(tiles[i]);
+    picture_.add(mean_of(tiles));
   }
 
-  std::size_t size() const { return sums_.size(); }
-  double mean(std::size_t tile) const { return sums_[tile] / renderings_; }
-  double variance_of_mean(std::size_t tile) const {
-    return (squares_[tile] / renderings_ - mean(tile) * mean(tile)) / (renderings_ - 1.0);
+  std::size_t size() const { return tiles_.size(); }
+  double mean(std::size_t tile) const { return mean(tiles_[tile]); }
+  double variance_of_mean(std::size_t tile) const { return variance_of_mean(tiles_[tile]); }
+  /// Of all tiles together: what is independent from tile to tile cancels.
+  double picture_mean() const { return mean(picture_); }
+  double variance_of_picture_mean() const { return variance_of_mean(picture_); }
+
+  /// As if each rendering had `factor` times its light beyond `rest`, a known mean of each tile.
+  tile_means scaled_beyond(const std::vector<double>& rest, double factor) const {
+    tile_means result = *this;
+    for (std::size_t i = 0; i < size(); ++i)
+      result.tiles_[i] = tiles_[i].scaled_beyond(rest[i], factor, renderings_);
+    result.picture_ = picture_.scaled_beyond(mean_of(rest), factor, renderings_);
+    return result;
+  }
+
+  static double mean_of(const std::vector<double>& values) {
+    double sum = 0.0;
+    for (const double x : values) sum += x;
+    return sum / static_cast<double>(values.size());
   }
 
  private:
+  struct moments {
+    double sum = 0.0, squares = 0.0;
+
+    void add(double x) { sum += x, squares += x * x; }
+    moments scaled_beyond(double rest, double factor, double n) const {
+      const double offset = (1.0 - factor) * rest;
+      return {n * offset + factor * sum,
+              n * offset * offset + 2.0 * offset * factor * sum + factor * factor * squares};
+    }
+  };
+
+  double mean(const moments& m) const { return m.sum / renderings_; }
+  double variance_of_mean(const moments& m) const {
+    return (m.squares / renderings_ - mean(m) * mean(m)) / (renderings_ - 1.0);
+  }
+
   double renderings_ = 0.0;
-  std::vector<double> sums_, squares_;
+  std::vector<moments> tiles_;
+  moments picture_;
 };
+
+/// Beyond this many standard errors two pictures' means differ: of correct ones 4 in 1000 do, with 24
+/// renderings of each.
+inline constexpr double picture_threshold = 3.2;
+
+/// The standard error of the difference between two methods' pictures, all tiles together.
+inline double picture_error(const tile_means& truth, const tile_means& tested) {
+  return std::sqrt(truth.variance_of_picture_mean() + tested.variance_of_picture_mean());
+}
+
+/// The bias that check_unbiased() finds in a picture's mean with probability 0.99: 2.33 standard errors
+/// beyond the threshold.
+inline double found_bias(const tile_means& truth, const tile_means& tested) {
+  return (picture_threshold + 2.33) * picture_error(truth, tested);
+}
 
 /// Checks that two renderers have one mean, by tiles that each know their variance. With some 20 renderings
 /// or more of each, Student's t exceeds 6 in no tile of correct ones and 4 in 0.02% of them. A bias too small
-/// for one tile shows in all of them together: the mean of t² is 1 within four standard errors.
+/// for one tile shows in all of them together: in the picture's mean where it has one sign, and else in the
+/// mean of t², which is 1 within four standard errors.
 inline wfpg::testing::check_report check_unbiased(const tile_means& truth, const tile_means& tested) {
   double sum_of_squares = 0.0, count = 0.0, beyond = 0.0;
   for (std::size_t tile = 0; tile < truth.size(); ++tile) {
@@ -221,10 +269,14 @@ inline wfpg::testing::check_report check_unbiased(const tile_means& truth, const
     return {
         wfpg::detail::sentence("tiles together: the mean of their squared differences in standard errors is ",
                                sum_of_squares / count, ", expected 1 within ", 4.0 * std::sqrt(2.0 / count))};
+  const double z = (tested.picture_mean() - truth.picture_mean()) / picture_error(truth, tested);
+  if (count > 0.0 && !(std::fabs(z) < picture_threshold))
+    return {wfpg::detail::sentence("the picture: observed a mean of ", tested.picture_mean(), ", expected ",
+                                   truth.picture_mean(), ", ", z, " standard errors apart")};
   return {};
 }
 
-/// The same of renderers that render for it. Of correct ones a check of 64 tiles fails by chance once in 70
+/// The same of renderers that render for it. Of correct ones a check of 64 tiles fails by chance once in 55
 /// times, so that one that fails is made anew with four times as many renderings: a bias is twice as many
 /// standard errors there, and chance does not come back. `truth` and `tested`: (int factor) -> tile_means of
 /// `factor` times as many renderings as suffice, independent of those of another factor.
