@@ -1,5 +1,5 @@
-// The host that README.md's section "Guide your path tracer" talks about, and that section's code as it
-// stands there.
+// The host that docs/host.md and README.md talk about, and their code as it stands there: the functors of the
+// one are what the other's loop passes.
 #include <wfpg/types.hpp>
 
 #include <cstdint>
@@ -39,5 +39,7 @@ void start_camera_paths(std::vector<path>&, std::uint32_t sample);
 void trace(const scene&, path&);
 
 }  // namespace my
+
+#include "host-1.inc"
 
 #include "readme-1.inc"
