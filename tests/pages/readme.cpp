@@ -41,5 +41,4 @@ void trace(const scene&, path&);
 }  // namespace my
 
 #include "host-1.inc"
-
 #include "readme-1.inc"
