@@ -5,6 +5,7 @@
 #include "measures.hpp"
 #include "program.hpp"
 #include "support/catch.hpp"
+#include "support/command_lines.hpp"
 #include "support/inspections.hpp"
 #include "support/renderer_io.hpp"
 
@@ -26,18 +27,8 @@ using inspect::direction_grid;
 using render::image;
 using render::vec2;
 
-struct outcome {
-  int code;
-  std::string out, log;
-};
-
-outcome run(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "wfpg-inspect");
-  std::vector<const char*> argv;
-  for (const std::string& argument : arguments) argv.push_back(argument.c_str());
-  std::ostringstream out, log;
-  const int code = inspect::run_program(static_cast<int>(argv.size()), argv.data(), out, log);
-  return {code, out.str(), log.str()};
+outcome run(const std::vector<std::string>& arguments) {
+  return run_command(inspect::run_program, "wfpg-inspect", arguments);
 }
 
 /// The bytes of all that a page has in it as base64.

@@ -50,21 +50,25 @@ WFPG_TEST_CASE("product sampler: nothing is left of black and of delta BSDFs", "
   }
 }
 
-/// The cosine about `up`, where it is positive, over blocks of a field of light everywhere: their
-/// probabilities.
-std::vector<double> cosines_of_blocks(const directional_field& field, std::uint32_t p) {
+/// What `light` is of a direction, over each block of a field: probabilities.
+template <class Light>
+std::vector<double> shares_of_blocks(const directional_field& field, std::uint32_t p, const Light& light) {
   constexpr std::uint32_t n = 32;  // of the midpoint rule, along a block's side
   std::vector<double> blocks(p * p, 0.0);
   double sum = 0.0;
   for (std::uint32_t i = 0; i < p * p * n * n; ++i) {
     const std::uint32_t x = i % (p * n), y = i / (p * n);
-    const vec3 d = field.direction((vec2(float(x), float(y)) + 0.5f) / float(p * n));
-    const double cosine = std::max(double(glm::dot(d, up)), 0.0);
-    blocks[y / n * p + x / n] += cosine;
-    sum += cosine;
+    const double here = light(field.direction((vec2(float(x), float(y)) + 0.5f) / float(p * n)));
+    blocks[y / n * p + x / n] += here;
+    sum += here;
   }
   for (double& block : blocks) block /= sum;
   return blocks;
+}
+
+/// The cosine about a normal where it is positive, 0 below.
+double cosine_above(vec3 d, vec3 normal) {
+  return std::max(double(glm::dot(d, normal)), 0.0);
 }
 
 WFPG_TEST_CASE("product sampler: of light everywhere and a Lambertian cosines are left",
@@ -72,7 +76,9 @@ WFPG_TEST_CASE("product sampler: of light everywhere and a Lambertian cosines ar
   constexpr product_size size{16, 8};
   const made_product<Exec, test_bsdf> made(Exec(), size, field_values(field_kind::uniform, size.field, 1),
                                            false, make_surface({}, up, toward_eye), 1, 10);
-  const std::vector<double> cells = made.cells(), expected = cosines_of_blocks(made.field(), size.product);
+  const std::vector<double> cells = made.cells();
+  const std::vector<double> expected =
+      shares_of_blocks(made.field(), size.product, [](vec3 d) { return cosine_above(d, up); });
   std::vector<double> blocks(expected.size(), 0.0);
   for (std::uint32_t i = 0; i < cells.size(); ++i)
     blocks[i / size.field / 2 * size.product + i % size.field / 2] += cells[i];
@@ -106,22 +112,6 @@ std::vector<float> cells_of_glow(std::uint32_t n, bool hemisphere) {
   return values;
 }
 
-/// What a Lambertian surface reflects of it from each block: probabilities.
-std::vector<double> reflected_glow(const directional_field& field, std::uint32_t p, vec3 normal) {
-  constexpr std::uint32_t n = 32;  // of the midpoint rule, along a block's side
-  std::vector<double> blocks(p * p, 0.0);
-  double sum = 0.0;
-  for (std::uint32_t i = 0; i < p * p * n * n; ++i) {
-    const std::uint32_t x = i % (p * n), y = i / (p * n);
-    const vec3 d = field.direction((vec2(float(x), float(y)) + 0.5f) / float(p * n));
-    const double light = glow(d) * std::max(double(glm::dot(d, normal)), 0.0);
-    blocks[y / n * p + x / n] += light;
-    sum += light;
-  }
-  for (double& block : blocks) block /= sum;
-  return blocks;
-}
-
 /// By how much a product's blocks differ from that: the share of directions that are drawn elsewhere.
 template <class Exec, class Bsdf>
 double misplaced(bool hemisphere, vec3 normal) {
@@ -132,7 +122,9 @@ double misplaced(bool hemisphere, vec3 normal) {
   surface.bsdf.normal = normal;
   const made_product<Exec, Bsdf> made(Exec(), size, cells_of_glow(size.field, hemisphere), hemisphere,
                                       surface, 1, 10);
-  std::vector<double> difference = reflected_glow(made.field(), size.product, normal);
+  // What a Lambertian surface reflects.
+  std::vector<double> difference =
+      shares_of_blocks(made.field(), size.product, [&](vec3 d) { return glow(d) * cosine_above(d, normal); });
   const std::vector<double> cells = made.cells();
   constexpr std::uint32_t side = size.field / size.product;
   for (std::uint32_t i = 0; i < cells.size(); ++i)

@@ -1,4 +1,4 @@
-// wfpg-render's command lines in tests.
+// Programs' command lines in tests.
 #pragma once
 
 #include "render_program.hpp"
@@ -14,14 +14,19 @@ struct outcome {
   std::string out, log;
 };
 
-/// Runs wfpg-render with a command line's words.
-inline outcome run_render(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "wfpg-render");
-  std::vector<const char*> argv;
+/// Runs a program's run_program() with a command line's words.
+template <class Program>
+outcome run_command(const Program& program, const char* name, const std::vector<std::string>& arguments) {
+  std::vector<const char*> argv{name};
   for (const std::string& argument : arguments) argv.push_back(argument.c_str());
   std::ostringstream out, log;
-  const int code = render::run_program(static_cast<int>(argv.size()), argv.data(), out, log);
+  const int code = program(static_cast<int>(argv.size()), argv.data(), out, log);
   return {code, out.str(), log.str()};
+}
+
+/// Runs wfpg-render.
+inline outcome run_render(const std::vector<std::string>& arguments) {
+  return run_command(render::run_program, "wfpg-render", arguments);
 }
 
 }  // namespace render_test

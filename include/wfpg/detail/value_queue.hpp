@@ -60,7 +60,7 @@ class exact_sum {
   int shift_;
 };
 
-/// What a kernel sees of a queue. A default one has room for nothing.
+/// View of a queue, for kernels. A default-constructed one has room for nothing.
 class value_queue_view {
  public:
   /// The first of n entries in a row. Each that fits is then written or dropped, and then counted: writing
