@@ -1,7 +1,7 @@
 // Building the guide of a mesh of a million triangles: voxelization, octree, normals and cache, each by
 // itself. Arguments: octree resolution, triangles in thousands.
 #include <wfpg/exec/tbb.hpp>
-#include <wfpg/exitance_cache.hpp>
+#include <wfpg/octree/exitance_cache.hpp>
 
 #include <benchmark/benchmark.h>
 

@@ -2,8 +2,8 @@
 // and the density of another direction; P = 8 over F = 64. And what evaluating the BSDF takes of that.
 #include "materials.hpp"
 
-#include <wfpg/detail/cpu_block.hpp>
-#include <wfpg/product_sampler.hpp>
+#include <wfpg/exec/support/cpu_block.hpp>
+#include <wfpg/sampling/product_sampler.hpp>
 
 #include <benchmark/benchmark.h>
 
@@ -33,7 +33,7 @@ struct drawn_direction {
 };
 
 vec2 random_vec2(std::uint64_t stream, std::uint64_t i) {
-  return wfpg::detail::unit_vec2(wfpg::detail::hash(wfpg::detail::hash(1, stream), i));
+  return wfpg::unit_vec2(wfpg::hash(wfpg::hash(1, stream), i));
 }
 
 // A field over the hemisphere above `up`, bright in a few places, and rays that meet surfaces of one material
@@ -48,15 +48,14 @@ struct workload {
   std::array<ray, 256> rays;
 
   explicit workload(render::material_kind kind) {
-    const wfpg::detail::cpu_block<8> block(nullptr, 0);
-    const wfpg::detail::cell_words cells{sums.data()};
+    const wfpg::cpu_block<8> block(nullptr, 0);
+    const wfpg::cell_words cells{sums.data()};
     for (std::uint32_t i = 0; i < field_resolution * field_resolution; ++i)
       cells.set(static_cast<int>(i), std::pow(random_vec2(0, i).x, 8.0f));
-    const auto grid =
-        wfpg::detail::build_distribution(block, cells, static_cast<int>(field_resolution), 0.01f);
+    const auto grid = wfpg::build_distribution(block, cells, static_cast<int>(field_resolution), 0.01f);
     field = wfpg::directional_field(grid, up);
-    const wfpg::detail::draw_product_points draw{hemisphere.data(), sphere.data(), product_resolution, 2};
-    const wfpg::detail::measure_product_blocks measure{hemisphere.data(), sphere.data(), product_resolution};
+    const wfpg::draw_product_points draw{hemisphere.data(), sphere.data(), product_resolution, 2};
+    const wfpg::measure_product_blocks measure{hemisphere.data(), sphere.data(), product_resolution};
     for (std::uint32_t i = 0; i < block_count; ++i) {
       measure(i);
       draw(i);
@@ -67,7 +66,7 @@ struct workload {
 
   static ray make_ray(render::material_kind kind, std::uint32_t i) {
     const auto above = [&](vec3 axis, std::uint64_t stream) {
-      return wfpg::detail::frame(axis).to_world(wfpg::square_to_hemisphere(random_vec2(stream, i)));
+      return wfpg::frame(axis).to_world(wfpg::square_to_hemisphere(random_vec2(stream, i)));
     };
     const vec3 normal = glm::normalize(up + 0.5f * above(up, 1));
     const vec3 outgoing = glm::normalize(0.1f * normal + above(normal, 2));
@@ -78,7 +77,7 @@ struct workload {
 
 drawn_direction product_of(const workload& w, const ray& r) {
   std::uint32_t words[block_count];
-  const wfpg::product_field product = wfpg::detail::multiply(w.field, w.points, r.hit, words);
+  const wfpg::product_field product = wfpg::multiply_field(w.field, w.points, r.hit, words);
   drawn_direction result;
   if (product.empty()) return result;
   result.direction = product.sample(r.u, result.density);

@@ -5,8 +5,8 @@
 #include "support/failing_resource.hpp"
 #include "support/policies.hpp"
 
-#include <wfpg/buffer.hpp>
-#include <wfpg/error.hpp>
+#include <wfpg/base/error.hpp>
+#include <wfpg/exec/buffer.hpp>
 
 #include <thrust/reduce.h>
 #include <thrust/sort.h>
@@ -256,12 +256,12 @@ TEST_CASE("errors name what was wrong", "[error]") {
     }
     return std::string("nothing thrown");
   };
-  CHECK(message([] { wfpg::detail::require(true, "size", 3, "4"); }) == "nothing thrown");
-  CHECK(message([] { wfpg::detail::require(false, "size", 3, "4"); }) == "wfpg: size is 3, expected 4");
+  CHECK(message([] { wfpg::require(true, "size", 3, "4"); }) == "nothing thrown");
+  CHECK(message([] { wfpg::require(false, "size", 3, "4"); }) == "wfpg: size is 3, expected 4");
   CHECK(message([] { throw wfpg::device_error(7, "too hot", "launch"); }) ==
         "wfpg: launch: too hot (code 7)");
   CHECK(wfpg::device_error(7, "too hot", "launch").code() == 7);
-  CHECK_THROWS_AS(wfpg::detail::require(false, "size", 3, "4"), std::invalid_argument);
+  CHECK_THROWS_AS(wfpg::require(false, "size", 3, "4"), std::invalid_argument);
 }
 
 }  // namespace

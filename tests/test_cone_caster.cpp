@@ -4,9 +4,10 @@
 #include "support/catch.hpp"
 #include "support/octree_nodes.hpp"
 
-#include <wfpg/cone_caster.hpp>
-#include <wfpg/octahedral_map.hpp>
-#include <wfpg/ray_caster.hpp>
+#include <wfpg/base/octahedral_map.hpp>
+#include <wfpg/host/ray_caster.hpp>
+#include <wfpg/octree/svo_cone_caster.hpp>
+#include <wfpg/octree/svo_ray_caster.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 #include "support/guiding.hpp"
 #include "support/statistics.hpp"
 
-#include <wfpg/cone_caster.hpp>
+#include <wfpg/octree/svo_cone_caster.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -20,7 +20,7 @@ struct width_caster {
   WFPG_HD wfpg::ray_hit operator()(const wfpg::ray&) const { return (*this)(wfpg::ray(), -1.0f); }
   WFPG_HD wfpg::ray_hit operator()(const wfpg::ray&, float solid_angle) const {
     const bool right = std::fabs(solid_angle - expected) < 1.0e-4f * expected;
-    wfpg::detail::atomic_add(right ? wrong + 1 : wrong, 1u);
+    wfpg::atomic_add(right ? wrong + 1 : wrong, 1u);
     return {-1.0f, 1.0f};
   }
 };
@@ -44,7 +44,7 @@ WFPG_TEST_CASE("cone caster: fields say how wide their cones are", "[cone_caster
         guided_box<Exec> box(box_options(mode, lifetime));
         box.learn();
         const float cells = lifetime == field_lifetime::kept || depth == 0 ? 256.0f : 64.0f;
-        const float covered = (mode == guiding_mode::plain ? 4.0f : 2.0f) * wfpg::detail::pi;
+        const float covered = (mode == guiding_mode::plain ? 4.0f : 2.0f) * wfpg::pi;
         const wfpg::buffer<std::uint32_t, Exec> counts(box.exec, std::vector<std::uint32_t>(2, 0));
         box.sample(wall_surfaces(500, 1), width_caster{covered / cells, counts.data()}, 1, depth);
         CHECK(counts.to_host(box.exec)[0] == 0);

@@ -4,8 +4,8 @@
 #include "support/catch.hpp"
 #include "support/policies.hpp"
 
-#include <wfpg/detail/atomic.hpp>
 #include <wfpg/exec/policy.hpp>
+#include <wfpg/exec/support/atomic.hpp>
 
 #include <thrust/scan.h>
 #include <thrust/sort.h>
@@ -27,7 +27,7 @@ using warp_of = typename Exec::block::warp;
 
 struct count_visits {
   std::uint32_t* visits;
-  WFPG_HD void operator()(std::size_t i) const { wfpg::detail::atomic_add(visits + i, 1u); }
+  WFPG_HD void operator()(std::size_t i) const { wfpg::atomic_add(visits + i, 1u); }
 };
 /// One visit of each block.
 struct count_blocks {
@@ -79,8 +79,8 @@ struct take_steps {
       return static_cast<std::uint32_t>(index % 5);
     });
     run.once([&] {
-      wfpg::detail::atomic_add(sum, std::uint64_t(returned));
-      if (run.first() == 0) wfpg::detail::atomic_add(begun, 1u);
+      wfpg::atomic_add(sum, std::uint64_t(returned));
+      if (run.first() == 0) wfpg::atomic_add(begun, 1u);
     });
     run.for_each([&](std::size_t index, int i) {
       if (squares[i] == static_cast<std::uint32_t>(index * index)) visit(index);

@@ -6,8 +6,8 @@
 #include "support/random_meshes.hpp"
 #include "support/section_bytes.hpp"
 
-#include <wfpg/detail/guide_state.hpp>
-#include <wfpg/exitance_cache.hpp>
+#include <wfpg/guides/octree/detail/guide_state.hpp>
+#include <wfpg/octree/exitance_cache.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -28,7 +28,7 @@ std::string name_of(field_kind kind, std::uint32_t resolution, std::uint64_t see
 }
 
 WFPG_HD vec2 random_point(std::uint64_t seed, std::size_t i) {
-  return wfpg::detail::unit_vec2(wfpg::detail::hash(seed, i));
+  return wfpg::unit_vec2(wfpg::hash(seed, i));
 }
 
 WFPG_HD bool in_square(vec2 p) {
@@ -74,7 +74,7 @@ struct density_of_sample {
     const vec2 u = random_point(9, i), uv = grid.sample(u);
     const auto cell = static_cast<std::uint32_t>(cell_of(uv, resolution));
     const auto weight = float(grid.weight(cell % resolution, cell / resolution));
-    const float domain = (field.hemisphere() ? 2.0f : 4.0f) * wfpg::detail::pi;
+    const float domain = (field.hemisphere() ? 2.0f : 4.0f) * wfpg::pi;
     const float density = weight / float(grid.total()) * float(resolution * resolution) / domain;
     return field.pdf(field.sample(u)) == density && density > 0.0f;
   }
@@ -249,10 +249,9 @@ struct rectangles_above {
 
   WFPG_HD std::uint32_t of(vec3 d) const {
     const float turn = std::atan2(glm::dot(d, bitangent), glm::dot(d, tangent)) / full_turn;
-    const float row = wfpg::detail::max(glm::dot(d, normal), 0.0f) * float(rows);
+    const float row = wfpg::max(glm::dot(d, normal), 0.0f) * float(rows);
     const float column = (turn < 0.0f ? turn + 1.0f : turn) * float(columns);
-    return wfpg::detail::min(std::uint32_t(row), rows - 1) * columns +
-           wfpg::detail::min(std::uint32_t(column), columns - 1);
+    return wfpg::min(std::uint32_t(row), rows - 1) * columns + wfpg::min(std::uint32_t(column), columns - 1);
   }
   /// A direction from (row, column), not whole numbers.
   WFPG_HD vec3 direction(float row, float column) const {
@@ -280,8 +279,7 @@ struct integrate_rectangle {
     constexpr std::uint32_t n = 100;
     double sum = 0.0;
     for (std::uint32_t k = 0; k < n * n; ++k) {
-      const vec2 inside =
-          (vec2(float(k % n), float(k / n)) + random_point(wfpg::detail::hash(1, i), k)) / float(n);
+      const vec2 inside = (vec2(float(k % n), float(k / n)) + random_point(wfpg::hash(1, i), k)) / float(n);
       sum += double(field.pdf(rectangles.direction(float(i / rectangles_above::columns) + inside.y,
                                                    float(i % rectangles_above::columns) + inside.x)));
     }
@@ -322,7 +320,7 @@ WFPG_TEST_CASE("field sampler: on hemispheres a density that is off by 2% in a p
     std::vector<double> observed(rectangles_above::count, 0.0);
     for (std::uint64_t chunk = 0; chunk < samples / at_once; ++chunk)
       for (const std::uint32_t i :
-           evaluate(exec, at_once, rectangle_of_sample{field, rectangles, wfpg::detail::hash(50, chunk)}))
+           evaluate(exec, at_once, rectangle_of_sample{field, rectangles, wfpg::hash(50, chunk)}))
         observed[i] += 1.0;
     family.add(chi_square_test(observed, expected), name_of(kind, 16, 33));
 

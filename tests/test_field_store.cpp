@@ -10,7 +10,7 @@
 #include "support/statistics.hpp"
 #include "support/threads.hpp"
 
-#include <wfpg/field_store.hpp>
+#include <wfpg/guides/octree/field_store.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -20,10 +20,10 @@
 #include <vector>
 
 using namespace wfpg_test;
+using wfpg::cone_hit;
 using wfpg::directional_field;
 using wfpg::guide_view;
 using wfpg::guiding_mode;
-using wfpg::detail::cone_hit;
 
 namespace {
 
@@ -182,9 +182,8 @@ WFPG_TEST_CASE("field store: directions have the density that fields report, whi
 /// Where a direction's cell is in a field's grid.
 std::size_t cell_of(const directional_field& field, vec3 d) {
   const std::uint32_t n = field.grid().resolution();
-  const vec2 uv = field.hemisphere()
-                      ? wfpg::hemisphere_to_square(wfpg::detail::frame(field.normal()).to_local(d))
-                      : wfpg::sphere_to_square(d);
+  const vec2 uv = field.hemisphere() ? wfpg::hemisphere_to_square(wfpg::frame(field.normal()).to_local(d))
+                                     : wfpg::sphere_to_square(d);
   const vec2 cell = glm::min(glm::floor(uv * float(n)), vec2(float(n - 1)));
   return std::size_t(cell.y) * n + std::size_t(cell.x);
 }

@@ -8,7 +8,7 @@
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
-#include <wfpg/field_store.hpp>
+#include <wfpg/guides/octree/field_store.hpp>
 
 #include <algorithm>
 #include <set>

@@ -5,7 +5,7 @@
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
-#include <wfpg/field_store.hpp>
+#include <wfpg/guides/octree/field_store.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -122,8 +122,8 @@ WFPG_TEST_CASE("field store: samples that only count rays leave bins to those th
   kept_box<Exec> box(slots_of(4, 160));
   const auto surfaces = wall_surfaces(600, 1);
   const wfpg::buffer<test_surface, Exec> stored(box.exec(), surfaces);
-  const wfpg::detail::wave_rays<stored_surfaces> rays{{const_view<test_surface>(stored)},
-                                                      wfpg::guiding_mode::oriented};
+  const wfpg::wave_rays<stored_surfaces> rays{{const_view<test_surface>(stored)},
+                                              wfpg::guiding_mode::oriented};
   while (box.sample < 8) {
     box.begin();
     box.store.count(box.exec(), surfaces.size(), rays);

@@ -161,7 +161,7 @@ TEST_CASE(
     wfpg::sampling_options options;
     options.max_paths = paths;
     options.max_depth = 4;
-    return wfpg::detail::recorded_share(options, wanted).needs(true);
+    return wfpg::detail::recorded_fraction(options, wanted).needs(true);
   };
   const auto is = [](const wfpg::recording_needs& n, std::uint32_t share, std::uint32_t turns) {
     return n.directions && n.share_shift == share && n.settled_turns == turns;

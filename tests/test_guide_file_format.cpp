@@ -82,7 +82,7 @@ std::map<std::string, std::size_t> units_of(const wfpg::path_guider<one_policy>&
   const std::string fields = payload_of(bytes, "fields");
   std::size_t live = 0, built = 0;
   for (std::size_t at = 32; at < fields.size(); ++live) {
-    const float fraction = wfpg::detail::number_at<float>(&fields[at + 32]);
+    const float fraction = wfpg::number_at<float>(&fields[at + 32]);
     built += fraction > 0.0f;
     at += 36 + (fraction > 0.0f ? 10 * cells + 4 * options.kept.resolution : 0);
   }
@@ -171,11 +171,11 @@ TEST_CASE("a guide of other triangles is refused by its octree", "[guide_file]")
 }
 
 /// A policy that counts copies to the host and back.
-class counting_policy : public wfpg::detail::cpu_policy<counting_policy, 8> {
+class counting_policy : public wfpg::exec::cpu_policy<counting_policy, 8> {
  public:
   explicit counting_policy(wfpg::memory_resource* resource = nullptr) : cpu_policy(resource) {}
 
-  auto thrust() const { return ::thrust::cpp::par(wfpg::detail::resource_allocator<char>(resource())); }
+  auto thrust() const { return ::thrust::cpp::par(wfpg::resource_allocator<char>(resource())); }
   int concurrency() const { return 1; }
   template <class F>
   void parallel(std::size_t n, std::size_t, const F& f) const {

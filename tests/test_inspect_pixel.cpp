@@ -7,8 +7,8 @@
 #include "support/inspections.hpp"
 #include "support/renderer_io.hpp"
 
-#include <wfpg/detail/chi_square.hpp>
-#include <wfpg/spatial_binner.hpp>
+#include <wfpg/bins/spatial_binner.hpp>
+#include <wfpg/testing/statistics.hpp>
 
 #include <glm/vector_relational.hpp>
 
@@ -50,7 +50,7 @@ TEST_CASE("inspect: light arrives in a furnace alike from everywhere", "[inspect
   options.nee = false;
   const learnt_scene learnt(furnace, options, {});
   const render::hit_surface& at = learnt.hits()[27];
-  const direction_grid cells(6, wfpg::detail::facing_normal(at.surface));
+  const direction_grid cells(6, wfpg::facing_normal(at.surface));
   const auto light = learnt.arriving(at, cells, 4, {});
   // Three segments are left of four.
   for (const image* half : {&light.first, &light.second})
@@ -67,7 +67,7 @@ TEST_CASE("inspect: light arrives by all lamps, however the guide groups them", 
     options.light_groups = groups;
     const learnt_scene learnt(lamps, options, {});
     const render::hit_surface& at = learnt.hits()[27];
-    const direction_grid cells(6, wfpg::detail::facing_normal(at.surface));
+    const direction_grid cells(6, wfpg::facing_normal(at.surface));
     const std::vector<vec3> pixels = learnt.arriving(at, cells, 4, {}).mean().pixels;
     if (groups == 1)
       by_one_group = pixels;
@@ -150,7 +150,7 @@ TEST_CASE("inspect: histograms are the density cell by cell", "[inspect]") {
   }
   const double scale = sum_of(observed) / sum_of(expected);
   for (double& e : expected) e *= scale;
-  const auto test = wfpg::detail::chi_square_test(observed, expected);
+  const auto test = wfpg::testing::chi_square_test(observed, expected);
   INFO(test.message);
   CHECK(test.p > 1e-3);
 }
@@ -172,7 +172,7 @@ TEST_CASE("inspect: a pixel's point lies in its bin's node, on a surface of its 
       const vec3 slack(1.5f * tree.grid().voxel_size());  // a neighbour's voxel serves where there is none
       CHECK(glm::all(glm::greaterThan(surface.position, box.lower - slack)));
       CHECK(glm::all(glm::lessThan(surface.position, box.upper + slack)));
-      CHECK(bin % wfpg::orientations == wfpg::dominant_axis(wfpg::detail::facing_normal(surface)));
+      CHECK(bin % wfpg::orientations == wfpg::dominant_axis(wfpg::facing_normal(surface)));
     }
     CHECK(binned > 24 * 24 / 2);
     CHECK(learnt.bytes().field > 8 * 8 * 4);

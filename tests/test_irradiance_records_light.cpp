@@ -4,6 +4,8 @@
 #include "support/estimates.hpp"
 #include "support/records.hpp"
 
+#include <wfpg/octree/svo_ray_caster.hpp>
+
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -107,7 +109,7 @@ struct wide_cone {
     const hashed_numbers random{5};
     const vec2 at = random(static_cast<std::uint32_t>(i / irradiance_record::cells), 0);
     const vec3 from(0.2f + 0.6f * at.x, 0.2f + 0.6f * at.y, 0.4f);
-    constexpr float cell_angle = 4.0f * wfpg::detail::pi / float(irradiance_record::cells);
+    constexpr float cell_angle = 4.0f * wfpg::pi / float(irradiance_record::cells);
     constexpr int n = 16;
     float sum = 0.0f;
     for (int k = 0; k < n * n; ++k) {
@@ -177,7 +179,7 @@ double lit_wall_radiance(vec3 from, vec3 direction, double albedo) {
     irradiance += double(patch_radiance * step * step * std::fmax(to.y * glm::dot(normal, to), 0.0f)) /
                   double(square * square + 1.0e-6f);
   }
-  return albedo * irradiance / double(wfpg::detail::pi);
+  return albedo * irradiance / double(wfpg::pi);
 }
 
 WFPG_TEST_CASE("irradiance records: what a lamp lights, against brute force", "[records]") {

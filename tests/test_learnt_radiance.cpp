@@ -5,7 +5,7 @@
 #include "support/kept_fields.hpp"
 #include "support/policies.hpp"
 
-#include <wfpg/detail/learnt_radiance.hpp>
+#include <wfpg/guides/octree/learnt_radiance.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -14,9 +14,9 @@
 #include <vector>
 
 using namespace wfpg_test;
-using wfpg::detail::learnt_mean;
-using wfpg::detail::mixed_with;
-using wfpg::detail::rough_mean;
+using wfpg::learnt_mean;
+using wfpg::mixed_with;
+using wfpg::rough_mean;
 
 TEST_CASE("learnt mean: of up to 255 values, to a part in 2^16 each time", "[learnt_radiance]") {
   learnt_mean mean;

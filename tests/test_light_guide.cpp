@@ -4,8 +4,8 @@
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
-#include <wfpg/detail/chi_square.hpp>
-#include <wfpg/light_guide.hpp>
+#include <wfpg/guides/octree/light_guide.hpp>
+#include <wfpg/testing/statistics.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -223,7 +223,7 @@ WFPG_TEST_CASE("groups are chosen as often as their probabilities say", "[light_
     CHECK((p[g] == 0.0f) == is_worth_nothing(g));
     if (is_worth_nothing(g)) CHECK(counted[g] == 0.0);
   }
-  CHECK(wfpg::detail::chi_square_test(counted, expected).p > 1e-4);
+  CHECK(wfpg::testing::chi_square_test(counted, expected).p > 1e-4);
 }
 
 WFPG_TEST_CASE("probabilities sum to one everywhere and leave no group out", "[light_guide]") {

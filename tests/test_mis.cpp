@@ -6,7 +6,8 @@
 #include "support/scenes.hpp"
 #include "support/statistics.hpp"
 
-#include <wfpg/mis.hpp>
+#include <wfpg/sampling/mis.hpp>
+#include <wfpg/sampling/mixture.hpp>
 
 #include <cmath>
 #include <string>

@@ -2,7 +2,7 @@
 #include "support/catch.hpp"
 #include "support/policies.hpp"
 
-#include <wfpg/morton.hpp>
+#include <wfpg/base/morton.hpp>
 
 #include <cstdint>
 #include <vector>

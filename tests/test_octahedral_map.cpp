@@ -2,7 +2,7 @@
 #include "support/catch.hpp"
 #include "support/policies.hpp"
 
-#include <wfpg/octahedral_map.hpp>
+#include <wfpg/base/octahedral_map.hpp>
 
 #include <glm/vec3.hpp>
 

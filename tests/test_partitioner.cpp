@@ -3,7 +3,7 @@
 #include "support/evaluate.hpp"
 #include "support/policies.hpp"
 
-#include <wfpg/partitioner.hpp>
+#include <wfpg/bins/partitioner.hpp>
 
 #include <algorithm>
 #include <cstdint>

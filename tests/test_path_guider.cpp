@@ -452,7 +452,7 @@ WFPG_TEST_CASE("path guider: what moved is cast anew, light that moved is not", 
   CHECK(toward_patch() > 1.0f);
   box.guider.forget_light();
   CHECK(cones_of_sample(box, surfaces) == refreshed);
-  CHECK(toward_patch() == Approx(0.5f / wfpg::detail::pi));  // all dark: uniform over the hemisphere
+  CHECK(toward_patch() == Approx(0.5f / wfpg::pi));  // all dark: uniform over the hemisphere
 }
 
 }  // namespace

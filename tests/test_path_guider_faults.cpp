@@ -7,6 +7,8 @@
 #include "support/scenes.hpp"
 #include "support/stepwise_samples.hpp"
 
+#include <wfpg/octree/svo_ray_caster.hpp>
+
 #include <atomic>
 #include <cmath>
 #include <cstdint>
@@ -40,13 +42,13 @@ void for_each_kind(const F& f) {
 }
 
 WFPG_HD bool is_density(float density) {
-  return density >= 0.0f && wfpg::detail::is_finite(density);
+  return density >= 0.0f && wfpg::is_finite(density);
 }
 
 /// Whether a direction may be handed out: finite, with a density, or none.
 bool is_sound(const sampled_direction& d) {
   if (d.technique == sampling_technique::none) return d.pdf == 0.0f;
-  return d.pdf > 0.0f && is_density(d.pdf) && wfpg::detail::is_finite(d.direction);
+  return d.pdf > 0.0f && is_density(d.pdf) && wfpg::is_finite(d.direction);
 }
 
 std::size_t count_unsound(const std::vector<sampled_direction>& drawn) {
@@ -90,7 +92,7 @@ WFPG_TEST_CASE("path guider: an inline caster that throws leaves it usable", "[p
 struct nonsense_caster {
   WFPG_HD wfpg::ray_hit operator()(const wfpg::ray& r) const {
     const float answers[] = {nan, -nan, infinity, -infinity, 3.0e38f, -3.0e38f, -1.0f};
-    const auto i = wfpg::detail::hash32(1, wfpg::detail::float_bits(r.direction.x));
+    const auto i = wfpg::hash32(1, wfpg::float_bits(r.direction.x));
     if (i % 2 == 0) return box_caster()(r);
     return {answers[i / 2 % 7], answers[i / 14 % 7]};
   }

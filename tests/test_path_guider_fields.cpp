@@ -232,13 +232,13 @@ struct noting_bsdf {
   WFPG_HD bool is_delta() const { return false; }
   WFPG_HD bool transmits() const { return glass; }
   WFPG_HD float eval(vec3, vec3 direction) const {
-    const std::uint32_t at = wfpg::detail::atomic_add(count, 1);
+    const std::uint32_t at = wfpg::atomic_add(count, 1);
     if (at < incident.size()) incident[at] = direction;
     return 1.0f;
   }
-  WFPG_HD float pdf(vec3, vec3) const { return 0.25f / wfpg::detail::pi; }
+  WFPG_HD float pdf(vec3, vec3) const { return 0.25f / wfpg::pi; }
   WFPG_HD wfpg::bsdf_sample sample(vec3, vec2 u) const {
-    return {wfpg::square_to_sphere(u), 0.25f / wfpg::detail::pi};
+    return {wfpg::square_to_sphere(u), 0.25f / wfpg::pi};
   }
 };
 

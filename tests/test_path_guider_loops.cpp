@@ -6,8 +6,8 @@
 #include "support/scenes.hpp"
 #include "support/stepwise_samples.hpp"
 
-#include <wfpg/detail/cpu_policy.hpp>
-#include <wfpg/error.hpp>
+#include <wfpg/base/error.hpp>
+#include <wfpg/exec/cpu_policy.hpp>
 
 #include <thrust/system/cpp/execution_policy.h>
 
@@ -30,12 +30,12 @@ struct loop_count {
 };
 
 /// The serial policy, but that the k-th loop throws before it begins.
-class failing_policy : public wfpg::detail::cpu_policy<failing_policy, 8> {
+class failing_policy : public wfpg::exec::cpu_policy<failing_policy, 8> {
  public:
   explicit failing_policy(wfpg::memory_resource* resource = nullptr) : cpu_policy(resource) {}
   explicit failing_policy(loop_count& loops) : cpu_policy(nullptr), loops_(&loops) {}
 
-  auto thrust() const { return ::thrust::cpp::par(wfpg::detail::resource_allocator<char>(resource())); }
+  auto thrust() const { return ::thrust::cpp::par(wfpg::resource_allocator<char>(resource())); }
   int concurrency() const { return 1; }
 
   template <class F>

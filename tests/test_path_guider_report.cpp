@@ -329,8 +329,8 @@ void wait(double seconds) {
 }
 
 TEST_CASE("a stage inside another one has its time to itself", "[path_guider]") {
-  using wfpg::detail::stage;
-  wfpg::detail::stage_clock clock;
+  using wfpg::stage;
+  wfpg::stage_clock clock;
   const auto begin = std::chrono::steady_clock::now();
   {
     const auto outer = clock.time(stage::fields);

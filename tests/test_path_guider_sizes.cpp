@@ -6,7 +6,7 @@
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
-#include <wfpg/detail/value_queue.hpp>
+#include <wfpg/exec/support/value_queue.hpp>
 
 #include <cstddef>
 #include <cstdint>

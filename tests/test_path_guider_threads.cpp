@@ -5,6 +5,8 @@
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
+#include <wfpg/octree/svo_ray_caster.hpp>
+
 #include <cstddef>
 #include <cstdint>
 #include <exception>

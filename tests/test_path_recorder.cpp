@@ -4,7 +4,8 @@
 #include "support/evaluate.hpp"
 #include "support/policies.hpp"
 
-#include <wfpg/path_recorder.hpp>
+#include <wfpg/guide/path_recorder.hpp>
+#include <wfpg/guides/octree/deposit_paths.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -56,7 +57,7 @@ struct recording {
     scene.exec.for_each(1, [=] WFPG_HD(std::size_t) { paths.emission(path, depth, rgb); });
   }
   void finish() {
-    recorder.deposit(scene.exec, scene.view());
+    wfpg::deposit_paths(scene.exec, recorder, scene.view());
     scene.cache.update(scene.exec);
   }
   /// Radiance that leaves voxel k upward; negative where nothing was deposited.
@@ -93,7 +94,7 @@ struct learning : recording<Exec> {
   }
   void finish() {
     const wfpg::learnt_radiance_view learnt{const_view<wfpg::resident_field>(spheres), 2, queue.view()};
-    this->recorder.deposit(this->scene.exec, this->scene.view(), learnt);
+    wfpg::deposit_paths(this->scene.exec, this->recorder, this->scene.view(), learnt);
     this->scene.cache.update(this->scene.exec);
     queue.sum(this->scene.exec);
   }
@@ -250,8 +251,7 @@ TEST_CASE("of each group of runs one is recorded, another in each sample", "[pat
   for (const std::uint32_t shift : {0u, 1u, 3u}) {
     std::vector<std::uint32_t> times(paths, 0);
     for (std::uint32_t sample = 0; sample < samples; ++sample) {
-      const wfpg::detail::recorded_runs runs{shift,
-                                             static_cast<std::uint32_t>(wfpg::detail::hash(7, sample))};
+      const wfpg::detail::recorded_runs runs{shift, static_cast<std::uint32_t>(wfpg::hash(7, sample))};
       std::vector<bool> taken(runs.size(paths), false);
       std::size_t wrong = 0;
       for (std::size_t path = 0; path < paths; ++path) {

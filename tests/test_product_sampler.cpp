@@ -2,7 +2,7 @@
 // the sampler's own. tests/test_renderer_products.cpp does the same for many more BSDFs.
 #include "support/products.hpp"
 
-#include <wfpg/product_sampler.hpp>
+#include <wfpg/sampling/product_sampler.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -176,7 +176,7 @@ WFPG_TEST_CASE("product sampler: a block that is black at one point alone is dra
 struct two_sided_bsdf : test_bsdf {
   WFPG_HD bool transmits() const { return true; }
   WFPG_HD float eval(vec3, vec3 incident) const {
-    return std::fabs(glm::dot(normal, incident)) / (2.0f * wfpg::detail::pi);
+    return std::fabs(glm::dot(normal, incident)) / (2.0f * wfpg::pi);
   }
 };
 

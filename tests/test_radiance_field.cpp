@@ -6,8 +6,11 @@
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
-#include <wfpg/detail/serve_rays.hpp>
-#include <wfpg/radiance_field.hpp>
+#include <wfpg/bins/wave_rays.hpp>
+#include <wfpg/guide/sample_rays.hpp>
+#include <wfpg/guides/octree/field_sinks.hpp>
+#include <wfpg/guides/octree/guide_view.hpp>
+#include <wfpg/guides/octree/transient_fields.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -28,13 +31,13 @@ float constant_walls(std::uint32_t face, float, float) {
 
 /// Copies out the cells of a field before anything is done to them.
 struct raw_cells {
-  wfpg::detail::field_cells cells;
+  wfpg::field_cells cells;
   wfpg::exitance_cache_view cache;
   box_caster caster;
   wfpg::array_view<float> values;
   wfpg::array_view<wfpg::ray> cones;
   WFPG_HD void operator()(std::size_t i) const {
-    cones[i] = cells.cone(wfpg::detail::cell_at(static_cast<std::uint32_t>(i), cells.resolution));
+    cones[i] = cells.cone(wfpg::cell_at(static_cast<std::uint32_t>(i), cells.resolution));
     values[i] =
         cells.weigh(cells.find(cache, cones[i], caster(cones[i])).radiance(cache), cones[i].direction);
   }
@@ -51,7 +54,7 @@ seen_cells look(const lit_box<Exec>& box, const wfpg::field_origin& origin, std:
   const std::size_t n = std::size_t(resolution) * resolution;
   const wfpg::buffer<float, Exec> values(box.exec, n);
   const wfpg::buffer<wfpg::ray, Exec> cones(box.exec, n);
-  const wfpg::detail::field_cells cells(origin, resolution);
+  const wfpg::field_cells cells(origin, resolution);
   box.exec.for_each(n, raw_cells{cells, box.cache.view(), caster, values.view(), cones.view()});
   return {values.to_host(box.exec), cones.to_host(box.exec)};
 }
@@ -111,20 +114,20 @@ WFPG_TEST_CASE("radiance field: a uniform furnace is uniform, to the rim and at 
 }
 
 struct direction_of_cone {
-  wfpg::detail::field_cells cells;
+  wfpg::field_cells cells;
   WFPG_HD vec3 operator()(std::size_t cell) const {
-    return cells.cone(wfpg::detail::cell_at(static_cast<std::uint32_t>(cell), cells.resolution)).direction;
+    return cells.cone(wfpg::cell_at(static_cast<std::uint32_t>(cell), cells.resolution)).direction;
   }
 };
 
 WFPG_TEST_CASE("radiance field: cones are jittered inside their cells, anew with the seed",
                "[radiance_field]") {
   wfpg::field_origin origin;
-  const wfpg::detail::field_cells first(origin, 16);
+  const wfpg::field_cells first(origin, 16);
   origin.seed = 1;
-  const wfpg::detail::field_cells second(origin, 16);
+  const wfpg::field_cells second(origin, 16);
   const Exec exec;
-  const auto directions = [&](const wfpg::detail::field_cells& cells) {
+  const auto directions = [&](const wfpg::field_cells& cells) {
     return evaluate(exec, 256, direction_of_cone{cells});
   };
   const std::vector<vec3> before = directions(first), after = directions(second);
@@ -156,12 +159,12 @@ WFPG_TEST_CASE("radiance field: the environment where a cone misses", "[radiance
 WFPG_TEST_CASE("radiance field: what is not finite or negative from a caster counts as nothing or bounded",
                "[radiance_field]") {
   const lit_box<Exec> box(constant_walls);
-  const wfpg::detail::field_cells cells({}, 4);
+  const wfpg::field_cells cells({}, 4);
   const wfpg::exitance_cache_view cache = box.cache.view();
   const std::vector<float> environments{2.0f, -2.0f, std::nanf(""), INFINITY, 1e38f};
   const auto values = evaluate(box.exec, environments, [=] WFPG_HD(float environment) {
     const wfpg::ray cone = cells.cone({0, 0});
-    const wfpg::detail::cone_hit hit = cells.find(cache, cone, {-1.0f, environment});
+    const wfpg::cone_hit hit = cells.find(cache, cone, {-1.0f, environment});
     return cells.weigh(hit.radiance(cache), cone.direction);
   });
   CHECK(values == std::vector<float>{2.0f, 0.0f, 0.0f, 0.0f, 1e30f});
@@ -187,17 +190,16 @@ made_fields make_fields(const lit_box<Exec>& box, const std::vector<test_surface
   const wfpg::buffer<test_surface, Exec> surfaces(exec, wave);
   const stored_surfaces stored{const_view<test_surface>(surfaces)};
   wfpg::spatial_binner<Exec> binner(exec, box.tree.view(), {1, 16}, wave.size());
-  const auto bins = binner.bin(exec, wave.size(), wfpg::detail::wave_rays<stored_surfaces>{stored, mode});
-  const wfpg::detail::bin_fields<stored_surfaces> fields{bins,       stored, box.cache.view(), {}, mode,
-                                                         resolution, 42};
+  const auto bins = binner.bin(exec, wave.size(), wfpg::wave_rays<stored_surfaces>{stored, mode});
+  const wfpg::bin_fields<stored_surfaces> fields{bins, stored, box.cache.view(), {}, mode, resolution, 42};
   const std::size_t n = wfpg::read_element(exec, bins.count);
   const wfpg::buffer<std::uint32_t, Exec> words(exec, n * wfpg::grid_distribution::words(resolution));
   const wfpg::buffer<wfpg::resident_field, Exec> resident(exec, n);
   const wfpg::buffer<std::uint32_t, Exec> field_of_ray(
       exec, std::vector<std::uint32_t>(wave.size(), wfpg::no_field));
-  wfpg::detail::for_each_field(
+  wfpg::for_each_field(
       exec, fields, caster,
-      wfpg::detail::resident_sink{
+      wfpg::resident_sink{
           bins, words.data(), resident.data(), field_of_ray.data(), {0.5f, 0.5f, 0}, resolution},
       buffer_bytes);
   return {words.to_host(exec), field_of_ray.to_host(exec), resident.to_host(exec)};

@@ -3,7 +3,7 @@
 #include "support/fields.hpp"
 #include "support/policies.hpp"
 
-#include <wfpg/radiance_field.hpp>
+#include <wfpg/guides/octree/transient_fields.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -22,7 +22,7 @@ struct finish_cells {
   wfpg::field_options options;
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t) const {
-    wfpg::detail::finish_field(block, {words}, resolution, hemisphere, options);
+    wfpg::finish_field(block, {words}, resolution, hemisphere, options);
   }
 };
 
@@ -32,7 +32,7 @@ std::vector<double> finished(const std::vector<float>& values, std::uint32_t res
                              const wfpg::field_options& options) {
   const Exec exec;
   const wfpg::buffer<std::uint32_t, Exec> words(exec, words_of(values, resolution));
-  exec.for_each_block(1, wfpg::detail::field_scratch_bytes(resolution, Exec::warps_per_block),
+  exec.for_each_block(1, wfpg::field_scratch_bytes(resolution, Exec::warps_per_block),
                       finish_cells{words.data(), int(resolution), hemisphere, options});
   const std::vector<std::uint32_t> weights = cell_weights(exec, {words.data(), resolution});
   const std::uint32_t total = std::accumulate(weights.begin(), weights.end(), 0u);

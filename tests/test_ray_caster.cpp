@@ -4,7 +4,8 @@
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
-#include <wfpg/ray_caster.hpp>
+#include <wfpg/host/ray_caster.hpp>
+#include <wfpg/octree/svo_ray_caster.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 #include "support/policies.hpp"
 #include "support/random_meshes.hpp"
 
-#include <wfpg/testing.hpp>
+#include <wfpg/testing/check_ray_caster.hpp>
 
 #include <cmath>
 #include <cstring>

@@ -311,7 +311,7 @@ TEST_CASE("the brightest lights that are not refused give finite pictures", "[re
     for (std::size_t i = 0; i < found.pixels.size(); ++i) {
       sum += static_cast<double>(wfpg::luminance(found.pixels[i]));
       expected_sum += static_cast<double>(wfpg::luminance(expected.pixels[i]));
-      not_finite += !wfpg::detail::is_finite(found.pixels[i]);
+      not_finite += !wfpg::is_finite(found.pixels[i]);
     }
     CHECK(not_finite == 0);
     CHECK(sum / static_cast<double>(largest_radiance) == Approx(expected_sum).epsilon(0.3));

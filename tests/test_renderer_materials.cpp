@@ -4,7 +4,7 @@
 #include "support/catch.hpp"
 
 #include <wfpg/exec/tbb.hpp>
-#include <wfpg/testing.hpp>
+#include <wfpg/testing/check_bsdf.hpp>
 
 #include <cstdint>
 #include <string>
@@ -103,7 +103,7 @@ vec3 uniform_sphere(vec2 u) {
   return {r * std::cos(2.0f * render::pi * u.y), r * std::sin(2.0f * render::pi * u.y), z};
 }
 
-using estimate = wfpg::detail::sample_mean;
+using estimate = wfpg::testing::sample_mean;
 
 void check(const std::string& name, const bsdf& f) {
   wfpg::testing::bsdf_check_options options;

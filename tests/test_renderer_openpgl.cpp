@@ -10,7 +10,7 @@
 #include "support/reports.hpp"
 #include "wavefront.hpp"
 
-#include <wfpg/testing.hpp>
+#include <wfpg/testing/check_bsdf.hpp>
 
 #include <tbb/global_control.h>
 

@@ -158,8 +158,7 @@ struct dark_side {
     wfpg::surface<bsdf> s;
     s.position = {0.0f, 2.6f * u.x, -2.0f + 4.0f * u.y};
     s.geometric_normal = s.normal = normal;
-    s.outgoing =
-        wfpg::detail::frame(normal).to_world(render::cosine_hemisphere(hashed_numbers{seed}(ray, 1)));
+    s.outgoing = wfpg::frame(normal).to_world(render::cosine_hemisphere(hashed_numbers{seed}(ray, 1)));
     s.bsdf = {normal, normal, vec3(0.7f, 0.6f, 0.45f), 1.0f, 1.5f, material_kind::lambert};
     return s;
   }

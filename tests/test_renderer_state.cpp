@@ -10,7 +10,7 @@
 #include "support/renderings.hpp"
 #include "support/section_bytes.hpp"
 
-#include <wfpg/error.hpp>
+#include <wfpg/base/error.hpp>
 
 #include <csignal>
 #include <cstring>

@@ -2,7 +2,7 @@
 #include "support/catch.hpp"
 #include "support/temporary_folder.hpp"
 
-#include <wfpg/detail/section_file.hpp>
+#include <wfpg/state/section_file.hpp>
 
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -18,7 +18,7 @@
 namespace {
 
 using namespace wfpg_test;
-using wfpg::detail::replace_file;
+using wfpg::replace_file;
 namespace fs = std::filesystem;
 
 void replace_by(const std::string& path, const std::string& bytes) {

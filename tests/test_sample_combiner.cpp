@@ -1,7 +1,7 @@
 // The ways to combine samples, sample by sample.
 #include "support/catch.hpp"
 
-#include <wfpg/sample_combiner.hpp>
+#include <wfpg/sampling/sample_combiner.hpp>
 
 #include <cstdint>
 #include <vector>

@@ -5,7 +5,7 @@
 #include "support/policies.hpp"
 #include "support/random_meshes.hpp"
 
-#include <wfpg/sparse_voxel_octree.hpp>
+#include <wfpg/octree/sparse_voxel_octree.hpp>
 
 #include <algorithm>
 #include <cmath>

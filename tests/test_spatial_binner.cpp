@@ -5,7 +5,7 @@
 #include "support/policies.hpp"
 #include "support/random_meshes.hpp"
 
-#include <wfpg/spatial_binner.hpp>
+#include <wfpg/bins/spatial_binner.hpp>
 
 #include <algorithm>
 #include <cmath>

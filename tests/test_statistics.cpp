@@ -83,10 +83,10 @@ TEST_CASE("statistics: correct samplers are rejected as rarely as they are to be
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     std::vector<drawn_direction> drawn;
     random_numbers random(seed);
-    for (int i = 0; i < 4000; ++i) drawn.push_back({random.direction(), 0.25f / wfpg::detail::pi});
+    for (int i = 0; i < 4000; ++i) drawn.push_back({random.direction(), 0.25f / wfpg::pi});
     sampler_check_options options;
     options.significance = 0.05;
-    rejected += !check_sampler(drawn, each([](vec3) { return 0.25f / wfpg::detail::pi; }), options);
+    rejected += !check_sampler(drawn, each([](vec3) { return 0.25f / wfpg::pi; }), options);
   }
   CHECK(rejected <= 12);  // 5 expected, 0.1% of 13 or more
 }
@@ -127,15 +127,15 @@ TEST_CASE("statistics: a cell shifted by one is caught", "[statistics]") {
 
 TEST_CASE("statistics: a missing Jacobian is caught", "[statistics]") {
   const open_sampler sampler;
-  const auto of_the_square = [&](vec3 d) { return 4.0f * wfpg::detail::pi * sampler.pdf(d); };
+  const auto of_the_square = [&](vec3 d) { return 4.0f * wfpg::pi * sampler.pdf(d); };
   check_names(check_sampler(sampler.draw(as_it_is, of_the_square), each(of_the_square)), {"energy", "12.57"});
 
   // Even in theta and phi, where the density is said to be even over the sphere: its sum is right.
   std::vector<drawn_direction> drawn;
-  const auto even = [](vec3) { return 0.25f / wfpg::detail::pi; };
+  const auto even = [](vec3) { return 0.25f / wfpg::pi; };
   for (std::uint32_t i = 0; i < samples; ++i) {
     const vec2 u = hashed_numbers{9}(i, 0);
-    const float theta = wfpg::detail::pi * u.x, phi = 2.0f * wfpg::detail::pi * u.y;
+    const float theta = wfpg::pi * u.x, phi = 2.0f * wfpg::pi * u.y;
     drawn.push_back(
         {{std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)}, even({})});
   }

@@ -3,7 +3,7 @@
 #include "support/reports.hpp"
 #include "support/scenes.hpp"
 
-#include <wfpg/testing.hpp>
+#include <wfpg/testing/check_bsdf.hpp>
 
 #include <cmath>
 #include <limits>
@@ -12,13 +12,13 @@
 
 using namespace wfpg_test;
 using wfpg::bsdf_sample;
-using wfpg::detail::sphere_bins;
 using wfpg::testing::bsdf_check_options;
 using wfpg::testing::check_bsdf;
+using wfpg::testing::sphere_bins;
 
 namespace {
 
-using wfpg::detail::pi;
+using wfpg::pi;
 constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr float nan_value = std::numeric_limits<float>::quiet_NaN();
 const vec3 tilted = glm::normalize(vec3(0.3f, -0.5f, 0.7f));
@@ -79,7 +79,7 @@ struct faulty_bsdf {
     if (glm::dot(outgoing, normal) <= 0.0f) return {};
     const float turn = 2.0f * pi * u.y * (fault == bsdf_fault::empty_sector ? 0.9f : 1.0f);
     const float z = std::sqrt(1.0f - u.x), r = std::sqrt(u.x);
-    const wfpg::detail::frame axes(normal);
+    const wfpg::frame axes(normal);
     vec3 d = glm::normalize(axes.to_world({r * std::cos(turn), r * std::sin(turn), z}));
     if (fault == bsdf_fault::fails_in_sector && in_sector(d)) return {};
     if (fault == bsdf_fault::leaks && std::fmod(u.x * 1024.0f, 1.0f) < 0.5f) d = -d;
@@ -92,7 +92,7 @@ struct faulty_bsdf {
 
  private:
   WFPG_HD bool in_sector(vec3 d) const {
-    const vec3 local = wfpg::detail::frame(normal).to_local(d);
+    const vec3 local = wfpg::frame(normal).to_local(d);
     return local.x > 0.0f && std::fabs(local.y) < 0.5f * local.x;
   }
 };
@@ -279,7 +279,7 @@ TEST_CASE("check_bsdf: options out of range are refused", "[testing]") {
 }
 
 TEST_CASE("sphere bins: integrals, sizes and words", "[testing]") {
-  const wfpg::detail::frame axes(tilted);
+  const wfpg::frame axes(tilted);
   const auto each = [](const auto& f) {
     return [f](const std::vector<vec3>& directions) {
       std::vector<float> values;
@@ -301,8 +301,8 @@ TEST_CASE("sphere bins: integrals, sizes and words", "[testing]") {
     for (int i = 0; i < 4000; ++i) {
       const double z = std::pow(random.unit(), 1.0 / (exponent + 1.0)), r = std::sqrt(1.0 - z * z);
       const double turn = 6.28318530717959 * double(random.unit());
-      hints.push_back(wfpg::detail::frame(about).to_world(
-          {float(r * std::cos(turn)), float(r * std::sin(turn)), float(z)}));
+      hints.push_back(
+          wfpg::frame(about).to_world({float(r * std::cos(turn)), float(r * std::sin(turn)), float(z)}));
     }
     const sphere_bins bins(axes, each(lobe), 1.0e5, hints);
     CHECK(bins.integral() == Approx(1.0).epsilon(1e-3));

@@ -4,8 +4,10 @@
 #include "support/reports.hpp"
 #include "support/scenes.hpp"
 
-#include <wfpg/ray_caster.hpp>
-#include <wfpg/testing.hpp>
+#include <wfpg/host/ray_caster.hpp>
+#include <wfpg/octree/svo_ray_caster.hpp>
+#include <wfpg/testing/check_ray_caster.hpp>
+#include <wfpg/testing/check_surfaces.hpp>
 
 #include <cmath>
 #include <limits>

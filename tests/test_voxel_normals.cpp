@@ -4,8 +4,8 @@
 #include "support/octree_nodes.hpp"
 #include "support/policies.hpp"
 
-#include <wfpg/detail/voxel_normals.hpp>
-#include <wfpg/exitance_cache.hpp>
+#include <wfpg/octree/exitance_cache.hpp>
+#include <wfpg/octree/voxel_normals.hpp>
 
 #include <algorithm>
 #include <cmath>

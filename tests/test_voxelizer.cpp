@@ -5,7 +5,7 @@
 #include "support/policies.hpp"
 #include "support/random_meshes.hpp"
 
-#include <wfpg/voxelizer.hpp>
+#include <wfpg/octree/voxelizer.hpp>
 
 #include <algorithm>
 #include <cmath>

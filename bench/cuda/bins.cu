@@ -1,7 +1,7 @@
 // Binning a wave of rays: from the leaf look-up to the bins' offsets.
 #include "guide.hpp"
 
-#include <wfpg/spatial_binner.hpp>
+#include <wfpg/bins/spatial_binner.hpp>
 
 #include <cub/device/device_radix_sort.cuh>
 
@@ -19,7 +19,7 @@ struct stored_rays {
 struct random_keys {
   wfpg::array_view<std::uint32_t> keys;
   WFPG_HD void operator()(std::size_t i) const {
-    keys[i] = static_cast<std::uint32_t>(wfpg::detail::hash(3, i)) & 0x1fffffu;
+    keys[i] = static_cast<std::uint32_t>(wfpg::hash(3, i)) & 0x1fffffu;
   }
 };
 
@@ -34,7 +34,7 @@ void binning(benchmark::State& state) {
   exec.for_each(pixels, random_keys{keys.view()});
   std::size_t bytes = 0;
   const auto sort = [&](void* storage) {
-    wfpg::detail::check_cuda(
+    wfpg::check_cuda(
         cub::DeviceRadixSort::SortPairs(storage, bytes, keys.data(), sorted.data(), values.data(),
                                         sorted_values.data(), pixels, 0, 21, exec.stream()),
         "cub::DeviceRadixSort::SortPairs");

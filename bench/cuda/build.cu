@@ -1,7 +1,7 @@
 // Building the guide of a scene: voxelization, and the octree with its cache.
 #include "room.hpp"
 
-#include <wfpg/exitance_cache.hpp>
+#include <wfpg/octree/exitance_cache.hpp>
 
 #include <cub/device/device_radix_sort.cuh>
 
@@ -30,7 +30,7 @@ class sort_of_codes {
 
  private:
   void sort(void* storage, std::size_t& bytes) const {
-    wfpg::detail::check_cuda(
+    wfpg::check_cuda(
         cub::DeviceRadixSort::SortPairs(storage, bytes, codes_.data(), sorted_.data(), values_.data(),
                                         sorted_values_.data(), codes_.size(), 0, bits_, exec_.stream()),
         "cub::DeviceRadixSort::SortPairs");
@@ -48,7 +48,7 @@ class sort_of_codes {
 template <class T>
 void copy(const exec_policy& exec, const wfpg::buffer<T, exec_policy>& from,
           const wfpg::buffer<T, exec_policy>& to) {
-  wfpg::detail::check_cuda(
+  wfpg::check_cuda(
       cudaMemcpyAsync(to.data(), from.data(), from.bytes(), cudaMemcpyDeviceToDevice, exec.stream()),
       "cudaMemcpyAsync");
 }
@@ -77,7 +77,7 @@ void voxelization(benchmark::State& state) {
 struct scatter {
   wfpg::array_view<wfpg::surface_fragment> samples;
   WFPG_HD void operator()(std::size_t i) const {
-    const vec3 d = wfpg::square_to_sphere(wfpg::detail::unit_vec2(wfpg::detail::hash(5, i)));
+    const vec3 d = wfpg::square_to_sphere(wfpg::unit_vec2(wfpg::hash(5, i)));
     samples[i] = {vec3(0.5f) + 0.5f * d, d, 1.0f};
   }
 };

@@ -8,8 +8,8 @@
 #include "optix_caster.hpp"
 #endif
 
-#include <wfpg/octahedral_map.hpp>
-#include <wfpg/radiance_field.hpp>
+#include <wfpg/base/octahedral_map.hpp>
+#include <wfpg/guides/octree/transient_fields.hpp>
 
 #include <cmath>
 #include <vector>
@@ -17,11 +17,11 @@
 namespace bench {
 namespace {
 
+using wfpg::hash;
+using wfpg::unit_vec2;
 using wfpg::uvec3;
 using wfpg::vec2;
 using wfpg::vec3;
-using wfpg::detail::hash;
-using wfpg::detail::unit_vec2;
 
 constexpr std::uint32_t bin_count = 2048, resolution = 128, cells = resolution * resolution;
 constexpr std::uint32_t ray_count = bin_count * cells;  // a power of two, for `shuffled`
@@ -87,7 +87,7 @@ struct make_ray {
   WFPG_HD void operator()(std::size_t thread) const {
     const auto written = static_cast<std::uint32_t>(thread);
     const std::uint32_t i = in_order ? written : shuffled(written);
-    const wfpg::detail::field_cell cell = wfpg::detail::cell_in_order(i % cells, resolution);
+    const wfpg::field_cell cell = wfpg::cell_in_order(i % cells, resolution);
     const vec2 square = vec2(static_cast<float>(cell.x), static_cast<float>(cell.y)) + unit_vec2(hash(3, i));
     rays[written] = {0.05f + 0.9f * random_point(4, i / cells), 0.0f,
                      wfpg::square_to_sphere(square / static_cast<float>(resolution)), 3.0e38f};

@@ -2,7 +2,8 @@
 // bottom-up.
 #include "guide.hpp"
 
-#include <wfpg/path_recorder.hpp>
+#include <wfpg/guide/path_recorder.hpp>
+#include <wfpg/guides/octree/deposit_paths.hpp>
 
 namespace bench {
 namespace {
@@ -17,9 +18,8 @@ struct record_vertex {
   WFPG_HD void operator()(std::size_t path) const {
     const room_point& p = points[path % 100 < percent_in_one ? 0 : path];
     recorder.vertex(path, depth, p.position, p.outgoing, vec3(1.0f / static_cast<float>(depth + 1)));
-    recorder.radiance(
-        path, depth,
-        vec3(wfpg::detail::unit_float(static_cast<std::uint32_t>(wfpg::detail::hash(depth, path)))));
+    recorder.radiance(path, depth,
+                      vec3(wfpg::unit_float(static_cast<std::uint32_t>(wfpg::hash(depth, path)))));
   }
 };
 
@@ -40,7 +40,7 @@ void depositing(benchmark::State& state) {
   compare(
       state, exec,
       [&] {
-        recorder.deposit(exec, guide.cache.view());
+        wfpg::deposit_paths(exec, recorder, guide.cache.view());
         guide.cache.update(exec);
       },
       copy_of(exec, recorder.bytes()), record);

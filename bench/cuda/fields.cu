@@ -1,10 +1,11 @@
 // Transient fields of a wave's bins: making them from what their cones hit, and drawing directions from them.
 #include "guide.hpp"
 
-#include <wfpg/detail/serve_rays.hpp>
-#include <wfpg/product_sampler.hpp>
-#include <wfpg/radiance_field.hpp>
-#include <wfpg/spatial_binner.hpp>
+#include <wfpg/bins/spatial_binner.hpp>
+#include <wfpg/guide/sample_rays.hpp>
+#include <wfpg/guides/octree/field_sinks.hpp>
+#include <wfpg/guides/octree/transient_fields.hpp>
+#include <wfpg/sampling/product_sampler.hpp>
 
 #include <type_traits>
 
@@ -13,8 +14,8 @@ namespace {
 
 constexpr std::uint32_t field_count = 2048, field_size = 128, cells = field_size * field_size;
 
-using fields_type = wfpg::detail::bin_fields<stored_surfaces>;
-using serve_type = wfpg::detail::serve_ray<stored_surfaces, hashed_numbers, wfpg::no_queries>;
+using fields_type = wfpg::bin_fields<stored_surfaces>;
+using serve_type = wfpg::serve_ray<stored_surfaces, hashed_numbers, wfpg::no_queries>;
 
 /// Rays in runs of equal length, a run a bin of the wave: the rays of one bin lie together.
 struct equal_bins {
@@ -34,10 +35,10 @@ struct cast_cones {
   wfpg::array_view<wfpg::ray_hit> hits;
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t bin) const {
-    const wfpg::detail::field_cells cone_of(fields.origin(bin), field_size);
+    const wfpg::field_cells cone_of(fields.origin(bin), field_size);
     block.for_each(static_cast<int>(cells), [&](int k) {
       const auto i = static_cast<std::uint32_t>(k);
-      hits[bin * cells + i] = room_caster()(cone_of.cone(wfpg::detail::cell_in_order(i, field_size)));
+      hits[bin * cells + i] = room_caster()(cone_of.cone(wfpg::cell_in_order(i, field_size)));
     });
   }
 };
@@ -86,10 +87,8 @@ class workload {
     exec.for_each_block(field_count, 0, cast_cones{fields, hits.view()});
     const std::uint32_t p = product_resolution;
     wfpg::product_point* const hemisphere = product_points.data();
-    exec.for_each(std::size_t(p) * p,
-                  wfpg::detail::measure_product_blocks{hemisphere, hemisphere + p * p, p});
-    exec.for_each(std::size_t(p) * p,
-                  wfpg::detail::draw_product_points{hemisphere, hemisphere + p * p, p, 1});
+    exec.for_each(std::size_t(p) * p, wfpg::measure_product_blocks{hemisphere, hemisphere + p * p, p});
+    exec.for_each(std::size_t(p) * p, wfpg::draw_product_points{hemisphere, hemisphere + p * p, p, 1});
     serve = serve_type{surfaces, hashed_numbers{}, {}, directions.view()};
     sink = {bins, serve, {0.7f, 0.5f, 64}, field_size, {hemisphere, hemisphere + p * p, p}};
   }
@@ -97,9 +96,9 @@ class workload {
   /// Every field through a sink.
   template <class Sink>
   void make(const Sink& into) const {
-    const std::size_t making = wfpg::detail::field_scratch_bytes(field_size, exec_policy::warps_per_block);
+    const std::size_t making = wfpg::field_scratch_bytes(field_size, exec_policy::warps_per_block);
     exec.for_each_block(field_count, making + into.scratch_bytes(),
-                        wfpg::detail::make_fields<stored_surfaces, wfpg::detail::stored_hits, Sink>{
+                        wfpg::make_fields<stored_surfaces, wfpg::stored_hits, Sink>{
                             fields, {hits.view(), 0, cells}, into, 0});
   }
 
@@ -113,7 +112,7 @@ class workload {
   wfpg::buffer<wfpg::product_point, exec_policy> product_points;
   fields_type fields;
   serve_type serve;
-  wfpg::detail::transient_sink<serve_type> sink;
+  wfpg::transient_sink<serve_type> sink;
 };
 
 /// From hits to distributions in scratch memory; the floor reads the hits.

@@ -4,8 +4,8 @@
 #include "materials.hpp"
 #include "room.hpp"
 
-#include <wfpg/exitance_cache.hpp>
-#include <wfpg/wave.hpp>
+#include <wfpg/host/wave.hpp>
+#include <wfpg/octree/exitance_cache.hpp>
 
 namespace bench {
 
@@ -51,7 +51,7 @@ struct stored_surfaces {
 struct hashed_numbers {
   std::uint64_t seed = 1;
   WFPG_HD vec2 operator()(std::uint32_t ray, std::uint32_t dimension) const {
-    return wfpg::detail::unit_vec2(wfpg::detail::hash(wfpg::detail::hash(seed, ray), dimension));
+    return wfpg::unit_vec2(wfpg::hash(wfpg::hash(seed, ray), dimension));
   }
 };
 

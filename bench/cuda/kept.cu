@@ -14,7 +14,7 @@ struct make_slots {
   wfpg::resident_field* fields;
   wfpg::array_view<const room_point> points;
   WFPG_HD void operator()(std::size_t i) const {
-    const std::uint64_t ray = wfpg::detail::hash(9, i) % pixels;
+    const std::uint64_t ray = wfpg::hash(9, i) % pixels;
     slots[i].key = static_cast<std::uint32_t>(i) * wfpg::orientations;
     slots[i].builds = 1;
     slots[i].origin = ray;
@@ -30,7 +30,7 @@ struct cast_all {
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t i) const {
     const auto slot = static_cast<std::uint32_t>(i);
-    const wfpg::detail::field_cells cells_of = builder.cells(slot, whole);
+    const wfpg::field_cells cells_of = builder.cells(slot, whole);
     block.for_each(static_cast<int>(cones), [&](int c) {
       const auto cone = static_cast<std::uint32_t>(c);
       hits[i * cones + cone] = room_caster()(cells_of.cone(builder.cell(slot, whole, cone)));
@@ -50,8 +50,8 @@ void refreshing_slots(benchmark::State& state) {
   const wfpg::buffer<std::uint32_t, exec_policy> words(
       exec, std::size_t(slot_count) * wfpg::grid_distribution::words(slot_size)),
       list(exec, slot_count);
-  const wfpg::buffer<wfpg::detail::cone_hit, exec_policy> found(exec, std::size_t(slot_count) * cells);
-  const wfpg::buffer<wfpg::detail::rough_mean, exec_policy> learnt(exec, found.size());
+  const wfpg::buffer<wfpg::cone_hit, exec_policy> found(exec, std::size_t(slot_count) * cells);
+  const wfpg::buffer<wfpg::rough_mean, exec_policy> learnt(exec, found.size());
   const wfpg::buffer<wfpg::ray_hit, exec_policy> hits(exec, std::size_t(slot_count) * cells);
   thrust::sequence(exec.thrust(), list.data(), list.data() + slot_count);
 
@@ -74,9 +74,8 @@ void refreshing_slots(benchmark::State& state) {
   const auto renew = [&] { exec.for_each(slot_count, make_slots{slots.view(), fields.data(), given}); };
   const auto build = [&](bool whole) {
     const std::uint32_t cones = builder.cone_count(whole);
-    exec.for_each_block(slot_count,
-                        wfpg::detail::field_scratch_bytes(slot_size, exec_policy::warps_per_block),
-                        wfpg::detail::build_kept_fields<builder_type, wfpg::detail::stored_hits>{
+    exec.for_each_block(slot_count, wfpg::field_scratch_bytes(slot_size, exec_policy::warps_per_block),
+                        wfpg::detail::build_kept_fields<builder_type, wfpg::stored_hits>{
                             builder, {hits.view(), 0, cones}, list.data(), whole});
   };
   for (const bool whole : {true, false}) {

@@ -4,9 +4,9 @@
 
 #include "timing.hpp"
 
-#include <wfpg/detail/math.hpp>
-#include <wfpg/types.hpp>
-#include <wfpg/voxelizer.hpp>
+#include <wfpg/base/math.hpp>
+#include <wfpg/base/types.hpp>
+#include <wfpg/octree/voxelizer.hpp>
 
 #include <cmath>
 #include <vector>
@@ -31,8 +31,8 @@ class room_mesh {
     const auto first = static_cast<std::uint32_t>(positions.size());
     for (int i = 0; i <= rings; ++i)
       for (int j = 0; j < segments; ++j) {
-        const float theta = wfpg::detail::pi * static_cast<float>(i) / static_cast<float>(rings);
-        const float phi = 2.0f * wfpg::detail::pi * static_cast<float>(j) / static_cast<float>(segments);
+        const float theta = wfpg::pi * static_cast<float>(i) / static_cast<float>(rings);
+        const float phi = 2.0f * wfpg::pi * static_cast<float>(j) / static_cast<float>(segments);
         positions.push_back(vec3(0.5f) + ball_radius * vec3(std::sin(theta) * std::cos(phi), std::cos(theta),
                                                             std::sin(theta) * std::sin(phi)));
       }
@@ -63,15 +63,14 @@ struct room_caster {
     for (int axis = 0; axis < 3; ++axis) {
       if (r.direction[axis] == 0.0f) continue;
       const float face = r.direction[axis] > 0.0f ? 1.0f : 0.0f;
-      nearest =
-          wfpg::detail::min(nearest, wfpg::detail::max((face - r.origin[axis]) / r.direction[axis], 0.0f));
+      nearest = wfpg::min(nearest, wfpg::max((face - r.origin[axis]) / r.direction[axis], 0.0f));
     }
     const vec3 to_centre = vec3(0.5f) - r.origin;
     const float along = glm::dot(to_centre, r.direction);
     const float square = ball_radius * ball_radius - glm::dot(to_centre, to_centre) + along * along;
     if (square > 0.0f) {
       const float t = along - sqrtf(square);
-      if (t > 1.0e-4f) nearest = wfpg::detail::min(nearest, t);
+      if (t > 1.0e-4f) nearest = wfpg::min(nearest, t);
     }
     return {nearest, 0.0f};
   }
@@ -85,7 +84,7 @@ struct room_point {
 /// Where the camera's ray through a pixel meets the room.
 struct camera_hits {
   WFPG_HD room_point operator()(std::uint32_t pixel) const {
-    const vec2 jitter = wfpg::detail::unit_vec2(wfpg::detail::hash(7, pixel));
+    const vec2 jitter = wfpg::unit_vec2(wfpg::hash(7, pixel));
     const float x = (static_cast<float>(pixel % width) + jitter.x) / static_cast<float>(width) - 0.5f;
     const float y = (static_cast<float>(pixel / width) + jitter.y) / static_cast<float>(height) - 0.5f;
     wfpg::ray r;
@@ -114,12 +113,10 @@ struct bounced_hits {
   WFPG_HD room_point operator()(std::uint32_t pixel) const {
     room_point at = camera_hits()(pixel);
     for (int i = 0; i < bounces; ++i) {
-      const vec2 u = wfpg::detail::unit_vec2(
-          wfpg::detail::hash(wfpg::detail::hash(11, static_cast<std::uint64_t>(i)), pixel));
-      const float r = sqrtf(u.x), phi = 2.0f * wfpg::detail::pi * u.y;
+      const vec2 u = wfpg::unit_vec2(wfpg::hash(wfpg::hash(11, static_cast<std::uint64_t>(i)), pixel));
+      const float r = sqrtf(u.x), phi = 2.0f * wfpg::pi * u.y;
       wfpg::ray next;
-      next.direction =
-          wfpg::detail::frame(at.normal).to_world({r * cosf(phi), r * sinf(phi), sqrtf(1.0f - u.x)});
+      next.direction = wfpg::frame(at.normal).to_world({r * cosf(phi), r * sinf(phi), sqrtf(1.0f - u.x)});
       next.origin = at.position + 1.0e-4f * at.normal;
       at = camera_hits::hit(next);
     }

@@ -2,7 +2,7 @@
 // its floor, measured in turn with it: the least that the hardware would need for the same.
 #pragma once
 
-#include <wfpg/buffer.hpp>
+#include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/cuda.hpp>
 
 #include <benchmark/benchmark.h>
@@ -18,7 +18,7 @@ using exec_policy = wfpg::exec::cuda;
 /// Seconds of GPU time that `work` takes on the policy's stream.
 template <class Work>
 double seconds_of(const exec_policy& exec, const Work& work) {
-  using wfpg::detail::check_cuda;
+  using wfpg::check_cuda;
   cudaEvent_t begin = nullptr, end = nullptr;
   check_cuda(cudaEventCreate(&begin), "cudaEventCreate");
   check_cuda(cudaEventCreate(&end), "cudaEventCreate");
@@ -73,7 +73,7 @@ class copy_of {
   copy_of(const exec_policy& exec, std::size_t bytes)
       : exec_(exec), from_(exec, bytes / 2), to_(exec, bytes / 2) {}
   void operator()() const {
-    wfpg::detail::check_cuda(
+    wfpg::check_cuda(
         cudaMemcpyAsync(to_.data(), from_.data(), to_.bytes(), cudaMemcpyDeviceToDevice, exec_.stream()),
         "cudaMemcpyAsync");
   }

@@ -3,7 +3,7 @@
 
 #include "colour_map.hpp"
 
-#include <wfpg/types.hpp>
+#include <wfpg/base/types.hpp>
 
 #include <algorithm>
 #include <cmath>

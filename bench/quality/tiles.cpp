@@ -3,7 +3,7 @@
 
 #include "statistic.hpp"
 
-#include <wfpg/types.hpp>
+#include <wfpg/base/types.hpp>
 
 #include <cmath>
 

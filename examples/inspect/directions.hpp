@@ -4,7 +4,7 @@
 
 #include "image_io.hpp"
 
-#include <wfpg/field_sampler.hpp>
+#include <wfpg/sampling/field_sampler.hpp>
 
 #include <cstddef>
 #include <optional>

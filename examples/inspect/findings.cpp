@@ -38,7 +38,7 @@ direction_grid cells_of(const pixel_sampler& sampler, const finding_options& opt
   if (!sampler.field().empty()) return direction_grid(sampler.field());
   const render_surface& at = sampler.surface();
   if (at.bsdf.transmits()) return direction_grid(options.field_resolution);
-  return {options.field_resolution, wfpg::detail::facing_normal(at)};
+  return {options.field_resolution, wfpg::facing_normal(at)};
 }
 
 /// The cosine that the field has in it.

@@ -9,7 +9,7 @@
 #include "page.hpp"
 #include "progress_bar.hpp"
 
-#include <wfpg/error.hpp>
+#include <wfpg/base/error.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -20,7 +20,7 @@ namespace inspect {
 namespace {
 
 void check(const inspection& asked) {
-  using wfpg::detail::require;
+  using wfpg::require;
   const render::render_options& options = asked.learning;
   require_fields(options);
   const auto range = [](int side) { return "0 to " + std::to_string(side - 1); };

@@ -5,8 +5,8 @@
 #include "option_names.hpp"
 #include "render_impl.hpp"
 
+#include <wfpg/bins/spatial_binner.hpp>
 #include <wfpg/exec/tbb.hpp>
-#include <wfpg/spatial_binner.hpp>
 
 namespace inspect {
 namespace {
@@ -117,8 +117,8 @@ struct learnt_scene::state {
     const wfpg::guider_options& told = guider.options();
     wfpg::spatial_binner<exec_policy> binner(exec, guider.octree().view(),
                                              {told.min_bin_level, told.rays_per_bin}, hits.size());
-    const wfpg::bins_view found = binner.bin(
-        exec, hits.size(), wfpg::detail::wave_rays<hit_surfaces>{hit_surfaces{hits.data()}, told.mode});
+    const wfpg::bins_view found =
+        binner.bin(exec, hits.size(), wfpg::wave_rays<hit_surfaces>{hit_surfaces{hits.data()}, told.mode});
     bins.assign(found.ray_keys.data(), found.ray_keys.data() + hits.size());
     field_bytes = wfpg::grid_distribution::words(guider.field_resolution(0)) * sizeof(std::uint32_t) +
                   sizeof(wfpg::resident_field);
@@ -140,7 +140,7 @@ struct learnt_scene::state {
 };
 
 void require_fields(const render::render_options& options) {
-  using wfpg::detail::require;
+  using wfpg::require;
   const std::string& method = render::name_of(render::method_names(), options.method);
   require(render::is_wfpg(options.method), "method", method,
           "wfpg or wfpg-product: others have no fields to look at");

@@ -6,8 +6,8 @@
 #include "directions.hpp"
 #include "render.hpp"
 
-#include <wfpg/exitance_cache.hpp>
-#include <wfpg/guide_view.hpp>
+#include <wfpg/guides/octree/guide_view.hpp>
+#include <wfpg/octree/exitance_cache.hpp>
 
 #include <cstddef>
 #include <cstdint>

@@ -1,7 +1,7 @@
 // Numbers and what they are called.
 #include "numbers.hpp"
 
-#include <wfpg/spatial_binner.hpp>
+#include <wfpg/bins/spatial_binner.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -84,7 +84,7 @@ json numbers_of_place(const learnt_scene& learnt, std::uint32_t pixel) {
                                                    : "a surface"}};
   if (kind != pixel_kind::nothing) {
     numbers["position"] = vector_of(surface.position);
-    numbers["normal"] = vector_of(wfpg::detail::facing_normal(surface));
+    numbers["normal"] = vector_of(wfpg::facing_normal(surface));
   }
   const std::uint32_t bin = learnt.bins()[pixel];
   if (bin != no_bin) {

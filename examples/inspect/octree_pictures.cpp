@@ -1,7 +1,7 @@
 // Look-ups of voxels, pixel by pixel.
 #include "octree_pictures.hpp"
 
-#include <wfpg/spatial_binner.hpp>
+#include <wfpg/bins/spatial_binner.hpp>
 
 #include <algorithm>
 #include <array>
@@ -33,7 +33,7 @@ void for_each_voxel(const learnt_scene& learnt, const F& f) {
 
 /// Any of three channels between dark and light, by a number's bits.
 vec3 random_colour(std::uint32_t key) {
-  const std::uint64_t bits = wfpg::detail::hash(0, key);
+  const std::uint64_t bits = wfpg::hash(0, key);
   const auto channel = [bits](int shift) { return 0.05f + float(bits >> shift & 0xffu) / 300.0f; };
   return {channel(0), channel(8), channel(16)};
 }

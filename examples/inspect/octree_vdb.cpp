@@ -1,8 +1,8 @@
 // Leaves into grids.
 #include "octree_vdb.hpp"
 
-#include <wfpg/detail/section_file.hpp>
-#include <wfpg/spatial_binner.hpp>
+#include <wfpg/bins/spatial_binner.hpp>
+#include <wfpg/state/section_file.hpp>
 
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
@@ -68,8 +68,7 @@ void require_vdb() {}
 void write_vdb(const learnt_scene& learnt, const std::string& path) {
   openvdb::initialize();
   try {
-    wfpg::detail::replace_file(path,
-                               [&](std::ostream& out) { openvdb::io::Stream(out).write(grids_of(learnt)); });
+    wfpg::replace_file(path, [&](std::ostream& out) { openvdb::io::Stream(out).write(grids_of(learnt)); });
   } catch (const openvdb::Exception& error) {
     throw std::runtime_error(path + ": cannot be written: " + error.what());
   }

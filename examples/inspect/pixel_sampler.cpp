@@ -3,7 +3,7 @@
 
 #include "rng.hpp"
 
-#include <wfpg/detail/sphere_statistics.hpp>
+#include <wfpg/testing/sphere_statistics.hpp>
 
 #include <algorithm>
 
@@ -47,14 +47,14 @@ double chi_square_p(const pixel_sampler& sampler, const std::vector<vec3>& direc
     for (const vec3 direction : at) values.push_back(sampler.pdf(direction));
     return values;
   };
-  const wfpg::detail::sphere_bins bins(wfpg::detail::frame(sampler.surface().normal), densities,
-                                       static_cast<double>(directions.size()), hints);
-  return wfpg::detail::test_directions(bins, directions).p;
+  const wfpg::testing::sphere_bins bins(wfpg::frame(sampler.surface().normal), densities,
+                                        static_cast<double>(directions.size()), hints);
+  return wfpg::testing::test_directions(bins, directions).p;
 }
 
 sample_counts count_samples(const pixel_sampler& sampler, const direction_grid& grid, int samples) {
   const render::random_stream random{0x1a5bec7, 0};
-  const vec3 up = wfpg::detail::facing_normal(sampler.surface());
+  const vec3 up = wfpg::facing_normal(sampler.surface());
   sample_counts counts;
   counts.density.assign(grid.size(), 0.0);
   std::vector<vec3> directions, hints;

@@ -4,7 +4,7 @@
 #include "device_scene.hpp"
 #include "directions.hpp"
 
-#include <wfpg/guide_view.hpp>
+#include <wfpg/guides/octree/guide_view.hpp>
 
 #include <cstdint>
 #include <vector>

@@ -2,7 +2,7 @@
 // in Vose 1991, "A Linear Algorithm for Generating Random Numbers with a Given Distribution".
 #pragma once
 
-#include <wfpg/types.hpp>
+#include <wfpg/base/types.hpp>
 
 #include <cstddef>
 #include <cstdint>

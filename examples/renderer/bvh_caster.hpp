@@ -11,7 +11,7 @@
 #include "frame.hpp"
 #include "warp_hints.hpp"
 
-#include <wfpg/detail/math.hpp>
+#include <wfpg/base/math.hpp>
 
 #include <cmath>
 
@@ -136,7 +136,7 @@ struct bvh_entries {
     for (int i = 0; i < bvh_node::width; ++i) {
       const float entry = largest_of(x.entry(i), y.entry(i), z.entry(i), ray.t_min);
       const float exit = smallest_of(x.exit(i), y.exit(i), z.exit(i), ray.t_max);
-      const std::uint32_t bits = wfpg::detail::float_bits(entry);
+      const std::uint32_t bits = wfpg::float_bits(entry);
       keys[i] = entry <= exit ? (bits & ~3u) | static_cast<std::uint32_t>(i) : none;
     }
     order(0, 1), order(2, 3), order(0, 2), order(1, 3), order(1, 2);
@@ -201,8 +201,7 @@ class bvh_caster {
   WFPG_HD hit cast(const wfpg::ray& asked) const {
     hit found;
     // A ray that is none would meet every box.
-    if (!nodes_ || !wfpg::detail::is_finite(asked.origin) || !wfpg::detail::is_finite(asked.direction))
-      return found;
+    if (!nodes_ || !wfpg::is_finite(asked.origin) || !wfpg::is_finite(asked.direction)) return found;
     detail::bvh_ray ray(asked, one_);
     waiting stack[stack_size];
     std::uint32_t depth = 0;
@@ -219,7 +218,7 @@ class bvh_caster {
       do {
         if (depth == 0) return found;
         --depth;
-      } while (wfpg::detail::bits_float(stack[depth].entry) > ray.t_max);
+      } while (wfpg::bits_float(stack[depth].entry) > ray.t_max);
       at = bvh_child(stack[depth].child);
     }
   }

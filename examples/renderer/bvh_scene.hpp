@@ -8,10 +8,10 @@
 
 #include "bvh_caster.hpp"
 
-#include <wfpg/buffer.hpp>
-#include <wfpg/detail/thrust.hpp>
-#include <wfpg/morton.hpp>
-#include <wfpg/voxelizer.hpp>
+#include <wfpg/base/morton.hpp>
+#include <wfpg/exec/buffer.hpp>
+#include <wfpg/exec/support/thrust.hpp>
+#include <wfpg/octree/voxelizer.hpp>
 
 #include <thrust/binary_search.h>
 #include <thrust/copy.h>
@@ -58,7 +58,7 @@ struct bvh_mesh {
     const std::size_t n = mesh.positions.size();
     if (corners.x >= n || corners.y >= n || corners.z >= n) return false;
     const vec3 a = mesh.positions[corners.x], b = mesh.positions[corners.y], c = mesh.positions[corners.z];
-    if (!wfpg::detail::is_usable(a) || !wfpg::detail::is_usable(b) || !wfpg::detail::is_usable(c))
+    if (!wfpg::is_valid_position(a) || !wfpg::is_valid_position(b) || !wfpg::is_valid_position(c))
       return false;
     const vec3 u = b - a, v = c - a;
     return difference_of_products(u.y, v.z, u.z, v.y) != 0.0f ||
@@ -290,7 +290,7 @@ class bvh_scene {
   bvh_scene(const Exec& exec, const wfpg::triangle_mesh_view& mesh, float environment,
             const bvh_options& options = {})
       : environment_(vec3(environment)) {
-    using wfpg::detail::require;
+    using wfpg::require;
     require(options.leaf_triangles >= 1 && options.leaf_triangles <= bvh_child::largest_leaf,
             "leaf_triangles", options.leaf_triangles, "in [1, 7]");
     require(mesh.triangles.size() < bvh_child::most_triangles, "number of triangles", mesh.triangles.size(),

@@ -38,9 +38,9 @@ class policy_clock<wfpg::exec::cuda> {
   void resolve() {
     for (std::size_t i = 0; i < used_; ++i) {
       float milliseconds = 0.0f;
-      wfpg::detail::check_cuda(cudaEventSynchronize(intervals_[i].end), "cudaEventSynchronize");
-      wfpg::detail::check_cuda(cudaEventElapsedTime(&milliseconds, intervals_[i].begin, intervals_[i].end),
-                               "cudaEventElapsedTime");
+      wfpg::check_cuda(cudaEventSynchronize(intervals_[i].end), "cudaEventSynchronize");
+      wfpg::check_cuda(cudaEventElapsedTime(&milliseconds, intervals_[i].begin, intervals_[i].end),
+                       "cudaEventElapsedTime");
       sums_.add(intervals_[i].stage, 1e-3 * static_cast<double>(milliseconds));
     }
     used_ = 0;
@@ -56,12 +56,12 @@ class policy_clock<wfpg::exec::cuda> {
 
   static interval make_interval() {
     interval made;
-    wfpg::detail::check_cuda(cudaEventCreate(&made.begin), "cudaEventCreate");
-    wfpg::detail::check_cuda(cudaEventCreate(&made.end), "cudaEventCreate");
+    wfpg::check_cuda(cudaEventCreate(&made.begin), "cudaEventCreate");
+    wfpg::check_cuda(cudaEventCreate(&made.end), "cudaEventCreate");
     return made;
   }
   void record(cudaEvent_t event) const {
-    wfpg::detail::check_cuda(cudaEventRecord(event, stream_), "cudaEventRecord");
+    wfpg::check_cuda(cudaEventRecord(event, stream_), "cudaEventRecord");
   }
 
   cudaStream_t stream_;

@@ -3,7 +3,7 @@
 
 #include "device_scene.hpp"
 
-#include <wfpg/detail/math.hpp>
+#include <wfpg/base/math.hpp>
 
 namespace render {
 
@@ -15,7 +15,7 @@ WFPG_HD auto cast_through_cut_outs(const scene_view* scene, wfpg::ray ray, const
     const auto found = cast(ray);
     if (!scene || !found.triangle.is_hit() || !scene->is_cut_out(found.triangle)) return found;
     const float distance = glm::max(found.distance, 1e-30f);  // nothing smaller need have a successor
-    ray.t_min = wfpg::detail::bits_float(wfpg::detail::float_bits(distance) + 1u);
+    ray.t_min = wfpg::bits_float(wfpg::float_bits(distance) + 1u);
   }
 }
 

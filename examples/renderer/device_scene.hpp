@@ -6,8 +6,8 @@
 #include "materials.hpp"
 #include "texel_pair.hpp"
 
-#include <wfpg/buffer.hpp>
-#include <wfpg/error.hpp>
+#include <wfpg/base/error.hpp>
+#include <wfpg/exec/buffer.hpp>
 
 #include <algorithm>
 #include <numeric>
@@ -255,7 +255,7 @@ class device_scene {
   static void check_lights(const scene& host) {
     const auto check = [](vec3 light, const std::string& name) {
       for (const float channel : {light.x, light.y, light.z})
-        wfpg::detail::require(is_usable_light(vec3(channel)), name.c_str(), channel, "in [0, 1e+15]");
+        wfpg::require(is_usable_light(vec3(channel)), name.c_str(), channel, "in [0, 1e+15]");
     };
     const auto check_each = [&](const auto& elements, const std::string& name, const auto& light_of) {
       for (std::size_t i = 0; i < elements.size(); ++i)  // without a string for each
@@ -271,10 +271,9 @@ class device_scene {
 
   static void check(const scene& host) {
     check_lights(host);
-    wfpg::detail::require(
-        host.sky.texels.size() == std::size_t(host.sky.width) * std::size_t(host.sky.height),
-        "scene.sky.texels.size()", host.sky.texels.size(), "width times height");
-    using wfpg::detail::require;
+    wfpg::require(host.sky.texels.size() == std::size_t(host.sky.width) * std::size_t(host.sky.height),
+                  "scene.sky.texels.size()", host.sky.texels.size(), "width times height");
+    using wfpg::require;
     const std::size_t vertices = host.positions.size();
     require(host.normals.empty() || host.normals.size() == vertices, "scene.normals.size()",
             host.normals.size(), "0 or the number of positions");

@@ -3,7 +3,7 @@
 
 #include "cut_outs.hpp"
 
-#include <wfpg/ray_caster.hpp>
+#include <wfpg/host/ray_caster.hpp>
 
 #if __has_include(<embree4/rtcore.h>)
 #include <embree4/rtcore.h>

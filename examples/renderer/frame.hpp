@@ -1,7 +1,7 @@
 // Orthonormal frames, and the directions on a sphere that are drawn in them.
 #pragma once
 
-#include <wfpg/types.hpp>
+#include <wfpg/base/types.hpp>
 
 #include <glm/common.hpp>
 

@@ -3,7 +3,7 @@
 
 #include "render.hpp"
 
-#include <wfpg/irradiance_records.hpp>
+#include <wfpg/guides/records/irradiance_records.hpp>
 #include <wfpg/path_guider.hpp>
 
 #include <algorithm>

@@ -4,7 +4,7 @@
 
 #include "output_files.hpp"
 
-#include <wfpg/detail/section_file.hpp>
+#include <wfpg/state/section_file.hpp>
 
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
@@ -204,7 +204,7 @@ environment_map read_environment(const std::string& path) try {
 }
 
 void write_exr(const std::string& path, const image& picture) {
-  wfpg::detail::replace_file(path, [&](std::ostream& out) {
+  wfpg::replace_file(path, [&](std::ostream& out) {
     try {
       write_exr_pixels(out, path, picture);
     } catch (const std::exception& reason) {

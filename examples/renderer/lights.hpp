@@ -7,7 +7,7 @@
 #include "light_groups.hpp"
 #include "rng.hpp"
 
-#include <wfpg/light_guide.hpp>
+#include <wfpg/guides/octree/light_guide.hpp>
 
 namespace render {
 
@@ -199,8 +199,8 @@ class light_distribution {
   }
 
   static float checked(double total_power) {
-    wfpg::detail::require(total_power <= largest_light_power,
-                          "the sum of radiance times area over all lights", total_power, "at most 1e+30");
+    wfpg::require(total_power <= largest_light_power, "the sum of radiance times area over all lights",
+                  total_power, "at most 1e+30");
     return static_cast<float>(total_power);
   }
 

@@ -1,11 +1,11 @@
 // The BSDF of the renderer: one tagged, trivially copyable type, so that a kernel needs no virtual call.
-// Directions as in <wfpg/bsdf.hpp>: world space, unit length, away from the surface.
+// Directions as in <wfpg/host/bsdf.hpp>: world space, unit length, away from the surface.
 #pragma once
 
 #include "metallic_roughness.hpp"
 #include "scene.hpp"
 
-#include <wfpg/bsdf.hpp>
+#include <wfpg/host/bsdf.hpp>
 
 #include <type_traits>
 

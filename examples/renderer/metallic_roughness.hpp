@@ -5,8 +5,8 @@
 
 #include "microfacet.hpp"
 
-#include <wfpg/bsdf.hpp>
-#include <wfpg/types.hpp>
+#include <wfpg/base/types.hpp>
+#include <wfpg/host/bsdf.hpp>
 
 #include <cstdint>
 
@@ -46,7 +46,7 @@ struct lobe_factors {
 };
 
 /// All lobes, seen from above: `outgoing.z` is positive in every function here. Radiance is what goes along
-/// them, as in <wfpg/testing.hpp>.
+/// them, as in <wfpg/testing>.
 struct metallic_roughness {
   vec3 colour;              ///< of metal, of the diffuse base, of what is refracted
   vec3 transmitted_colour;  ///< of what the diffuse base scatters to the other side

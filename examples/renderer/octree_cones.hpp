@@ -4,9 +4,10 @@
 #include "environment.hpp"
 #include "render.hpp"
 
-#include <wfpg/cone_caster.hpp>
+#include <wfpg/host/ray_caster.hpp>
+#include <wfpg/octree/svo_cone_caster.hpp>
+#include <wfpg/octree/svo_ray_caster.hpp>
 #include <wfpg/path_guider.hpp>
-#include <wfpg/ray_caster.hpp>
 
 namespace render {
 

@@ -5,8 +5,8 @@
 #include "openpgl_paths.hpp"
 #include "stage_clock.hpp"
 
-#include <wfpg/mis.hpp>
-#include <wfpg/wave.hpp>
+#include <wfpg/host/wave.hpp>
+#include <wfpg/sampling/mixture.hpp>
 
 #include <type_traits>
 

@@ -15,7 +15,7 @@
 #include "path_state.hpp"
 
 #include <wfpg/exec/tbb.hpp>
-#include <wfpg/mis.hpp>
+#include <wfpg/sampling/mixture.hpp>
 
 #include <openpgl/cpp/OpenPGL.h>
 #include <tbb/enumerable_thread_specific.h>

@@ -4,8 +4,8 @@
 #include "device_scene.hpp"
 #include "optix_tracer.hpp"
 
-#include <wfpg/buffer.hpp>
-#include <wfpg/detail/math.hpp>
+#include <wfpg/base/math.hpp>
+#include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/cuda.hpp>
 
 #include <cstdint>
@@ -43,7 +43,7 @@ class optix_caster {
   void launch(const wfpg::exec::cuda& exec, optix_query query, wfpg::array_view<const wfpg::ray> rays,
               T* answers) const {
     for (std::size_t first = 0; first < rays.size(); first += optix_tracer::max_rays) {
-      const std::size_t count = wfpg::detail::min(rays.size() - first, optix_tracer::max_rays);
+      const std::size_t count = wfpg::min(rays.size() - first, optix_tracer::max_rays);
       // Each launch has parameters of its own, taken, written and given back in the stream's order. The
       // vector may go at once: what a copy reads from pageable memory it has read when the call returns.
       const std::vector<optix_parameters> one{
@@ -64,7 +64,7 @@ struct make_finite {
   wfpg::array_view<const vec3> positions;
   vec3* result;
   WFPG_HD void operator()(std::size_t i) const {
-    result[i] = wfpg::detail::is_finite(positions[i]) ? positions[i] : vec3(0.0f);
+    result[i] = wfpg::is_finite(positions[i]) ? positions[i] : vec3(0.0f);
   }
 };
 
@@ -74,7 +74,7 @@ struct collapse_invalid {
   wfpg::array_view<const uvec3> triangles;
   uvec3* result;
   WFPG_HD bool valid(std::uint32_t corner) const {
-    return corner < positions.size() && wfpg::detail::is_finite(positions[corner]);
+    return corner < positions.size() && wfpg::is_finite(positions[corner]);
   }
   WFPG_HD void operator()(std::size_t i) const {
     const uvec3 t = triangles[i];

@@ -1,7 +1,7 @@
 // What the host tells one launch of the device programs in optix_programs.cu.
 #pragma once
 
-#include <wfpg/types.hpp>
+#include <wfpg/base/types.hpp>
 
 namespace render {
 

@@ -3,7 +3,7 @@
 #include "device_scene.hpp"
 #include "optix_parameters.hpp"
 
-#include <wfpg/detail/math.hpp>
+#include <wfpg/base/math.hpp>
 
 #include <optix.h>
 
@@ -15,7 +15,7 @@ namespace {
 
 /// True where the ray hits anything inside (t_min, t_max), which the hit object then tells of.
 __device__ __forceinline__ bool hits(const wfpg::ray& ray, unsigned flags) {
-  using wfpg::detail::is_finite;
+  using wfpg::is_finite;
   // What OptiX does with other than finite numbers and distances from zero on is not defined.
   const float t_min = fmaxf(ray.t_min, 0.0f), t_max = fminf(ray.t_max, wfpg::ray().t_max);
   const bool in_order = ray.t_min < ray.t_max && t_min < t_max;

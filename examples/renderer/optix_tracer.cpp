@@ -1,8 +1,8 @@
 // Makes OptiX's context, pipeline and acceleration structure, and launches.
 #include "optix_tracer.hpp"
 
-#include <wfpg/buffer.hpp>
-#include <wfpg/error.hpp>
+#include <wfpg/base/error.hpp>
+#include <wfpg/exec/buffer.hpp>
 
 #include <optix.h>
 #include <optix_function_table_definition.h>

@@ -4,8 +4,8 @@
 
 #include "optix_parameters.hpp"
 
+#include <wfpg/base/types.hpp>
 #include <wfpg/exec/policy.hpp>
-#include <wfpg/types.hpp>
 
 #include <cuda_runtime_api.h>
 

@@ -1,7 +1,7 @@
 // Writing is the library's replace_file().
 #include "output_files.hpp"
 
-#include <wfpg/detail/section_file.hpp>
+#include <wfpg/state/section_file.hpp>
 
 #include <algorithm>
 #include <cctype>
@@ -35,13 +35,13 @@ fs::path identity_of(const std::string& path) {
   std::error_code error;
   const fs::path known = fs::canonical(path, error);
   if (!error) return known;
-  const fs::path file = fs::absolute(wfpg::detail::file_behind(path), error);
+  const fs::path file = fs::absolute(wfpg::file_behind(path), error);
   return fs::weakly_canonical(file.parent_path(), error) / file.filename();
 }
 
 void check_place(const named_file& output) {
   try {
-    fs::remove(wfpg::detail::make_partial(wfpg::detail::file_behind(output.path), output.path));
+    fs::remove(wfpg::make_partial(wfpg::file_behind(output.path), output.path));
   } catch (const std::exception& error) {
     refuse(output.option, reason_of(error));
   }
@@ -57,7 +57,7 @@ void check_distinct(const named_file& output, const named_file& other) {
 }  // namespace
 
 void write_file(const std::string& path, const std::string& content) {
-  wfpg::detail::replace_file(path, [&](std::ostream& out) { out << content; });
+  wfpg::replace_file(path, [&](std::ostream& out) { out << content; });
 }
 
 void check_outputs(const std::vector<named_file>& outputs, const std::vector<named_file>& inputs) {
@@ -73,7 +73,7 @@ void check_outputs(const std::vector<named_file>& outputs, const std::vector<nam
 void prepare_folder(const std::string& option, const fs::path& folder) {
   try {
     fs::create_directories(folder);
-    fs::remove(wfpg::detail::make_partial(folder / "output", folder.string()));
+    fs::remove(wfpg::make_partial(folder / "output", folder.string()));
   } catch (const fs::filesystem_error& error) {
     refuse(option, folder.string() + " is no folder to write to: " + error.code().message());
   } catch (const std::exception& error) {

@@ -5,7 +5,8 @@
 #include "camera.hpp"
 #include "path_state.hpp"
 
-#include <wfpg/mis.hpp>
+#include <wfpg/sampling/mis.hpp>
+#include <wfpg/sampling/sampled_direction.hpp>
 
 namespace render {
 

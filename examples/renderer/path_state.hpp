@@ -5,8 +5,8 @@
 #include "rng.hpp"
 #include "tiled_array.hpp"
 
-#include <wfpg/light_guide.hpp>
-#include <wfpg/partitioner.hpp>
+#include <wfpg/bins/partitioner.hpp>
+#include <wfpg/guides/octree/light_guide.hpp>
 
 namespace render {
 

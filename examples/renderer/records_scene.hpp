@@ -3,7 +3,7 @@
 
 #include "device_scene.hpp"
 
-#include <wfpg/irradiance_records.hpp>
+#include <wfpg/guides/records/irradiance_records.hpp>
 
 #include <algorithm>
 #include <vector>

@@ -4,7 +4,7 @@
 #include "embree_caster.hpp"
 #include "option_names.hpp"
 
-#include <wfpg/error.hpp>
+#include <wfpg/base/error.hpp>
 #include <wfpg/exec/omp.hpp>
 #include <wfpg/exec/seq.hpp>
 #include <wfpg/exec/tbb.hpp>
@@ -22,7 +22,7 @@ namespace {
 
 /// State on disk is of what can be saved.
 void require_guided_files(const render_options& options) {
-  using wfpg::detail::require;
+  using wfpg::require;
   const std::string& method = name_of(method_names(), options.method);
   require(is_wfpg(options.method) || (options.load_guide.empty() && !options.keep_guide), "method", method,
           "wfpg or wfpg-product where a guide is loaded or saved");
@@ -35,7 +35,7 @@ void require_guided_files(const render_options& options) {
 }  // namespace
 
 render_options completed(const scene& scene, render_options options) {
-  using wfpg::detail::require;
+  using wfpg::require;
   if (options.width == 0 && options.height == 0) {
     options.width = scene.width;
     options.height = scene.height;

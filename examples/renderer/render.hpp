@@ -4,9 +4,9 @@
 #include "image_io.hpp"
 #include "stage_clock.hpp"
 
-#include <wfpg/irradiance_records_options.hpp>
-#include <wfpg/sample_combiner.hpp>
-#include <wfpg/sarsa_options.hpp>
+#include <wfpg/guides/records/options.hpp>
+#include <wfpg/guides/sarsa/options.hpp>
+#include <wfpg/sampling/sample_combiner.hpp>
 
 #include <cstdint>
 #include <functional>

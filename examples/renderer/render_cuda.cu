@@ -9,7 +9,7 @@ namespace render {
 
 render_result render_on_cuda(const scene& scene, const render_options& options,
                              const progress_callback& progress) {
-  wfpg::detail::check_cuda(cudaFree(nullptr), "--device cuda finds no GPU that it can use; cudaFree");
+  wfpg::check_cuda(cudaFree(nullptr), "--device cuda finds no GPU that it can use; cudaFree");
   return render_on<bvh_scene<wfpg::exec::cuda>>(wfpg::exec::cuda(), scene, options, progress);
 }
 

@@ -10,9 +10,9 @@
 #include "unguided.hpp"
 #include "wavefront.hpp"
 
-#include <wfpg/irradiance_records.hpp>
+#include <wfpg/guides/records/irradiance_records.hpp>
+#include <wfpg/guides/sarsa/sarsa_grid.hpp>
 #include <wfpg/path_guider.hpp>
-#include <wfpg/sarsa_grid.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -157,8 +157,8 @@ inline render_state begin_state(const scene& scene, const render_options& option
   if (options.resume.empty()) return {};
   render_state state = read_state(options.resume, scene, options);
   if (options.seconds <= 0.0)
-    wfpg::detail::require(state.samples <= options.spp, "spp", options.spp,
-                          "no fewer than the rendering to go on with has");
+    wfpg::require(state.samples <= options.spp, "spp", options.spp,
+                  "no fewer than the rendering to go on with has");
   return state;
 }
 

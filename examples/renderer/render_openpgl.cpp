@@ -14,7 +14,7 @@ namespace {
 /// Of all vertices, and a little more, since what a ray hits is beside them by rounding.
 pgl_box3f bounds_of(const scene& scene) {
   wfpg::bounds3 box;
-  for (const vec3& p : scene.positions) box = wfpg::detail::bounds_union()(box, {p, p});
+  for (const vec3& p : scene.positions) box = wfpg::bounds_union()(box, {p, p});
   const vec3 more(1e-3f * glm::length(box.extent()));
   return {to_pgl(box.lower - more), to_pgl(box.upper + more)};
 }

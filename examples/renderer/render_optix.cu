@@ -33,7 +33,7 @@ class optix_accelerated {
 
 render_result render_on_optix(const scene& scene, const render_options& options,
                               const progress_callback& progress) {
-  wfpg::detail::check_cuda(cudaFree(nullptr), "--device optix finds no GPU that it can use; cudaFree");
+  wfpg::check_cuda(cudaFree(nullptr), "--device optix finds no GPU that it can use; cudaFree");
   return render_on<optix_accelerated>(wfpg::exec::cuda(), scene, options, progress);
 }
 

@@ -4,8 +4,8 @@
 #include "option_names.hpp"
 #include "scene_checksum.hpp"
 
-#include <wfpg/detail/math.hpp>
-#include <wfpg/detail/section_file.hpp>
+#include <wfpg/base/math.hpp>
+#include <wfpg/state/section_file.hpp>
 
 #include <cstdio>
 #include <sstream>
@@ -14,10 +14,10 @@
 namespace render {
 namespace {
 
-using wfpg::detail::section_reader;
-using wfpg::detail::section_writer;
+using wfpg::section_reader;
+using wfpg::section_writer;
 
-constexpr wfpg::detail::file_kind state_file_kind{{"\x89wfpgR\n\x1a", 8}, 1, "a rendering's state file"};
+constexpr wfpg::file_kind state_file_kind{{"\x89wfpgR\n\x1a", 8}, 1, "a rendering's state file"};
 
 /// What decides a picture's bits: names as errors say them, and values.
 using named_values = std::vector<std::pair<std::string, std::string>>;
@@ -123,7 +123,7 @@ void restore_film(section_reader bytes, std::size_t pixels, render_state& state)
 
 std::string state_bytes(const scene& scene, const render_options& options, const render_state& state) {
   std::ostringstream out;
-  wfpg::detail::file_writer file(out, state_file_kind, "the state");
+  wfpg::file_writer file(out, state_file_kind, "the state");
   section_writer guide;
   guide.put_text(state.guide);
   file.section("options", options_to_bytes(scene, options));
@@ -135,7 +135,7 @@ std::string state_bytes(const scene& scene, const render_options& options, const
 
 render_state read_state(std::istream& in, const std::string& name, const scene& scene,
                         const render_options& options) {
-  wfpg::detail::file_reader file(in, state_file_kind, name);
+  wfpg::file_reader file(in, state_file_kind, name);
   check_options(file.section("options"), name, scene, options);
   render_state state;
   restore_film(file.section("film"), std::size_t(options.width) * std::size_t(options.height), state);
@@ -147,8 +147,7 @@ render_state read_state(std::istream& in, const std::string& name, const scene& 
 }
 
 render_state read_state(const std::string& path, const scene& scene, const render_options& options) {
-  return wfpg::detail::read_file(path,
-                                 [&](std::istream& in) { return read_state(in, path, scene, options); });
+  return wfpg::read_file(path, [&](std::istream& in) { return read_state(in, path, scene, options); });
 }
 
 }  // namespace render

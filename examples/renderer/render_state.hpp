@@ -1,5 +1,5 @@
 // What a rendering needs to go on later as if it had never stopped: the film, the samples so far, the guide,
-// and what it was rendered with. State files are sections as in wfpg/detail/section_file.hpp:
+// and what it was rendered with. State files are sections as in wfpg/state/section_file.hpp:
 //   options  the scene's name and checksum (8); an option's name and value, for each that decides the picture
 //   film     samples (4), their weight (8), segments (8), of them hits of lights (8), a pixel's sums (3 x 8)
 //   guide    a guide file, or nothing

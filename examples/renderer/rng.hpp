@@ -2,7 +2,7 @@
 // the order in which threads ask.
 #pragma once
 
-#include <wfpg/types.hpp>
+#include <wfpg/base/types.hpp>
 
 #include <cstdint>
 

@@ -2,7 +2,7 @@
 // Host data only; what kernels read is made from it in device_scene.hpp.
 #pragma once
 
-#include <wfpg/types.hpp>
+#include <wfpg/base/types.hpp>
 
 #include <glm/vec4.hpp>
 

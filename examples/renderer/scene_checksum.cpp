@@ -1,7 +1,7 @@
 // Every number of a scene into one hash, member by member, since structures have padding.
 #include "scene_checksum.hpp"
 
-#include <wfpg/detail/section_file.hpp>
+#include <wfpg/state/section_file.hpp>
 
 #include <string>
 #include <type_traits>
@@ -23,8 +23,8 @@ class scene_hash {
   template <class T, class = std::enable_if_t<std::is_arithmetic_v<T>>>
   void add(T number) {
     std::string bytes;
-    wfpg::detail::put_number(bytes, number);
-    hash_ = wfpg::detail::checksum(bytes, hash_);
+    wfpg::put_number(bytes, number);
+    hash_ = wfpg::checksum(bytes, hash_);
   }
   void add(texture_wrap wrap) { add(static_cast<std::uint8_t>(wrap)); }
   void add(material_kind kind) { add(static_cast<std::uint8_t>(kind)); }
@@ -69,7 +69,7 @@ class scene_hash {
             emission_texture, absorption);
   }
 
-  std::uint64_t hash_ = wfpg::detail::checksum({});
+  std::uint64_t hash_ = wfpg::checksum({});
 };
 
 scene_hash hash_without_camera(const scene& s) {

@@ -3,7 +3,7 @@
 // ones, so that what a warp moves is contiguous. Elsewhere they are ordinary arrays.
 #pragma once
 
-#include <wfpg/buffer.hpp>
+#include <wfpg/exec/buffer.hpp>
 
 #include <cstring>
 #include <new>

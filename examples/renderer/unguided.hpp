@@ -2,11 +2,11 @@
 // where directions come from.
 #pragma once
 
-#include <wfpg/detail/serve_rays.hpp>
-#include <wfpg/light_guide.hpp>
-#include <wfpg/mis.hpp>
-#include <wfpg/path_recorder.hpp>
-#include <wfpg/wave.hpp>
+#include <wfpg/guide/path_recorder.hpp>
+#include <wfpg/guide/sample_rays.hpp>
+#include <wfpg/guides/octree/light_guide.hpp>
+#include <wfpg/host/wave.hpp>
+#include <wfpg/sampling/sampled_direction.hpp>
 
 namespace render {
 
@@ -26,9 +26,9 @@ class unguided {
   void sample_directions(const Wave& wave, const Caster&,
                          wfpg::array_view<wfpg::sampled_direction> directions,
                          const Queries& queries = {}) const {
-    using serve = wfpg::detail::serve_ray<decltype(wave.surfaces), decltype(wave.random), Queries>;
-    exec_.for_each(wave.ray_count, wfpg::detail::serve_unbinned<serve>{
-                                       {wave.surfaces, wave.random, queries, directions}, {}});
+    using serve = wfpg::serve_ray<decltype(wave.surfaces), decltype(wave.random), Queries>;
+    exec_.for_each(wave.ray_count,
+                   wfpg::serve_unbinned<serve>{{wave.surfaces, wave.random, queries, directions}, {}});
   }
 
  private:

@@ -1,7 +1,7 @@
 // What a GPU has an instruction for that compilers do not find by themselves; plain C++ elsewhere.
 #pragma once
 
-#include <wfpg/detail/math.hpp>
+#include <wfpg/base/math.hpp>
 
 namespace render::detail {
 
@@ -12,7 +12,7 @@ WFPG_HD inline float byte_float(std::uint32_t word, int i, std::uint32_t one) {
 #if defined(__CUDA_ARCH__)
   return __uint_as_float(__byte_perm(word, one, 0x7604u | static_cast<unsigned>(i) << 4));
 #else
-  return wfpg::detail::bits_float((word >> (8 * i) & 0xffu) << 8 | one);
+  return wfpg::bits_float((word >> (8 * i) & 0xffu) << 8 | one);
 #endif
 }
 

@@ -5,10 +5,10 @@
 #include "render_state.hpp"
 #include "stage_clock.hpp"
 
-#include <wfpg/buffer.hpp>
-#include <wfpg/partitioner.hpp>
-#include <wfpg/ray_caster.hpp>
-#include <wfpg/wave.hpp>
+#include <wfpg/bins/partitioner.hpp>
+#include <wfpg/exec/buffer.hpp>
+#include <wfpg/host/ray_caster.hpp>
+#include <wfpg/host/wave.hpp>
 
 #include <cstdint>
 #include <numeric>

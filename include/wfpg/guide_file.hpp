@@ -40,7 +40,7 @@
 // About 40 bytes a leaf and 10 F² a field; detail/guide_state.hpp and kept_state.hpp say what is checked.
 #pragma once
 
-#include <wfpg/detail/guide_state.hpp>
+#include <wfpg/guides/octree/detail/guide_state.hpp>
 #include <wfpg/path_guider.hpp>
 
 #include <istream>
@@ -53,7 +53,7 @@ namespace wfpg {
 /// what errors call the stream. Throws file_error where the stream takes no more.
 template <class Exec>
 void save_guide(const path_guider<Exec>& guider, std::ostream& out, const std::string& name = "the guide") {
-  detail::file_writer file(out, detail::guide_file_kind, name);
+  file_writer file(out, detail::guide_file_kind, name);
   detail::state_access::save(guider, file);
 }
 
@@ -61,7 +61,7 @@ void save_guide(const path_guider<Exec>& guider, std::ostream& out, const std::s
 /// replaced by a whole one or not at all. Throws file_error.
 template <class Exec>
 void save_guide(const path_guider<Exec>& guider, const std::string& path) {
-  detail::replace_file(path, [&](std::ostream& out) { save_guide(guider, out, path); });
+  replace_file(path, [&](std::ostream& out) { save_guide(guider, out, path); });
 }
 
 /// A guider in the state that was saved. These options must be what they were: scene_tag, octree_resolution,
@@ -74,7 +74,7 @@ void save_guide(const path_guider<Exec>& guider, const std::string& path) {
 template <class Exec>
 path_guider<Exec> load_guide(const Exec& exec, std::istream& in, const guider_options& options,
                              const std::string& name = "the guide") {
-  detail::file_reader file(in, detail::guide_file_kind, name);
+  file_reader file(in, detail::guide_file_kind, name);
   return detail::state_access::load(exec, file, options, nullptr);
 }
 
@@ -82,7 +82,7 @@ path_guider<Exec> load_guide(const Exec& exec, std::istream& in, const guider_op
 /// does.
 template <class Exec>
 path_guider<Exec> load_guide(const Exec& exec, const std::string& path, const guider_options& options) {
-  return detail::read_file(path, [&](std::istream& in) { return load_guide(exec, in, options, path); });
+  return read_file(path, [&](std::istream& in) { return load_guide(exec, in, options, path); });
 }
 
 /// A guider in the state that was saved, of a scene in hand: file_error, too, where the octree is not that of
@@ -90,7 +90,7 @@ path_guider<Exec> load_guide(const Exec& exec, const std::string& path, const gu
 template <class Exec>
 path_guider<Exec> load_guide(const Exec& exec, triangle_mesh_view mesh, std::istream& in,
                              const guider_options& options, const std::string& name = "the guide") {
-  detail::file_reader file(in, detail::guide_file_kind, name);
+  file_reader file(in, detail::guide_file_kind, name);
   return detail::state_access::load(exec, file, options, &mesh);
 }
 
@@ -98,7 +98,7 @@ path_guider<Exec> load_guide(const Exec& exec, triangle_mesh_view mesh, std::ist
 template <class Exec>
 path_guider<Exec> load_guide(const Exec& exec, triangle_mesh_view mesh, const std::string& path,
                              const guider_options& options) {
-  return detail::read_file(path, [&](std::istream& in) { return load_guide(exec, mesh, in, options, path); });
+  return read_file(path, [&](std::istream& in) { return load_guide(exec, mesh, in, options, path); });
 }
 
 }  // namespace wfpg

@@ -11,14 +11,15 @@
 //   guider.end_sample();
 #pragma once
 
-#include <wfpg/buffer.hpp>
-#include <wfpg/detail/serve_rays.hpp>
+#include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/policy.hpp>
-#include <wfpg/guide.hpp>
-#include <wfpg/octree_guide.hpp>
-#include <wfpg/path_recorder.hpp>
-#include <wfpg/statistics.hpp>
-#include <wfpg/wave.hpp>
+#include <wfpg/guide/guide.hpp>
+#include <wfpg/guide/path_recorder.hpp>
+#include <wfpg/guide/sample_rays.hpp>
+#include <wfpg/guide/statistics.hpp>
+#include <wfpg/guides/octree/octree_guide.hpp>
+#include <wfpg/host/ray_caster.hpp>
+#include <wfpg/host/wave.hpp>
 
 #include <memory>
 #include <utility>
@@ -139,7 +140,7 @@ class path_guider {
         needs_(guide_.recording()),
         recorder_(exec_, Guide::records_paths ? options_.max_paths : 0, options_.max_depth,
                   options_.include_emission, needs_.share_shift, needs_.directions) {
-    detail::require(needs_.settled_turns >= 1, "settled_turns", needs_.settled_turns, "at least 1");
+    require(needs_.settled_turns >= 1, "settled_turns", needs_.settled_turns, "at least 1");
   }
 
   static options_type completed(options_type options) {
@@ -149,12 +150,12 @@ class path_guider {
   }
   template <class Surfaces, class Random, class Caster>
   void check(const wave<Surfaces, Random>& w, const Caster& caster) const;
-  std::uint64_t seed_of(std::uint32_t sample) const { return detail::hash(options_.seed, sample); }
+  std::uint64_t seed_of(std::uint32_t sample) const { return hash(options_.seed, sample); }
   bool is_guided(std::uint32_t sample) const { return sample > options_.unguided_samples && !guide_.empty(); }
   /// Of `settled_turns` samples one at random: a host may have turns of its own, such as tiles.
   bool is_recorded(std::uint32_t sample) const {
     const std::uint32_t turns = needs_.settled_turns, round = (sample - 1) / turns;
-    return sample <= settled_after_ || (sample - 1) % turns == detail::hash(~options_.seed, round) % turns;
+    return sample <= settled_after_ || (sample - 1) % turns == hash(~options_.seed, round) % turns;
   }
   guide_sample<Exec> at(std::uint32_t sample) {
     return {exec_, sample, seed_of(sample), is_guided(sample), recorded_, clock_};
@@ -167,7 +168,7 @@ class path_guider {
   }
 
   options_type options_;
-  detail::stage_clock clock_;
+  stage_clock clock_;
   std::unique_ptr<retaining_resource> working_memory_;  // of what follows, in part
   Exec exec_;                                           // allocates there
   Guide guide_;
@@ -208,10 +209,10 @@ void path_guider<Exec, Guide>::begin_sample() {
 template <class Exec, class Guide>
 void path_guider<Exec, Guide>::end_sample() {
   if (recorded_) {
-    const auto timed = clock_.time(detail::stage::record);
+    const auto timed = clock_.time(stage::record);
     guide_.learn(now(), recorder_);
   }
-  const auto timed = clock_.time(detail::stage::cache);
+  const auto timed = clock_.time(stage::cache);
   guide_.update(now());
 }
 
@@ -222,7 +223,7 @@ void path_guider<Exec, Guide>::check(const wave<Surfaces, Random>& w, const Cast
                 "surfaces: needs wfpg::surface<Bsdf> operator()(std::uint32_t) const");
   static_assert(is_ray_caster_v<Caster, Exec>,
                 "caster: needs ray_hit operator()(const ray&) const, or cast(exec, rays, hits) const");
-  detail::require(w.ray_count <= options_.max_rays, "ray_count", w.ray_count, "at most max_rays");
+  require(w.ray_count <= options_.max_rays, "ray_count", w.ray_count, "at most max_rays");
 }
 
 template <class Exec, class Guide>
@@ -234,22 +235,21 @@ void path_guider<Exec, Guide>::sample_directions(const wave<Surfaces, Random>& w
   static_assert(is_bsdf_v<bsdf_of_t<Surfaces>>,
                 "the BSDF needs eval, pdf, sample, is_delta and transmits, all const");
   static_assert(is_random_v<Random>, "random: needs vec2 operator()(std::uint32_t, std::uint32_t) const");
-  detail::require(directions.size() >= w.ray_count, "size of directions", directions.size(),
-                  "ray_count or more");
+  require(directions.size() >= w.ray_count, "size of directions", directions.size(), "ray_count or more");
   if constexpr (!std::is_same_v<Queries, no_queries>)
-    detail::require(queries.densities.size() >= w.ray_count, "size of densities", queries.densities.size(),
-                    "ray_count or more");
+    require(queries.densities.size() >= w.ray_count, "size of densities", queries.densities.size(),
+            "ray_count or more");
 
-  const detail::serve_ray<Surfaces, Random, Queries> serve{w.surfaces, w.random, queries, directions};
+  const serve_ray<Surfaces, Random, Queries> serve{w.surfaces, w.random, queries, directions};
   if constexpr (Guide::serves_waves)
     guide_.serve(now(w.depth), w, caster, serve);
   else {
     const view_type view = prepare(w, caster);
-    const auto timed = clock_.time(detail::stage::serve);
+    const auto timed = clock_.time(stage::serve);
     if (now(w.depth).guided)
-      exec_.for_each(w.ray_count, detail::serve_guide_view<decltype(serve), view_type>{serve, view});
+      exec_.for_each(w.ray_count, serve_guide_view<decltype(serve), view_type>{serve, view});
     else
-      exec_.for_each(w.ray_count, detail::serve_unbinned<decltype(serve)>{serve, {}});
+      exec_.for_each(w.ray_count, serve_unbinned<decltype(serve)>{serve, {}});
   }
 }
 
@@ -258,7 +258,7 @@ template <class Surfaces, class Random, class Caster>
 typename path_guider<Exec, Guide>::view_type path_guider<Exec, Guide>::prepare(
     const wave<Surfaces, Random>& w, const Caster& caster) {
   check(w, caster);
-  const auto timed = clock_.time(detail::stage::fields);
+  const auto timed = clock_.time(stage::fields);
   return guide_.prepare(now(w.depth), w, caster);
 }
 

@@ -1,75 +1,7 @@
-// One depth of a wavefront, as the renderer describes it to the guider.
+// Forwards to where the header is now; gone in version 0.3.
 #pragma once
 
-#include <wfpg/bsdf.hpp>
-#include <wfpg/types.hpp>
+#pragma message("wfpg/wave.hpp is deprecated: include wfpg/host/wave.hpp and wfpg/guide/statistics.hpp")
 
-#include <cstdint>
-#include <type_traits>
-#include <utility>
-
-namespace wfpg {
-
-/// Rays [0, ray_count) that have hit something and want a next direction. Inactive ones may lie among them.
-///   Surfaces  surface<Bsdf> operator()(std::uint32_t ray) const;
-///   Random    vec2 operator()(std::uint32_t ray, std::uint32_t dimension) const;   in [0,1)², dimensions 0
-///   and 1
-template <class Surfaces, class Random>
-struct wave {
-  std::uint32_t depth = 0;    ///< 0: the camera's first hits
-  std::size_t ray_count = 0;  ///< rays, or a capacity of them
-  Surfaces surfaces;          ///< where they have hit
-  Random random;              ///< what directions are drawn from
-};
-/// The types follow from the arguments.
-template <class Surfaces, class Random>
-wave(std::uint32_t, std::size_t, Surfaces, Random) -> wave<Surfaces, Random>;
-
-/// What guiding did for the waves of one depth: sums over the guided samples so far; 0 beyond guided_depths.
-struct depth_statistics {
-  std::uint64_t bins = 0;  ///< whose fields were made; of kept fields, made or refreshed
-  std::uint64_t rays = 0;  ///< in bins
-  /// Active rays outside every voxel, with a normal that is not of about unit length, or without room for a
-  /// field: their BSDF alone.
-  std::uint64_t unbinned = 0;
-  std::uint64_t cones = 0;  ///< cast for them
-};
-
-/// Directions whose densities the renderer wants from the same fields: those that next-event estimation
-/// chose.
-///   Query  vec3 operator()(std::uint32_t ray) const;   unit length, or zero for none
-template <class Query>
-struct density_queries {
-  Query query;                  ///< a ray's direction
-  array_view<float> densities;  ///< a ray: the whole mixture's density, per steradian; 0 for none
-};
-/// The type follows from the argument.
-template <class Query>
-density_queries(Query, array_view<float>) -> density_queries<Query>;
-
-/// No query.
-struct no_queries {};
-
-namespace detail {
-
-template <class S, class = void>
-struct is_surfaces : std::false_type {};
-template <class S>
-struct is_surfaces<S, std::void_t<bsdf_of_t<S>>> : std::true_type {};
-
-template <class R, class = void>
-struct is_random : std::false_type {};
-template <class R>
-struct is_random<R, std::void_t<decltype(vec2(std::declval<const R&>()(std::uint32_t(0), std::uint32_t(0))))>>
-    : std::true_type {};
-
-}  // namespace detail
-
-/// True where S gives a wfpg::surface for a ray index.
-template <class S>
-inline constexpr bool is_surfaces_v = detail::is_surfaces<S>::value;
-/// True where R gives a vec2 for a ray index and a dimension.
-template <class R>
-inline constexpr bool is_random_v = detail::is_random<R>::value;
-
-}  // namespace wfpg
+#include <wfpg/host/wave.hpp>
+#include <wfpg/guide/statistics.hpp>

@@ -111,7 +111,7 @@ TEST_CASE("fields of 128 x 128 fit the shared memory of small devices, and twice
   constexpr std::size_t small = 99 * 1024, large = 228 * 1024;  // of compute capabilities 8.6 and 9.0
   constexpr std::size_t reserved = 1024;                        // of each block
   const std::size_t bytes = sizeof(std::uint32_t) * wfpg::grid_distribution::words(128) + 16 +
-                            wfpg::detail::field_scratch_bytes(128, cuda_policy::warps_per_block) + reserved;
+                            wfpg::field_scratch_bytes(128, cuda_policy::warps_per_block) + reserved;
   CHECK(bytes <= small);
   CHECK(2 * bytes <= large);
 }

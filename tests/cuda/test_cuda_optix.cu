@@ -3,7 +3,7 @@
 #include "optix_caster.hpp"
 #include "support/random_meshes.hpp"
 
-#include <wfpg/ray_caster.hpp>
+#include <wfpg/host/ray_caster.hpp>
 
 #include <cmath>
 #include <limits>

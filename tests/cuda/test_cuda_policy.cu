@@ -15,7 +15,7 @@
 
 using namespace wfpg_test;
 using cuda_policy = wfpg::exec::cuda;
-using wfpg::detail::check_cuda;
+using wfpg::check_cuda;
 
 namespace {
 

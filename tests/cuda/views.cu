@@ -1,6 +1,6 @@
 // Compiled, never run: each view of the library goes to a kernel by value and is called there, so that
 // whatever a device will run is annotated for it.
-#include <wfpg/testing.hpp>
+#include <wfpg/octree/svo_ray_caster.hpp>
 #include <wfpg/wfpg.hpp>
 
 namespace cuda_compile {
@@ -127,7 +127,7 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(d::fold_deposits{});
   launch(d::average_children{});
   launch(d::compose_opacity{});
-  launch(wfpg::deposit_paths{recorder, cache, {}});
+  launch(wfpg::deposit_path{recorder, cache, {}});
   launch(d::starts_key_group{});
   launch(d::write_group_offsets{});
   launch(d::count_at_leaves<d::wave_rays<surfaces>>{});

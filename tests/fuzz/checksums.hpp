@@ -1,8 +1,8 @@
 // Files of sections with their checksums put right, so that what is behind them is reached.
 #pragma once
 
-#include <wfpg/detail/guide_state.hpp>
-#include <wfpg/detail/section_file.hpp>
+#include <wfpg/guides/octree/detail/guide_state.hpp>
+#include <wfpg/state/section_file.hpp>
 
 #include <algorithm>
 #include <cstdint>
@@ -14,20 +14,20 @@ namespace wfpg_fuzz {
 template <class T>
 void set_number(std::string& bytes, std::size_t at, T value) {
   std::string number;
-  wfpg::detail::put_number(number, value);
+  wfpg::put_number(number, value);
   bytes.replace(at, sizeof(T), number);
 }
 
 /// The same bytes with right checksums, of a guide file inside of a section, too.
 inline std::string with_checksums(std::string bytes) {
-  using wfpg::detail::checksum;
+  using wfpg::checksum;
   if (bytes.size() < 16) return bytes;
   const auto sum = [&bytes](std::size_t first, std::size_t n) {
     return checksum(std::string_view(bytes).substr(first, n));
   };
   set_number(bytes, 12, static_cast<std::uint32_t>(sum(0, 12)));
   for (std::size_t at = 16; bytes.size() - at >= 32;) {
-    const auto said = wfpg::detail::number_at<std::uint64_t>(&bytes[at + 8]);
+    const auto said = wfpg::number_at<std::uint64_t>(&bytes[at + 8]);
     const std::size_t size = static_cast<std::size_t>(std::min<std::uint64_t>(said, bytes.size() - at - 32));
     const std::size_t inner = at + 24 + 8;  // beyond the length of a text
     if (size > 8 && bytes.compare(inner, 8, wfpg::detail::guide_file_kind.magic) == 0)

@@ -3,7 +3,7 @@
 #include "memory_file.hpp"
 #include "require.hpp"
 
-#include <wfpg/detail/math.hpp>
+#include <wfpg/base/math.hpp>
 
 #include <cstdint>
 #include <stdexcept>
@@ -11,7 +11,7 @@
 
 namespace {
 
-using wfpg::detail::is_finite;
+using wfpg::is_finite;
 using wfpg_fuzz::require;
 
 bool is_texture(const render::scene& scene, const render::texture_reference& reference) {

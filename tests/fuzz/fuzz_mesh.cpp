@@ -2,7 +2,7 @@
 // surfaces, or an error that names the argument.
 #include "guided_samples.hpp"
 
-#include <wfpg/voxelizer.hpp>
+#include <wfpg/octree/voxelizer.hpp>
 
 #include <cstddef>
 #include <cstdint>

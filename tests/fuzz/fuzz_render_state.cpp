@@ -7,7 +7,7 @@
 #include "require.hpp"
 #include "scene.hpp"
 
-#include <wfpg/error.hpp>
+#include <wfpg/base/error.hpp>
 
 #include <cmath>
 #include <cstdint>

@@ -4,8 +4,9 @@
 #include "require.hpp"
 
 #include <wfpg/exec/seq.hpp>
+#include <wfpg/host/ray_caster.hpp>
+#include <wfpg/octree/svo_ray_caster.hpp>
 #include <wfpg/path_guider.hpp>
-#include <wfpg/ray_caster.hpp>
 
 #include <cmath>
 #include <cstdint>
@@ -28,7 +29,7 @@ struct lambert {
   wfpg::bsdf_sample sample(vec3 outgoing, vec2 u) const {
     const float r = std::sqrt(u.x), phi = 6.2831853f * u.y;
     const vec3 local(r * std::cos(phi), r * std::sin(phi), std::sqrt(1.0f - u.x));
-    const vec3 d = wfpg::detail::frame(normal).to_world(local);
+    const vec3 d = wfpg::frame(normal).to_world(local);
     return {d, pdf(outgoing, d)};
   }
   bool is_delta() const { return false; }
@@ -49,7 +50,7 @@ struct leaf_surfaces {
 
 struct random_numbers {
   vec2 operator()(std::uint32_t ray, std::uint32_t dimension) const {
-    return wfpg::detail::unit_vec2(wfpg::detail::hash(ray, dimension));
+    return wfpg::unit_vec2(wfpg::hash(ray, dimension));
   }
 };
 
@@ -76,7 +77,7 @@ void guide(wfpg::path_guider<policy>& guider, const Surfaces& surfaces) {
                              wfpg::svo_ray_caster(tree, 1.0f), {drawn.data(), drawn.size()});
     for (std::uint32_t ray = 0; ray < rays; ++ray) {
       const wfpg::sampled_direction& d = drawn[ray];
-      require(d.pdf >= 0.0f && wfpg::detail::is_finite(d.pdf) && wfpg::detail::is_finite(d.direction),
+      require(d.pdf >= 0.0f && wfpg::is_finite(d.pdf) && wfpg::is_finite(d.direction),
               "directions and densities are finite");
       guider.recorder().scatter(ray, 0, d);
       guider.recorder().escape(ray, 1, vec3(1.0f));

@@ -1,6 +1,6 @@
 // The host that docs/host.md and README.md talk about, and their code as it stands there: the functors of the
 // one are what the other's loop passes.
-#include <wfpg/types.hpp>
+#include <wfpg/base/types.hpp>
 
 #include <cstdint>
 #include <vector>

@@ -3,7 +3,7 @@
 
 #include "support/random_meshes.hpp"
 
-#include <wfpg/morton.hpp>
+#include <wfpg/base/morton.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -6,7 +6,7 @@
 #include "support/policies.hpp"
 #include "support/random_meshes.hpp"
 
-#include <wfpg/exitance_cache.hpp>
+#include <wfpg/octree/exitance_cache.hpp>
 
 #include <cstddef>
 #include <cstdint>

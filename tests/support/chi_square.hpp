@@ -1,19 +1,19 @@
 // Families of chi² tests, and the tests themselves under this namespace.
 #pragma once
 
-#include <wfpg/testing.hpp>
+#include <wfpg/testing/statistics.hpp>
 
 #include <sstream>
 #include <string>
 
 namespace wfpg_test {
 
-using wfpg::detail::chi_square_bin;
-using wfpg::detail::chi_square_result;
-using wfpg::detail::chi_square_tail;
-using wfpg::detail::chi_square_test;
-using wfpg::detail::pool_bins;
-using wfpg::detail::upper_gamma;
+using wfpg::testing::chi_square_bin;
+using wfpg::testing::chi_square_result;
+using wfpg::testing::chi_square_tail;
+using wfpg::testing::chi_square_test;
+using wfpg::testing::pool_bins;
+using wfpg::testing::upper_gamma;
 
 /// Many independent tests as one at significance 0.1%: none below 0.1% / n (Bonferroni), and the sum of all
 /// statistics, which is chi² of the sum of degrees, not below 0.1% either. The sum finds small errors that

@@ -3,7 +3,7 @@
 
 #include "support/policies.hpp"
 
-#include <wfpg/exitance_cache.hpp>
+#include <wfpg/octree/exitance_cache.hpp>
 
 #include <cstddef>
 #include <vector>

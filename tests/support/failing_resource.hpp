@@ -3,7 +3,7 @@
 
 #include "support/policies.hpp"
 
-#include <wfpg/error.hpp>
+#include <wfpg/base/error.hpp>
 
 #include <cstddef>
 #include <cstdio>

@@ -5,7 +5,7 @@
 #include "support/evaluate.hpp"
 #include "support/policies.hpp"
 
-#include <wfpg/field_sampler.hpp>
+#include <wfpg/sampling/field_sampler.hpp>
 
 #include <cmath>
 #include <cstdint>
@@ -50,7 +50,7 @@ inline std::vector<double> cell_probabilities(const std::vector<float>& values, 
 /// What a distribution is built from: cell values, and room for it.
 inline std::vector<std::uint32_t> words_of(const std::vector<float>& values, std::uint32_t resolution) {
   std::vector<std::uint32_t> words;
-  for (float value : values) words.push_back(wfpg::detail::float_bits(value));
+  for (float value : values) words.push_back(wfpg::float_bits(value));
   words.resize(wfpg::grid_distribution::words(resolution));
   return words;
 }
@@ -61,7 +61,7 @@ struct build_grid {
   float floor;
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t) const {
-    wfpg::detail::build_distribution(block, {words}, static_cast<int>(resolution), floor);
+    wfpg::build_distribution(block, {words}, static_cast<int>(resolution), floor);
   }
 };
 

@@ -6,7 +6,7 @@
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
-#include <wfpg/field_store.hpp>
+#include <wfpg/guides/octree/field_store.hpp>
 
 #include <cstddef>
 #include <cstdint>

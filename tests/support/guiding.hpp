@@ -160,7 +160,7 @@ struct guided_box {
 
 inline bool same_bits(const wfpg::sampled_direction& a, const wfpg::sampled_direction& b) {
   return std::memcmp(&a.direction, &b.direction, sizeof a.direction) == 0 &&
-         wfpg::detail::float_bits(a.pdf) == wfpg::detail::float_bits(b.pdf) && a.technique == b.technique;
+         wfpg::float_bits(a.pdf) == wfpg::float_bits(b.pdf) && a.technique == b.technique;
 }
 
 inline bool same_bits(const std::vector<wfpg::sampled_direction>& a,

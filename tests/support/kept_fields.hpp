@@ -7,8 +7,8 @@
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
-#include <wfpg/detail/atomic.hpp>
-#include <wfpg/field_store.hpp>
+#include <wfpg/exec/support/atomic.hpp>
+#include <wfpg/guides/octree/field_store.hpp>
 
 #include <algorithm>
 #include <cstddef>
@@ -23,7 +23,7 @@ struct noting_caster {
   wfpg::array_view<wfpg::ray> cones;
   box_caster box;
   WFPG_HD wfpg::ray_hit operator()(const wfpg::ray& cone) const {
-    const std::uint32_t at = wfpg::detail::atomic_add(count, 1);
+    const std::uint32_t at = wfpg::atomic_add(count, 1);
     if (at < cones.size()) cones[at] = cone;
     return box(cone);
   }
@@ -150,7 +150,7 @@ struct kept_box {
             field,
             mode,
             0.7f,
-            wfpg::detail::hash(7, sample),
+            wfpg::hash(7, sample),
             {}};
   }
 };
@@ -164,12 +164,12 @@ inline std::vector<test_surface> rays_at(vec3 position, vec3 normal, std::size_t
 WFPG_HD inline std::uint64_t field_bits(const wfpg::guide_mixture& mixture) {
   if (mixture.field.empty()) return 0;
   const wfpg::grid_distribution& grid = mixture.field.grid();
-  std::uint64_t bits = wfpg::detail::hash(mixture.field.hemisphere(), grid.resolution());
+  std::uint64_t bits = wfpg::hash(mixture.field.hemisphere(), grid.resolution());
   for (int axis = 0; axis < 3; ++axis)
-    bits = wfpg::detail::hash(bits, wfpg::detail::float_bits(mixture.field.normal()[axis]));
-  bits = wfpg::detail::hash(bits, wfpg::detail::float_bits(mixture.fraction));
+    bits = wfpg::hash(bits, wfpg::float_bits(mixture.field.normal()[axis]));
+  bits = wfpg::hash(bits, wfpg::float_bits(mixture.fraction));
   for (std::uint32_t i = 0; i < grid.resolution() * grid.resolution(); ++i)
-    bits = wfpg::detail::hash(bits, grid.weight(i % grid.resolution(), i / grid.resolution()));
+    bits = wfpg::hash(bits, grid.weight(i % grid.resolution(), i / grid.resolution()));
   return bits;
 }
 

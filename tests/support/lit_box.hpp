@@ -4,9 +4,9 @@
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
-#include <wfpg/exitance_cache.hpp>
-#include <wfpg/sparse_voxel_octree.hpp>
-#include <wfpg/voxelizer.hpp>
+#include <wfpg/octree/exitance_cache.hpp>
+#include <wfpg/octree/sparse_voxel_octree.hpp>
+#include <wfpg/octree/voxelizer.hpp>
 
 #include <cstdint>
 

@@ -3,7 +3,7 @@
 
 #include "support/evaluate.hpp"
 
-#include <wfpg/sparse_voxel_octree.hpp>
+#include <wfpg/octree/sparse_voxel_octree.hpp>
 
 #include <cstddef>
 #include <cstdint>

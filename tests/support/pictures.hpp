@@ -3,7 +3,7 @@
 
 #include "scene.hpp"
 
-#include <wfpg/types.hpp>
+#include <wfpg/base/types.hpp>
 
 #include <cstring>
 #include <vector>

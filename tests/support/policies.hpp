@@ -24,7 +24,7 @@
 #include <wfpg/exec/seq.hpp>
 #include <wfpg/exec/tbb.hpp>
 #endif
-#include <wfpg/buffer.hpp>
+#include <wfpg/exec/buffer.hpp>
 
 #include <cmath>
 #include <cstddef>

@@ -5,8 +5,8 @@
 #include "support/scenes.hpp"
 #include "support/statistics.hpp"
 
-#include <wfpg/mis.hpp>
-#include <wfpg/product_sampler.hpp>
+#include <wfpg/sampling/mixture.hpp>
+#include <wfpg/sampling/product_sampler.hpp>
 
 #include <cmath>
 #include <cstdint>
@@ -37,7 +37,7 @@ struct make_product {
   std::uint32_t* weights;
   wfpg::product_field* product;
   WFPG_HD void operator()(std::size_t) const {
-    *product = wfpg::detail::multiply(field, points, surface, weights);
+    *product = wfpg::multiply_field(field, points, surface, weights);
   }
 };
 
@@ -78,8 +78,8 @@ class made_product {
         weights_(exec, blocks()),
         points_(exec, 2 * blocks()) {
     wfpg::product_point* const sphere = points_.data() + blocks();
-    exec.for_each(blocks(), wfpg::detail::measure_product_blocks{points_.data(), sphere, resolution_});
-    exec.for_each(blocks(), wfpg::detail::draw_product_points{points_.data(), sphere, resolution_, seed});
+    exec.for_each(blocks(), wfpg::measure_product_blocks{points_.data(), sphere, resolution_});
+    exec.for_each(blocks(), wfpg::draw_product_points{points_.data(), sphere, resolution_, seed});
     const wfpg::buffer<wfpg::product_field, Exec> product(exec, 1);
     const wfpg::buffer<product_draw, Exec> results(exec, samples);
     exec.for_each(

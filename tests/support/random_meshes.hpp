@@ -3,7 +3,7 @@
 
 #include "support/policies.hpp"
 
-#include <wfpg/voxelizer.hpp>
+#include <wfpg/octree/voxelizer.hpp>
 
 #include <cmath>
 #include <cstdint>

@@ -6,7 +6,7 @@
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
-#include <wfpg/irradiance_records.hpp>
+#include <wfpg/guides/records/irradiance_records.hpp>
 #include <wfpg/path_guider.hpp>
 
 #include <cstdint>

@@ -7,7 +7,7 @@
 #include "support/catch.hpp"
 #include "support/statistics.hpp"
 
-#include <wfpg/types.hpp>
+#include <wfpg/base/types.hpp>
 
 #include <cstddef>
 #include <cstdint>

@@ -1,9 +1,9 @@
-// What tests ask of the reports of <wfpg/testing.hpp>.
+// What tests ask of the reports of <wfpg/testing>.
 #pragma once
 
 #include "support/catch.hpp"
 
-#include <wfpg/testing.hpp>
+#include <wfpg/testing/check_report.hpp>
 
 #include <string>
 #include <vector>

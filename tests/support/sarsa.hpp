@@ -6,8 +6,8 @@
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 
+#include <wfpg/guides/sarsa/sarsa_grid.hpp>
 #include <wfpg/path_guider.hpp>
-#include <wfpg/sarsa_grid.hpp>
 
 #include <cstdint>
 

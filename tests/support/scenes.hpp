@@ -6,11 +6,11 @@
 #include "support/deposits.hpp"
 #include "support/policies.hpp"
 
-#include <wfpg/bsdf.hpp>
-#include <wfpg/buffer.hpp>
-#include <wfpg/detail/math.hpp>
-#include <wfpg/types.hpp>
-#include <wfpg/voxelizer.hpp>
+#include <wfpg/base/math.hpp>
+#include <wfpg/base/types.hpp>
+#include <wfpg/exec/buffer.hpp>
+#include <wfpg/host/bsdf.hpp>
+#include <wfpg/octree/voxelizer.hpp>
 
 #include <cmath>
 #include <cstdint>
@@ -44,22 +44,22 @@ struct test_bsdf {
   WFPG_HD float pdf(vec3 outgoing, vec3 incident) const {
     const vec3 up = facing(outgoing);
     const float cosine = glm::dot(up, incident);
-    if (kind == bsdf_kind::glass) return 0.25f / wfpg::detail::pi;
+    if (kind == bsdf_kind::glass) return 0.25f / wfpg::pi;
     if (cosine <= 0.0f || is_delta() || kind == bsdf_kind::black) return 0.0f;
-    if (kind == bsdf_kind::lambert) return cosine / wfpg::detail::pi;
+    if (kind == bsdf_kind::lambert) return cosine / wfpg::pi;
     const float along = glm::dot(mirrored(outgoing), incident);
-    return along > 0.0f ? std::pow(along, exponent) * (exponent + 1.0f) / (2.0f * wfpg::detail::pi) : 0.0f;
+    return along > 0.0f ? std::pow(along, exponent) * (exponent + 1.0f) / (2.0f * wfpg::pi) : 0.0f;
   }
 
   WFPG_HD wfpg::bsdf_sample sample(vec3 outgoing, vec2 u) const {
-    const float turn = 2.0f * wfpg::detail::pi * u.y;
+    const float turn = 2.0f * wfpg::pi * u.y;
     if (kind == bsdf_kind::black) return {};
     if (is_delta()) return {mirrored(outgoing), 0.75f};
     const bool lambert = kind == bsdf_kind::lambert;
     float z = lambert ? std::sqrt(1.0f - u.x) : std::pow(1.0f - u.x, 1.0f / (exponent + 1.0f));
     if (kind == bsdf_kind::glass) z = 1.0f - 2.0f * u.x;
     const float r = std::sqrt(std::fmax(1.0f - z * z, 0.0f));
-    const wfpg::detail::frame around(lambert ? facing(outgoing) : mirrored(outgoing));
+    const wfpg::frame around(lambert ? facing(outgoing) : mirrored(outgoing));
     const vec3 d = glm::normalize(around.to_world({r * std::cos(turn), r * std::sin(turn), z}));
     const float density = pdf(outgoing, d);
     return density > 0.0f ? wfpg::bsdf_sample{d, density} : wfpg::bsdf_sample{};
@@ -92,7 +92,7 @@ struct stored_surfaces {
 struct hashed_numbers {
   std::uint64_t seed = 1;
   WFPG_HD vec2 operator()(std::uint32_t ray, std::uint32_t dimension) const {
-    return wfpg::detail::unit_vec2(wfpg::detail::hash(wfpg::detail::hash(seed, ray), dimension));
+    return wfpg::unit_vec2(wfpg::hash(wfpg::hash(seed, ray), dimension));
   }
 };
 

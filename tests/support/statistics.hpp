@@ -1,11 +1,14 @@
 // What every sampler of directions has to pass: its frequencies, its energy, its moments, and that it reports
-// the density that it answers when asked. Made of <wfpg/testing.hpp>'s own parts.
+// the density that it answers when asked. Made of <wfpg/testing>'s own parts.
 #pragma once
 
 #include "support/chi_square.hpp"
 #include "support/evaluate.hpp"
 
-#include <wfpg/types.hpp>
+#include <wfpg/base/types.hpp>
+#include <wfpg/testing/check_report.hpp>
+#include <wfpg/testing/detail/describe.hpp>
+#include <wfpg/testing/sphere_statistics.hpp>
 
 #include <cmath>
 #include <cstddef>
@@ -79,14 +82,14 @@ class sampler_check {
     const bins_type bins = integrate([](wfpg::vec3) { return 1.0f; });
     report.message = energy(bins);
     if (!report) return report;
-    report.frequencies = wfpg::detail::test_directions(bins, counted_);
+    report.frequencies = wfpg::testing::test_directions(bins, counted_);
     report.message = frequencies(bins, report.frequencies);
     if (report && options_.moments) report.message = moments(bins);
     return report;
   }
 
  private:
-  using bins_type = wfpg::detail::sphere_bins;
+  using bins_type = wfpg::testing::sphere_bins;
   static constexpr double tests = 7.0;  // frequencies and moments share the significance
 
   /// Of pdf() times `factor`, at least 0.
@@ -97,7 +100,7 @@ class sampler_check {
       for (std::size_t i = 0; i < result.size(); ++i) result[i] *= factor(directions[i]);
       return result;
     };
-    return {wfpg::detail::frame(wfpg::vec3(0.0f, 0.0f, 1.0f)), values, double(counted_.size()), hints_};
+    return {wfpg::frame(wfpg::vec3(0.0f, 0.0f, 1.0f)), values, double(counted_.size()), hints_};
   }
 
   std::string query() const {
@@ -142,11 +145,11 @@ class sampler_check {
         return square ? c * c : 0.5f * (1.0f + c);
       };
       const bins_type weighted = integrate(quantity);
-      wfpg::detail::sample_mean mean;
+      wfpg::testing::sample_mean mean;
       for (const wfpg::vec3 d : counted_) mean.add(double(quantity(d)));
       const double expected = weighted.integral() / bins.integral();
       const double allowance = 5.0e-4 * expected + weighted.integral_error() + bins.integral_error();
-      const double p = wfpg::detail::two_sided_tail(mean.mean() - expected, allowance, mean.error());
+      const double p = wfpg::testing::two_sided_tail(mean.mean() - expected, allowance, mean.error());
       if (p >= options_.significance / tests) continue;
       const char* const names[] = {"(1 + x) / 2", "(1 + y) / 2", "(1 + z) / 2", "x^2", "y^2", "z^2"};
       return wfpg::detail::sentence("moments: the mean of ", names[k], " over the samples is ", mean.mean(),
@@ -254,7 +257,7 @@ inline wfpg::testing::check_report check_unbiased(const tile_means& truth, const
     if (constant && std::fabs(difference) > 1.0e-5 * truth.mean(tile))
       return {wfpg::detail::sentence("tile ", tile, " without noise: observed ", tested.mean(tile),
                                      ", expected ", truth.mean(tile))};
-    if (!wfpg::detail::is_finite(t) || std::fabs(t) >= 6.0)
+    if (!wfpg::is_finite(t) || std::fabs(t) >= 6.0)
       return {wfpg::detail::sentence("tile ", tile, ": observed ", tested.mean(tile), ", expected ",
                                      truth.mean(tile), ", ", t, " standard errors apart")};
     if (constant) continue;

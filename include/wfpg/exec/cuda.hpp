@@ -5,11 +5,11 @@
 #error "wfpg/exec/cuda.hpp needs a CUDA compiler: include it in .cu files"
 #endif
 
-#include <wfpg/buffer.hpp>
-#include <wfpg/detail/cuda_block.hpp>
-#include <wfpg/detail/thrust.hpp>
-#include <wfpg/error.hpp>
+#include <wfpg/base/error.hpp>
+#include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/policy.hpp>
+#include <wfpg/exec/support/cuda_block.hpp>
+#include <wfpg/exec/support/thrust.hpp>
 
 #include <cub/device/device_radix_sort.cuh>
 #include <cuda_runtime_api.h>
@@ -36,14 +36,14 @@ class cuda_error : public device_error {
   cudaError_t code() const noexcept { return static_cast<cudaError_t>(device_error::code()); }
 };
 
-namespace detail {
-
 /// Throws cuda_error where `code` is one, which the next call is then not to find.
 inline void check_cuda(cudaError_t code, const char* call) {
   if (code == cudaSuccess) return;
   cudaGetLastError();
   throw cuda_error(call, code);
 }
+
+namespace detail {
 
 /// Device memory from a pool of its own on the current device, ordered on a stream. The pool keeps what is
 /// given back, since the driver takes milliseconds for new memory. Blocks that are in use keep the resource
@@ -189,13 +189,13 @@ class cuda {
 
   /// Thrust's CUDA policy on the stream, which does not wait, with temporaries from resource().
   auto thrust() const {
-    return ::thrust::cuda::par_nosync(wfpg::detail::resource_allocator<char>(resource_)).on(stream_);
+    return ::thrust::cuda::par_nosync(wfpg::resource_allocator<char>(resource_)).on(stream_);
   }
 
   /// Waits for the work before it.
   void copy_to_host(void* to, const void* from, std::size_t bytes) const {
     copy(to, from, bytes, cudaMemcpyDeviceToHost);
-    wfpg::detail::check_cuda(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
+    wfpg::check_cuda(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
   }
   /// Pinned memory on the host has to outlive the copy.
   void copy_from_host(void* to, const void* from, std::size_t bytes) const {
@@ -204,7 +204,7 @@ class cuda {
 
   /// Sets each byte of device memory.
   void fill_bytes(void* to, unsigned char value, std::size_t bytes) const {
-    if (bytes) wfpg::detail::check_cuda(cudaMemsetAsync(to, value, bytes, stream_), "cudaMemsetAsync");
+    if (bytes) wfpg::check_cuda(cudaMemsetAsync(to, value, bytes, stream_), "cudaMemsetAsync");
   }
 
   /// Sorts n pairs stably by the low bits of their keys.
@@ -213,9 +213,9 @@ class cuda {
                   Value* sorted_values) const {
     std::size_t bytes = 0;
     const auto sort = [&](void* storage) {
-      wfpg::detail::check_cuda(cub::DeviceRadixSort::SortPairs(storage, bytes, keys, sorted_keys, values,
-                                                               sorted_values, n, 0, bits, stream_),
-                               "cub::DeviceRadixSort::SortPairs");
+      wfpg::check_cuda(cub::DeviceRadixSort::SortPairs(storage, bytes, keys, sorted_keys, values,
+                                                       sorted_values, n, 0, bits, stream_),
+                       "cub::DeviceRadixSort::SortPairs");
     };
     if (n == 0) return;
     sort(nullptr);
@@ -262,14 +262,14 @@ class cuda {
   static constexpr unsigned threads = 128;
 
   void copy(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind) const {
-    if (bytes) wfpg::detail::check_cuda(cudaMemcpyAsync(to, from, bytes, kind, stream_), "cudaMemcpyAsync");
+    if (bytes) wfpg::check_cuda(cudaMemcpyAsync(to, from, bytes, kind, stream_), "cudaMemcpyAsync");
   }
 
   /// Of the current device.
   static std::size_t device_attribute(cudaDeviceAttr attribute) {
     int device = 0, value = 0;
-    wfpg::detail::check_cuda(cudaGetDevice(&device), "cudaGetDevice");
-    wfpg::detail::check_cuda(cudaDeviceGetAttribute(&value, attribute, device), "cudaDeviceGetAttribute");
+    wfpg::check_cuda(cudaGetDevice(&device), "cudaGetDevice");
+    wfpg::check_cuda(cudaDeviceGetAttribute(&value, attribute, device), "cudaDeviceGetAttribute");
     return static_cast<std::size_t>(value);
   }
 
@@ -291,12 +291,12 @@ class cuda {
   /// Asks for more shared memory than a kernel has without. Throws std::invalid_argument where the device has
   /// less.
   static void allow_shared_memory(const void* kernel, std::size_t bytes) {
-    using wfpg::detail::check_cuda;
+    using wfpg::check_cuda;
     cudaFuncAttributes attributes{};
     check_cuda(cudaFuncGetAttributes(&attributes, kernel), "cudaFuncGetAttributes");
     const std::size_t left =
         device_attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin) - attributes.sharedSizeBytes;
-    wfpg::detail::require(
+    wfpg::require(
         bytes <= left, "shared memory of a block, bytes,", bytes,
         ("at most " + std::to_string(left) + " on this device: lower the fields' resolution").c_str());
     check_cuda(
@@ -309,7 +309,7 @@ class cuda {
               std::size_t shared_bytes, const Arguments&... arguments) const {
     kernel<<<static_cast<unsigned>(blocks), threads_of_block, shared_bytes, stream_>>>(
         Parameters(arguments)...);
-    wfpg::detail::check_cuda(cudaGetLastError(), "kernel launch");
+    wfpg::check_cuda(cudaGetLastError(), "kernel launch");
   }
 
   cudaStream_t stream_;

@@ -1,8 +1,8 @@
 // The OpenMP policy. Compile with OpenMP enabled (target wfpg::omp).
 #pragma once
 
-#include <wfpg/detail/cpu_policy.hpp>
-#include <wfpg/detail/thrust.hpp>
+#include <wfpg/exec/cpu_policy.hpp>
+#include <wfpg/exec/support/thrust.hpp>
 
 #include <omp.h>
 #include <thrust/system/omp/execution_policy.h>
@@ -33,14 +33,13 @@ namespace wfpg::exec {
 
 /// The OpenMP policy with warps of W lanes. As many threads as OpenMP gives a parallel region.
 template <int W>
-class basic_omp : public wfpg::detail::cpu_policy<basic_omp<W>, W> {
+class basic_omp : public cpu_policy<basic_omp<W>, W> {
  public:
   /// What reports call it.
   static constexpr const char* name = "omp";
 
   /// Memory from `resource`, which must outlive what is allocated; null stands for the default resource.
-  explicit basic_omp(memory_resource* resource = nullptr)
-      : wfpg::detail::cpu_policy<basic_omp<W>, W>(resource) {}
+  explicit basic_omp(memory_resource* resource = nullptr) : cpu_policy<basic_omp<W>, W>(resource) {}
 
   /// Thrust's OpenMP policy, with temporaries from resource().
   auto thrust() const { return ::thrust::omp::par(wfpg::detail::omp_allocator<char>(this->resource())); }

@@ -26,8 +26,8 @@
 // `Exec::warps_per_block` that of the warps of a block.
 #pragma once
 
-#include <wfpg/detail/config.hpp>
-#include <wfpg/types.hpp>
+#include <wfpg/base/config.hpp>
+#include <wfpg/base/types.hpp>
 
 #include <cstddef>
 #include <cstdint>

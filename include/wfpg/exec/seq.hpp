@@ -1,8 +1,8 @@
 // The serial policy: one thread, in order. For debugging and as the reference of the others.
 #pragma once
 
-#include <wfpg/detail/cpu_policy.hpp>
-#include <wfpg/detail/thrust.hpp>
+#include <wfpg/exec/cpu_policy.hpp>
+#include <wfpg/exec/support/thrust.hpp>
 
 #include <thrust/system/cpp/execution_policy.h>
 
@@ -10,17 +10,16 @@ namespace wfpg::exec {
 
 /// The serial policy with warps of W lanes.
 template <int W>
-class basic_seq : public wfpg::detail::cpu_policy<basic_seq<W>, W> {
+class basic_seq : public cpu_policy<basic_seq<W>, W> {
  public:
   /// What reports call it.
   static constexpr const char* name = "seq";
 
   /// Memory from `resource`, which must outlive what is allocated; null stands for the default resource.
-  explicit basic_seq(memory_resource* resource = nullptr)
-      : wfpg::detail::cpu_policy<basic_seq<W>, W>(resource) {}
+  explicit basic_seq(memory_resource* resource = nullptr) : cpu_policy<basic_seq<W>, W>(resource) {}
 
   /// Thrust's serial policy, with temporaries from resource().
-  auto thrust() const { return ::thrust::cpp::par(wfpg::detail::resource_allocator<char>(this->resource())); }
+  auto thrust() const { return ::thrust::cpp::par(wfpg::resource_allocator<char>(this->resource())); }
 
   /// Threads of a loop.
   int concurrency() const { return 1; }

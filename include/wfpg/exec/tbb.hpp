@@ -1,8 +1,8 @@
 // The TBB policy. Link with TBB (target wfpg::tbb).
 #pragma once
 
-#include <wfpg/detail/cpu_policy.hpp>
-#include <wfpg/detail/thrust.hpp>
+#include <wfpg/exec/cpu_policy.hpp>
+#include <wfpg/exec/support/thrust.hpp>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -14,17 +14,16 @@ namespace wfpg::exec {
 /// The TBB policy with warps of W lanes. Runs in the calling thread's task arena, so that a host bounds the
 /// threads with tbb::task_arena or tbb::global_control.
 template <int W>
-class basic_tbb : public wfpg::detail::cpu_policy<basic_tbb<W>, W> {
+class basic_tbb : public cpu_policy<basic_tbb<W>, W> {
  public:
   /// What reports call it.
   static constexpr const char* name = "tbb";
 
   /// Memory from `resource`, which must outlive what is allocated; null stands for the default resource.
-  explicit basic_tbb(memory_resource* resource = nullptr)
-      : wfpg::detail::cpu_policy<basic_tbb<W>, W>(resource) {}
+  explicit basic_tbb(memory_resource* resource = nullptr) : cpu_policy<basic_tbb<W>, W>(resource) {}
 
   /// Thrust's TBB policy, with temporaries from resource().
-  auto thrust() const { return ::thrust::tbb::par(wfpg::detail::resource_allocator<char>(this->resource())); }
+  auto thrust() const { return ::thrust::tbb::par(wfpg::resource_allocator<char>(this->resource())); }
 
   /// Threads of a loop, at most.
   int concurrency() const { return ::tbb::this_task_arena::max_concurrency(); }
