@@ -1,6 +1,6 @@
 // One ray's product of a field and the renderer's BSDF on one core: its weights, a direction drawn from it,
 // and the density of another direction; P = 8 over F = 64. And what evaluating the BSDF takes of that.
-#include "materials.hpp"
+#include "materials/materials.hpp"
 
 #include <wfpg/exec/support/cpu_block.hpp>
 #include <wfpg/sampling/product_sampler.hpp>

@@ -1,11 +1,11 @@
 // What wfpg-inspect finds at a pixel: light that arrives, samplers and their densities, bins, voxels.
-#include "builtin_scenes.hpp"
 #include "findings.hpp"
 #include "octree_pictures.hpp"
-#include "rng.hpp"
+#include "scene/builtin_scenes.hpp"
 #include "support/catch.hpp"
 #include "support/inspections.hpp"
 #include "support/renderer_io.hpp"
+#include "tracer/rng.hpp"
 
 #include <wfpg/bins/spatial_binner.hpp>
 #include <wfpg/testing/statistics.hpp>

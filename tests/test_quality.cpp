@@ -1,12 +1,12 @@
 // The parts of wfpg-quality: statistics, pictures, its cache, references, progress, samples alone. Its
 // options are test_quality_options.cpp's, whole runs test_quality_program.cpp's.
-#include "builtin_scenes.hpp"
 #include "cache.hpp"
 #include "flip.hpp"
 #include "pictures.hpp"
 #include "progress.hpp"
 #include "reference.hpp"
 #include "runs.hpp"
+#include "scene/builtin_scenes.hpp"
 #include "settings.hpp"
 #include "single_samples.hpp"
 #include "statistic.hpp"

@@ -1,11 +1,11 @@
 // The path tracer without guiding: known answers, next-event estimation against none, the same picture on any
 // number of threads; and the lights that both methods share.
-#include "builtin_scenes.hpp"
-#include "embree_caster.hpp"
+#include "casters/embree_caster.hpp"
+#include "scene/builtin_scenes.hpp"
 #include "support/catch.hpp"
 #include "support/pictures.hpp"
-#include "unguided.hpp"
-#include "wavefront.hpp"
+#include "tracer/unguided.hpp"
+#include "tracer/wavefront.hpp"
 
 #include <wfpg/exec/omp.hpp>
 #include <wfpg/exec/seq.hpp>

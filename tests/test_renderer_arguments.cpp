@@ -1,7 +1,7 @@
 // What command lines share: a scene with its environment, and what is warned of.
-#include "builtin_scenes.hpp"
-#include "image_io.hpp"
-#include "render_arguments.hpp"
+#include "app/image_io.hpp"
+#include "app/render_arguments.hpp"
+#include "scene/builtin_scenes.hpp"
 #include "support/catch.hpp"
 #include "support/command_lines.hpp"
 #include "support/renderer_io.hpp"

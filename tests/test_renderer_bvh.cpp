@@ -1,6 +1,6 @@
 // The renderer's own hierarchy against all triangles one by one, in double precision; no leaks at edges and
 // corners; what cannot be hit; the same answers on every policy.
-#include "bvh_scene.hpp"
+#include "casters/bvh_scene.hpp"
 #include "support/policies.hpp"
 #include "support/random_meshes.hpp"
 

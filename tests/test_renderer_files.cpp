@@ -1,8 +1,8 @@
 // Files that the renderer's programs write: checked before any work, and replaced whole or not at all.
-#include "image_io.hpp"
-#include "output_files.hpp"
-#include "plot.hpp"
-#include "stats_json.hpp"
+#include "app/image_io.hpp"
+#include "app/output_files.hpp"
+#include "app/plot.hpp"
+#include "app/stats_json.hpp"
 #include "support/catch.hpp"
 #include "support/command_lines.hpp"
 #include "support/file_size_limit.hpp"

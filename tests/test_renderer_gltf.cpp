@@ -1,6 +1,6 @@
 // The glTF loader: what it reads, and that hostile files end in an error that names path and reason.
-#include "gltf_loader.hpp"
-#include "image_io.hpp"
+#include "app/image_io.hpp"
+#include "scene/gltf_loader.hpp"
 #include "support/catch.hpp"
 #include "support/renderer_io.hpp"
 #include "support/tiny_gltf.hpp"

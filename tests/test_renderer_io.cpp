@@ -1,8 +1,8 @@
 // The renderer's pictures, error measures and built-in scenes.
-#include "builtin_scenes.hpp"
-#include "image_io.hpp"
-#include "metrics.hpp"
-#include "plot.hpp"
+#include "app/image_io.hpp"
+#include "app/metrics.hpp"
+#include "app/plot.hpp"
+#include "scene/builtin_scenes.hpp"
 #include "support/catch.hpp"
 #include "support/renderer_io.hpp"
 

@@ -1,10 +1,10 @@
 // How lights are chosen: the alias table's probabilities, and what the lights of a scene are drawn with.
-#include "alias_table.hpp"
-#include "builtin_scenes.hpp"
-#include "lights.hpp"
-#include "render.hpp"
-#include "rng.hpp"
+#include "app/render.hpp"
+#include "lights/lights.hpp"
+#include "scene/alias_table.hpp"
+#include "scene/builtin_scenes.hpp"
 #include "support/catch.hpp"
+#include "tracer/rng.hpp"
 
 #include <wfpg/exec/seq.hpp>
 

@@ -1,7 +1,7 @@
 // The renderer's BSDFs: by the library's checks of what a host hands it, and against what is known of each.
-#include "materials.hpp"
-#include "rng.hpp"
+#include "materials/materials.hpp"
 #include "support/catch.hpp"
+#include "tracer/rng.hpp"
 
 #include <wfpg/exec/tbb.hpp>
 #include <wfpg/testing/check_bsdf.hpp>

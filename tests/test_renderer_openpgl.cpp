@@ -1,14 +1,14 @@
 // The renderer guided by Open PGL: pictures have the means of path tracing's, densities are those that
 // directions are drawn with, what is learnt is what arrives, and what cannot be is refused.
-#include "builtin_scenes.hpp"
-#include "device_scene.hpp"
-#include "embree_caster.hpp"
-#include "openpgl_guider.hpp"
+#include "casters/embree_caster.hpp"
+#include "scene/builtin_scenes.hpp"
+#include "scene/device_scene.hpp"
 #include "support/catch.hpp"
 #include "support/guided_depths.hpp"
 #include "support/renderings.hpp"
 #include "support/reports.hpp"
-#include "wavefront.hpp"
+#include "tracer/openpgl_guider.hpp"
+#include "tracer/wavefront.hpp"
 
 #include <wfpg/testing/check_bsdf.hpp>
 

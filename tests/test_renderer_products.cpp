@@ -1,11 +1,11 @@
 // Products of fields with the renderer's BSDFs: random pairs on every policy, width and resolution; what the
 // glossy-aware mixture leaves to a guide; where the rays of a thin wall's dark side go.
-#include "builtin_scenes.hpp"
-#include "embree_caster.hpp"
-#include "materials.hpp"
+#include "casters/embree_caster.hpp"
+#include "materials/materials.hpp"
+#include "scene/builtin_scenes.hpp"
 #include "support/products.hpp"
-#include "unguided.hpp"
-#include "wavefront.hpp"
+#include "tracer/unguided.hpp"
+#include "tracer/wavefront.hpp"
 
 #include <wfpg/path_guider.hpp>
 

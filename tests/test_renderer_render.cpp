@@ -1,7 +1,7 @@
 // render(): what it refuses, reports and keeps on the way, and guided pictures against path tracing's.
-#include "builtin_scenes.hpp"
-#include "device_scene.hpp"
-#include "render.hpp"
+#include "app/render.hpp"
+#include "scene/builtin_scenes.hpp"
+#include "scene/device_scene.hpp"
 #include "support/catch.hpp"
 #include "support/guided_depths.hpp"
 #include "support/pictures.hpp"

@@ -1,10 +1,10 @@
 // What rays find of a scene's surfaces: textures, holes in them, and normals on the viewer's side.
-#include "bvh_scene.hpp"
-#include "device_scene.hpp"
-#include "embree_caster.hpp"
+#include "casters/bvh_scene.hpp"
+#include "casters/embree_caster.hpp"
+#include "scene/device_scene.hpp"
+#include "scene/texel_pair.hpp"
 #include "support/catch.hpp"
 #include "support/pictures.hpp"
-#include "texel_pair.hpp"
 
 #include <wfpg/exec/seq.hpp>
 

@@ -1,6 +1,6 @@
 // What a renderer that was built without Open PGL says where it is asked for it.
-#include "builtin_scenes.hpp"
-#include "render.hpp"
+#include "app/render.hpp"
+#include "scene/builtin_scenes.hpp"
 #include "support/catch.hpp"
 
 #include <stdexcept>

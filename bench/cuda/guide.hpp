@@ -1,7 +1,7 @@
 // An octree and a cache of the room, with light in it, and a wave of surfaces.
 #pragma once
 
-#include "materials.hpp"
+#include "materials/materials.hpp"
 #include "room.hpp"
 
 #include <wfpg/host/wave.hpp>

@@ -1,7 +1,7 @@
 // Files of the cache.
 #include "cache.hpp"
 
-#include "output_files.hpp"
+#include "app/output_files.hpp"
 
 #include <ostream>
 #include <stdexcept>

@@ -1,7 +1,7 @@
 // Finished renderings in a directory: what an interrupted run has done is not done again.
 #pragma once
 
-#include "image_io.hpp"
+#include "app/image_io.hpp"
 #include "system.hpp"
 
 #include <exception>

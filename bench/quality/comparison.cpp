@@ -1,10 +1,10 @@
 // Plans and measures a scene.
 #include "comparison.hpp"
 
+#include "app/stats_json.hpp"
 #include "flip.hpp"
 #include "scene_files.hpp"
 #include "single_samples.hpp"
-#include "stats_json.hpp"
 #include "summary.hpp"
 #include "tiles.hpp"
 

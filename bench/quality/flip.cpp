@@ -1,7 +1,7 @@
 // The script flip.py, which the build embeds, and what it answers.
 #include "flip.hpp"
 
-#include "output_files.hpp"
+#include "app/output_files.hpp"
 #include "system.hpp"
 
 #include <unistd.h>

@@ -1,7 +1,7 @@
 // Crops and colours.
 #include "pictures.hpp"
 
-#include "colour_map.hpp"
+#include "app/colour_map.hpp"
 
 #include <wfpg/base/types.hpp>
 

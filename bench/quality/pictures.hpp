@@ -1,7 +1,7 @@
 // Pictures for people: exposures, crops, maps of errors.
 #pragma once
 
-#include "image_io.hpp"
+#include "app/image_io.hpp"
 #include "settings.hpp"
 
 #include <vector>

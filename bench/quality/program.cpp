@@ -1,10 +1,10 @@
 // From arguments to files.
 #include "program.hpp"
 
-#include "builtin_scenes.hpp"
+#include "app/output_files.hpp"
 #include "comparison.hpp"
 #include "markdown.hpp"
-#include "output_files.hpp"
+#include "scene/builtin_scenes.hpp"
 #include "summary.hpp"
 
 #include <CLI/CLI.hpp>

@@ -1,7 +1,7 @@
 // Keys of renderings, and their records as JSON.
 #include "runs.hpp"
 
-#include "stats_json.hpp"
+#include "app/stats_json.hpp"
 
 #include <limits>
 

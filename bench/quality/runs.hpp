@@ -1,8 +1,8 @@
 // Renderings, planned and done: each is looked up in the cache before it is rendered.
 #pragma once
 
+#include "app/metrics.hpp"
 #include "cache.hpp"
-#include "metrics.hpp"
 #include "scenes.hpp"
 #include "settings.hpp"
 

@@ -1,7 +1,7 @@
 // Pictures and plots of a scene in the output directory.
 #pragma once
 
-#include "plot.hpp"
+#include "app/plot.hpp"
 #include "reference.hpp"
 #include "single_samples.hpp"
 #include "summary.hpp"

@@ -1,10 +1,10 @@
 // Loading, and hashes of files.
 #include "scenes.hpp"
 
-#include "builtin_scenes.hpp"
-#include "gltf_json.hpp"
-#include "image_io.hpp"
-#include "render_arguments.hpp"
+#include "app/image_io.hpp"
+#include "app/render_arguments.hpp"
+#include "scene/builtin_scenes.hpp"
+#include "scene/gltf_json.hpp"
 #include "system.hpp"
 
 #include <ostream>

@@ -1,7 +1,7 @@
 // Scenes as they are measured: loaded, with their options complete, and told apart by their content.
 #pragma once
 
-#include "scene.hpp"
+#include "scene/scene.hpp"
 #include "settings.hpp"
 
 #include <iosfwd>

@@ -1,8 +1,8 @@
 // The command line and its presets.
 #include "settings.hpp"
 
-#include "number_options.hpp"
-#include "render_arguments.hpp"
+#include "app/number_options.hpp"
+#include "app/render_arguments.hpp"
 
 #include <CLI/CLI.hpp>
 

@@ -1,7 +1,7 @@
 // What is measured: scenes x methods x budgets x seeds, from the command line.
 #pragma once
 
-#include "render.hpp"
+#include "app/render.hpp"
 
 #include <filesystem>
 #include <optional>

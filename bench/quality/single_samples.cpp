@@ -1,7 +1,7 @@
 // Differences of pictures after each sample.
 #include "single_samples.hpp"
 
-#include "option_names.hpp"
+#include "app/option_names.hpp"
 #include "summary.hpp"
 
 #include <limits>

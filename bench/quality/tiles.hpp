@@ -1,7 +1,7 @@
 // Whether methods' pictures have one mean: tile by tile, over the seeds that all of them were rendered with.
 #pragma once
 
-#include "image_io.hpp"
+#include "app/image_io.hpp"
 
 #include <cstddef>
 #include <vector>

@@ -1,7 +1,7 @@
 // Scales of powers of ten and of whole numbers.
 #include "colour_scale.hpp"
 
-#include "colour_map.hpp"
+#include "app/colour_map.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // Which colour stands for which value, and the bar that says so.
 #pragma once
 
-#include "image_io.hpp"
+#include "app/image_io.hpp"
 
 #include <string>
 #include <vector>

@@ -1,7 +1,7 @@
 // Cells to directions and back.
 #include "directions.hpp"
 
-#include "frame.hpp"
+#include "scene/frame.hpp"
 
 #include <cmath>
 

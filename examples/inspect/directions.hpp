@@ -2,7 +2,7 @@
 // octahedral map is the cells as they are; latitude and longitude are the world's, as environments have them.
 #pragma once
 
-#include "image_io.hpp"
+#include "app/image_io.hpp"
 
 #include <wfpg/sampling/field_sampler.hpp>
 

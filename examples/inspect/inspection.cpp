@@ -1,13 +1,13 @@
 // Learns, measures, writes.
 #include "inspection.hpp"
 
+#include "app/option_names.hpp"
+#include "app/output_files.hpp"
+#include "app/progress_bar.hpp"
 #include "numbers.hpp"
 #include "octree_pictures.hpp"
 #include "octree_vdb.hpp"
-#include "option_names.hpp"
-#include "output_files.hpp"
 #include "page.hpp"
-#include "progress_bar.hpp"
 
 #include <wfpg/base/error.hpp>
 

@@ -2,8 +2,8 @@
 // (section 5.3).
 #pragma once
 
+#include "app/render.hpp"
 #include "findings.hpp"
-#include "render.hpp"
 
 #include <filesystem>
 #include <iosfwd>

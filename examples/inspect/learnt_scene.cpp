@@ -1,9 +1,9 @@
 // The renderer's parts, put together for one look at its guider.
 #include "learnt_scene.hpp"
 
-#include "embree_caster.hpp"
-#include "option_names.hpp"
-#include "render_impl.hpp"
+#include "app/option_names.hpp"
+#include "app/render_impl.hpp"
+#include "casters/embree_caster.hpp"
 
 #include <wfpg/bins/spatial_binner.hpp>
 #include <wfpg/exec/tbb.hpp>

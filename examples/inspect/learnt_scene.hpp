@@ -2,9 +2,9 @@
 // pixel's middle hits, its field, its bin. Light that arrives at such a point is traced by brute force.
 #pragma once
 
-#include "device_scene.hpp"
+#include "app/render.hpp"
 #include "directions.hpp"
-#include "render.hpp"
+#include "scene/device_scene.hpp"
 
 #include <wfpg/guides/octree/guide_view.hpp>
 #include <wfpg/octree/exitance_cache.hpp>

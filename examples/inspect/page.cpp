@@ -1,7 +1,7 @@
 // HTML by hand; pictures are in it as base64 (RFC 4648).
 #include "page.hpp"
 
-#include "output_files.hpp"
+#include "app/output_files.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // Mixtures with and without products behind one interface, and their statistics.
 #include "pixel_sampler.hpp"
 
-#include "rng.hpp"
+#include "tracer/rng.hpp"
 
 #include <wfpg/testing/sphere_statistics.hpp>
 

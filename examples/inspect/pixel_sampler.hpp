@@ -1,8 +1,8 @@
 // What draws a pixel's next directions: its field, or the product of that with its BSDF, and its BSDF.
 #pragma once
 
-#include "device_scene.hpp"
 #include "directions.hpp"
+#include "scene/device_scene.hpp"
 
 #include <wfpg/guides/octree/guide_view.hpp>
 

@@ -1,10 +1,10 @@
 // From arguments to an inspection.
 #include "program.hpp"
 
+#include "app/number_options.hpp"
+#include "app/output_files.hpp"
+#include "app/render_arguments.hpp"
 #include "inspection.hpp"
-#include "number_options.hpp"
-#include "output_files.hpp"
-#include "render_arguments.hpp"
 
 #include <CLI/CLI.hpp>
 

@@ -1,6 +1,6 @@
 // OptiX's caster against every triangle tried in double precision, and what it does with meshes and rays that
 // are not sound.
-#include "optix_caster.hpp"
+#include "casters/optix_caster.hpp"
 #include "support/random_meshes.hpp"
 
 #include <wfpg/host/ray_caster.hpp>

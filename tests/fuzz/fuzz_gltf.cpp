@@ -1,7 +1,7 @@
 // The glTF loader on any bytes: a scene that holds together, or an error with the path and a reason.
-#include "gltf_loader.hpp"
 #include "memory_file.hpp"
 #include "require.hpp"
+#include "scene/gltf_loader.hpp"
 
 #include <wfpg/base/math.hpp>
 

@@ -1,11 +1,11 @@
 // State files of renderings of any bytes: a rendering that goes on, and that can be interrupted once more
 // without a difference, or an error that names the file. Each input is read as it is, and with its checksums
 // put right, so that what is behind them is reached.
+#include "app/render.hpp"
 #include "checksums.hpp"
 #include "memory_file.hpp"
-#include "render.hpp"
 #include "require.hpp"
-#include "scene.hpp"
+#include "scene/scene.hpp"
 
 #include <wfpg/base/error.hpp>
 

@@ -1,8 +1,8 @@
 // Scenes with an environment map: one whose indirect light has little noise, so that little bias shows.
 #pragma once
 
-#include "builtin_scenes.hpp"
-#include "scene_builder.hpp"
+#include "scene/builtin_scenes.hpp"
+#include "scene/scene_builder.hpp"
 
 #include <cstddef>
 #include <string>

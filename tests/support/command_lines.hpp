@@ -1,7 +1,7 @@
 // Programs' command lines in tests.
 #pragma once
 
-#include "render_program.hpp"
+#include "app/render_program.hpp"
 
 #include <sstream>
 #include <string>

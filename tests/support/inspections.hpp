@@ -1,8 +1,8 @@
 // Small scenes and renderings to inspect.
 #pragma once
 
-#include "render.hpp"
-#include "scene.hpp"
+#include "app/render.hpp"
+#include "scene/scene.hpp"
 
 #include <numeric>
 #include <vector>

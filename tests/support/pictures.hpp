@@ -1,7 +1,7 @@
 // A scene of one square, and what is asked of pictures.
 #pragma once
 
-#include "scene.hpp"
+#include "scene/scene.hpp"
 
 #include <wfpg/base/types.hpp>
 

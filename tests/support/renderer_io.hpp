@@ -1,7 +1,7 @@
 // What the tests of the renderer's files and scenes share: a temporary folder and checks of a scene.
 #pragma once
 
-#include "scene.hpp"
+#include "scene/scene.hpp"
 #include "support/catch.hpp"
 #include "support/temporary_folder.hpp"
 

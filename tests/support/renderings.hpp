@@ -1,8 +1,8 @@
 // Small renderings of the built-in scenes, and the means of their tiles over independent seeds.
 #pragma once
 
-#include "option_names.hpp"
-#include "render.hpp"
+#include "app/option_names.hpp"
+#include "app/render.hpp"
 #include "support/bright_room.hpp"
 #include "support/catch.hpp"
 #include "support/statistics.hpp"

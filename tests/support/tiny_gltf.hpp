@@ -1,7 +1,7 @@
 // A .gltf or .glb of one triangle whose parts a test replaces, good or hostile.
 #pragma once
 
-#include "gltf_loader.hpp"
+#include "scene/gltf_loader.hpp"
 #include "support/catch.hpp"
 #include "support/renderer_io.hpp"
 

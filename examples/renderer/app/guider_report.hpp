@@ -1,0 +1,88 @@
+// What a guider says of itself, put into a render_report.
+#pragma once
+
+#include "app/render.hpp"
+
+#include <wfpg/guides/records/irradiance_records.hpp>
+#include <wfpg/path_guider.hpp>
+
+#include <algorithm>
+#include <string>
+
+namespace render {
+
+/// What a guider says whatever its guide: memory, and time by stage.
+template <class Exec, class Guide>
+void report_any_guider(const wfpg::path_guider<Exec, Guide>& guider, render_report& report) {
+  const wfpg::memory_report memory = guider.memory();
+  report.persistent_bytes = report.used_bytes = memory.persistent();
+  report.transient_bytes = memory.transient();
+  for (const wfpg::memory_part& part : memory.parts) report.memory.emplace_back(part.name, part.bytes);
+  for (const auto& [stage, seconds] : guider.statistics().seconds)
+    report.seconds.emplace_back("guide " + std::string(stage), seconds);
+}
+
+/// Of records: the last build's.
+template <class Exec, class Smooth>
+void report_records(const wfpg::path_guider<Exec, wfpg::irradiance_records<Exec, Smooth>>& guider,
+                    std::uint64_t segments, render_report& report) {
+  report_any_guider(guider, report);
+  const wfpg::irradiance_records_statistics& found = guider.guide().statistics();
+  report.records = {found.builds,  found.seconds, found.rays,   found.cones,
+                    found.records, found.objects, found.lights, found.directly_lit};
+  if (segments > 0)
+    report.cones_per_segment = static_cast<double>(found.cones) / static_cast<double>(segments);
+}
+
+/// What a guider has counted since it said `before`.
+inline void subtract(wfpg::guider_statistics& counted, const wfpg::guider_statistics& before) {
+  counted.guided_samples -= before.guided_samples;
+  for (std::size_t depth = 0; depth < before.depths.size(); ++depth) {
+    counted.depths[depth].bins -= before.depths[depth].bins;
+    counted.depths[depth].rays -= before.depths[depth].rays;
+    counted.depths[depth].cones -= before.depths[depth].cones;
+  }
+  counted.kept.born -= before.kept.born;
+  counted.kept.freed -= before.kept.freed;
+  counted.kept.refreshed -= before.kept.refreshed;
+}
+
+/// The octree's. `segments`: rays that paths were extended by in all samples, since the guider said `before`.
+template <class Exec>
+void report_guider(const wfpg::path_guider<Exec>& guider, std::uint64_t segments, render_report& report,
+                   const wfpg::guider_statistics& before = {}) {
+  report_any_guider(guider, report);
+  const wfpg::memory_report memory = guider.memory();
+
+  const wfpg::sparse_voxel_octree<Exec>& octree = guider.octree();
+  report.octree.resolution = octree.resolution();
+  report.octree.nodes = octree.node_count();
+  report.octree.leaves = octree.leaf_count();
+  double node_bytes = 0.0;
+  for (const wfpg::memory_part& part : memory.parts)
+    if (part.name == std::string("octree") || part.name == std::string("cache"))
+      node_bytes += static_cast<double>(part.bytes);
+  if (octree.node_count() > 0)
+    report.octree.bytes_per_node = node_bytes / static_cast<double>(octree.node_count());
+
+  wfpg::guider_statistics statistics = guider.statistics();
+  subtract(statistics, before);
+  const double samples = std::max(1.0, static_cast<double>(statistics.guided_samples));
+  double cones = 0.0;
+  for (const wfpg::depth_statistics& depth : statistics.depths) {
+    cones += static_cast<double>(depth.cones);
+    const double bins = static_cast<double>(depth.bins);
+    report.bins.push_back({bins / samples, bins > 0.0 ? static_cast<double>(depth.rays) / bins : 0.0});
+  }
+  const wfpg::kept_field_statistics& kept = statistics.kept;
+  report.slots.capacity = kept.capacity;
+  report.slots.live = kept.live;
+  report.slots.live_bytes = kept.live * kept.bytes_a_slot;
+  report.used_bytes = report.persistent_bytes - (kept.capacity - kept.live) * kept.bytes_a_slot;
+  report.slots.born = static_cast<double>(kept.born) / samples;
+  report.slots.freed = static_cast<double>(kept.freed) / samples;
+  report.slots.refreshed = static_cast<double>(kept.refreshed) / samples;
+  if (segments > 0) report.cones_per_segment = cones / static_cast<double>(segments);
+}
+
+}  // namespace render

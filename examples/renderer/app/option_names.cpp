@@ -1,0 +1,58 @@
+#include "app/option_names.hpp"
+
+namespace render {
+
+const std::map<std::string, sampling_method>& method_names() {
+  static const std::map<std::string, sampling_method> names = {
+      {"pt", sampling_method::pt},
+      {"wfpg", sampling_method::wfpg},
+      {"wfpg-product", sampling_method::wfpg_product},
+      {"sarsa", sampling_method::sarsa},
+      {"records", sampling_method::records},
+      {"openpgl-vmm", sampling_method::openpgl_vmm},
+      {"openpgl-dqt", sampling_method::openpgl_dqt}};
+  return names;
+}
+
+const std::map<std::string, device>& device_names() {
+  static const std::map<std::string, device> names = {{"cpu", device::cpu},
+                                                      {"omp", device::omp},
+                                                      {"seq", device::seq},
+                                                      {"cuda", device::cuda},
+                                                      {"optix", device::optix}};
+  return names;
+}
+
+const std::map<std::string, wfpg::sample_combination>& combination_names() {
+  using combine = wfpg::sample_combination;
+  static const std::map<std::string, combine> names = {
+      {"pt-linear", combine::pt_linear},        {"pt-first", combine::pt_first},
+      {"constant", combine::constant},          {"linear", combine::linear},
+      {"quadratic", combine::quadratic},        {"one-two", combine::one_two},
+      {"discard-first", combine::discard_first}};
+  return names;
+}
+
+const std::map<std::string, cones>& cones_names() {
+  static const std::map<std::string, cones> names = {
+      {"scene", cones::scene}, {"march", cones::march}, {"trace", cones::trace}};
+  return names;
+}
+
+const std::map<std::string, wfpg::sarsa_update>& sarsa_update_names() {
+  using update = wfpg::sarsa_update;
+  static const std::map<std::string, update> names = {
+      {"sarsa", update::sarsa}, {"expected", update::expected_sarsa}, {"monte-carlo", update::monte_carlo}};
+  return names;
+}
+
+const std::map<std::string, wfpg::sarsa_sampler>& sarsa_sampler_names() {
+  using sampler = wfpg::sarsa_sampler;
+  static const std::map<std::string, sampler> names = {{"sphere", sampler::sphere_inversion},
+                                                       {"hemisphere", sampler::hemisphere_inversion},
+                                                       {"rejection", sampler::rejection},
+                                                       {"mixed", sampler::mixed_rejection}};
+  return names;
+}
+
+}  // namespace render

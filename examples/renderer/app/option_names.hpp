@@ -1,0 +1,27 @@
+// What options are called, on command lines and in reports.
+#pragma once
+
+#include "app/render.hpp"
+
+#include <map>
+#include <string>
+
+namespace render {
+
+/// The choices of --method, --device, --combine, --cones, --sarsa-update and --sarsa-sampler.
+const std::map<std::string, sampling_method>& method_names();
+const std::map<std::string, device>& device_names();
+const std::map<std::string, wfpg::sample_combination>& combination_names();
+const std::map<std::string, cones>& cones_names();
+const std::map<std::string, wfpg::sarsa_update>& sarsa_update_names();
+const std::map<std::string, wfpg::sarsa_sampler>& sarsa_sampler_names();
+
+/// What a value is called there. Precondition: it has a name.
+template <class T>
+const std::string& name_of(const std::map<std::string, T>& names, T value) {
+  auto named = names.begin();
+  while (named->second != value) ++named;
+  return named->first;
+}
+
+}  // namespace render

@@ -1,0 +1,97 @@
+// Options made complete and checked; the choice of the device.
+#include "app/render.hpp"
+
+#include "app/option_names.hpp"
+#include "casters/embree_caster.hpp"
+
+#include <wfpg/base/error.hpp>
+#include <wfpg/exec/omp.hpp>
+#include <wfpg/exec/seq.hpp>
+#include <wfpg/exec/tbb.hpp>
+
+namespace render {
+
+extern template render_result render_on<embree_scene>(const wfpg::exec::seq&, const scene&,
+                                                      const render_options&, const progress_callback&);
+extern template render_result render_on<embree_scene>(const wfpg::exec::omp&, const scene&,
+                                                      const render_options&, const progress_callback&);
+extern template render_result render_on<embree_scene>(const wfpg::exec::tbb&, const scene&,
+                                                      const render_options&, const progress_callback&);
+
+namespace {
+
+/// State on disk is of what can be saved.
+void require_guided_files(const render_options& options) {
+  using wfpg::require;
+  const std::string& method = name_of(method_names(), options.method);
+  require(is_wfpg(options.method) || (options.load_guide.empty() && !options.keep_guide), "method", method,
+          "wfpg or wfpg-product where a guide is loaded or saved");
+  require(can_be_saved(options.method) || (options.resume.empty() && !options.keep_state), "method", method,
+          "pt, wfpg or wfpg-product where a rendering's state is resumed or saved");
+  require(options.resume.empty() || options.load_guide.empty(), "load_guide", options.load_guide,
+          "none where a rendering goes on, which has its own");
+}
+
+}  // namespace
+
+render_options completed(const scene& scene, render_options options) {
+  using wfpg::require;
+  if (options.width == 0 && options.height == 0) {
+    options.width = scene.width;
+    options.height = scene.height;
+  }
+  if (options.max_depth == 0) options.max_depth = scene.max_depth;
+  require(options.width > 0 && options.width <= largest_side, "width", options.width, "1 to 32768");
+  require(options.height > 0 && options.height <= largest_side, "height", options.height, "1 to 32768");
+  require(std::int64_t(options.width) * options.height <= most_pixels, "width times height",
+          std::int64_t(options.width) * options.height, "at most 2^28");
+  require(options.max_depth > 0 && options.max_depth <= largest_depth, "max_depth", options.max_depth,
+          "1 to 1024");
+  require(options.roulette_depth >= 1 && options.roulette_depth <= 1 << 30, "roulette_depth",
+          options.roulette_depth, "1 to 2^30");
+  require(options.method != sampling_method::wfpg_product || options.product_resolution > 0,
+          "product_resolution", options.product_resolution, "4, 8 or 16 for wfpg-product");
+  require(!is_openpgl(options.method) || options.where == device::cpu, "device",
+          name_of(device_names(), options.where), "cpu for Open PGL's methods, which run on TBB");
+  require(options.guide_fraction >= 0.0f && options.guide_fraction <= 1.0f, "guide_fraction",
+          options.guide_fraction, "0 to 1");
+  require(options.samples_per_leaf >= 8 && options.samples_per_leaf <= 1u << 30, "samples_per_leaf",
+          options.samples_per_leaf, "8 to 2^30");
+  require(options.seconds >= 0.0, "seconds", options.seconds, "0 or more");
+  const int least = combination_of(options) == wfpg::sample_combination::discard_first ? 2 : 1;
+  require(options.seconds > 0.0 || options.spp >= least, "spp", options.spp,
+          least == 2 ? "at least 2, as the first sample is discarded" : "at least 1");
+  require_guided_files(options);
+  return options;
+}
+
+namespace {
+
+render_result render_completed(const scene& scene, const render_options& options,
+                               const progress_callback& progress) {
+  if (is_openpgl(options.method)) return render_with_openpgl(scene, options, progress);
+  switch (options.where) {
+    case device::omp:
+      return render_on<embree_scene>(wfpg::exec::omp(), scene, options, progress);
+    case device::seq:
+      return render_on<embree_scene>(wfpg::exec::seq(), scene, options, progress);
+    case device::cuda:
+      return render_on_cuda(scene, options, progress);
+    case device::optix:
+      return render_on_optix(scene, options, progress);
+    default:
+      return render_on<embree_scene>(wfpg::exec::tbb(), scene, options, progress);
+  }
+}
+
+}  // namespace
+
+render_result render(const scene& scene, const render_options& options, const progress_callback& progress) {
+  render_result result = render_completed(scene, completed(scene, options), progress);
+  result.report.scene = scene.name;
+  result.report.method = name_of(method_names(), options.method);
+  result.report.device = name_of(device_names(), options.where);
+  return result;
+}
+
+}  // namespace render

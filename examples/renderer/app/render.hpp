@@ -1,0 +1,213 @@
+// Renders a scene with chosen options on a chosen device, and says what it cost.
+#pragma once
+
+#include "app/image_io.hpp"
+#include "tracer/stage_clock.hpp"
+
+#include <wfpg/guides/records/options.hpp>
+#include <wfpg/guides/sarsa/options.hpp>
+#include <wfpg/sampling/sample_combiner.hpp>
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace render {
+
+/// Path tracing; guided by wfpg's fields, or by their products with BSDFs; by its SARSA grid; by its
+/// irradiance records; by Open PGL's mixtures of von Mises-Fisher lobes, which know of parallax, or by its
+/// quadtrees of directions.
+enum class sampling_method { pt, wfpg, wfpg_product, sarsa, records, openpgl_vmm, openpgl_dqt };
+enum class guiding { oriented, plain };
+enum class fields { kept, transient };
+/// How fields' cones find light: by the scene's ray caster, or through the octree alone, by rays or as cones.
+enum class cones { scene, march, trace };
+enum class checkpoint_times {
+  none,
+  powers_of_two,
+  all
+};                                                 ///< after samples 1, 2, 4, 8, ... and the last; all
+enum class device { cpu, omp, seq, cuda, optix };  ///< TBB, OpenMP, one thread, a GPU, and with OptiX
+
+inline constexpr int largest_side = 32768;  ///< pixels
+inline constexpr std::int64_t most_pixels = std::int64_t(1) << 28;
+inline constexpr int largest_depth = 1024;  ///< segments of a path
+
+struct render_options {
+  sampling_method method = sampling_method::wfpg;
+  guiding mode = guiding::oriented;
+  fields lifetime = fields::kept;
+  cones through = cones::scene;
+  device where = device::cpu;
+  int spp = 64;          ///< samples a pixel, positive; not used where `seconds` is
+  double seconds = 0.0;  ///< time for samples, building not counted; the last may use more; 0: spp decides
+  int width = 0;  ///< pixels, both positive, at most `largest_side`, and `most_pixels` together; 0 x 0: the
+                  ///< scene's own
+  int height = 0;
+  int max_depth = 0;       ///< segments of a path, positive; 0: the scene's own
+  int roulette_depth = 3;  ///< Russian roulette ends no path before this vertex, from 0; 1 to 2^30
+  bool nee = true;         ///< next-event estimation toward area lights, with MIS
+  std::uint64_t seed = 0;
+  std::uint32_t octree_resolution = 128;             ///< voxels a side, a power of two
+  std::uint32_t field_resolution = 32;               ///< cells a side of transient fields at the first vertex
+  std::uint32_t slot_resolution = 24;                ///< cells a side of kept fields
+  std::uint32_t recast = 32;                         ///< a refresh casts one cone in so many again
+  bool learn = true;                                 ///< kept fields learn from paths
+  std::size_t field_budget = std::size_t(24) << 20;  ///< bytes of kept fields
+  std::size_t caster_buffer = std::size_t(16) << 20;  ///< bytes of cones in flight to OptiX
+  std::uint32_t product_resolution = 8;               ///< blocks a side of products, 4, 8 or 16
+  std::uint32_t rays_per_bin = 64;                    ///< c_ray
+  std::uint32_t min_bin_level = 3;                    ///< l_min, from the root
+  std::uint32_t deposits_per_leaf = 16;               ///< of a sample that is recorded; 0: all
+  float guide_fraction = 0.0f;                        ///< in [0, 1]; 0: the mode's own, 0.5 of Open PGL's
+  /// Of a path, from its first vertex on, at least 1; with next-event estimation never the last of several.
+  std::uint32_t guided_depths = 0xffffffffu;
+  std::uint32_t light_groups = 32;           ///< that guided paths learn to choose lights from, in [1, 255]
+  std::uint32_t samples_per_leaf = 32000;    ///< after which Open PGL's field splits a leaf, 8 to 2^30
+  wfpg::sarsa_grid_options sarsa;            ///< its own; what every guide is told follows from the others
+  wfpg::irradiance_records_options records;  ///< likewise
+  checkpoint_times checkpoints = checkpoint_times::none;  ///< when to keep the picture so far
+  /// Unset: pt_linear, and all alike for path tracing, records, and with a guide that was loaded.
+  std::optional<wfpg::sample_combination> combine;
+  std::string load_guide;            ///< guide file, of the same scene, to begin with; empty: none
+  std::string resume;                ///< state file of the rendering to go on with; empty: none
+  bool keep_guide = false;           ///< the result has the guide
+  bool keep_state = false;           ///< the result has what `resume` takes
+  std::function<bool()> is_stopped;  ///< asked after each sample: true ends the rendering; may be empty
+};
+
+/// Bins of one depth, means over the samples that were guided; of kept fields, those made or refreshed.
+struct bin_report {
+  double count = 0.0;
+  double mean_rays = 0.0;
+};
+
+/// Kept fields.
+struct slot_report {
+  std::uint32_t capacity = 0;  ///< that the budget holds; 0: fields are transient
+  std::uint32_t live = 0;      ///< at the end
+  std::size_t live_bytes = 0;
+  double born = 0.0;       ///< a guided sample
+  double freed = 0.0;      ///< a guided sample
+  double refreshed = 0.0;  ///< a guided sample
+};
+
+struct octree_report {
+  std::uint32_t resolution = 0;
+  std::size_t nodes = 0;
+  std::size_t leaves = 0;
+  double bytes_per_node = 0.0;  ///< of octree and cache
+  double build_seconds = 0.0;
+};
+
+/// Irradiance records, as of their last build.
+struct records_report {
+  std::uint32_t builds = 0;  ///< 0: there are none
+  double build_seconds = 0.0;
+  std::uint64_t rays = 0;
+  std::uint64_t cones = 0;
+  std::uint32_t records = 0;
+  std::uint32_t objects = 0, lights = 0, directly_lit = 0;  ///< voxels by their tag
+};
+
+struct render_report {
+  std::string scene, method, device;
+  int spp = 0;                 ///< rendered, before a rendering went on too; times are since then
+  std::uint64_t segments = 0;  ///< rays that paths were extended by
+  /// Of them, those that hit a surface that emits toward them or left for an environment that does, the
+  /// camera's among them; over the number of paths.
+  double light_hits_per_path = 0.0;
+  double total_seconds = 0.0;  ///< from building to the last sample
+  named_seconds seconds;       ///< by stage; "guide ..." are parts of "directions" and of "update"
+  std::vector<std::pair<std::string, std::size_t>> memory;  ///< the guider's bytes, by part
+  std::size_t persistent_bytes = 0;                         ///< allocated
+  std::size_t used_bytes = 0;                               ///< of them, without slots that hold no field
+  std::size_t transient_bytes = 0;
+  octree_report octree;
+  std::vector<bin_report> bins;  ///< by depth
+  slot_report slots;
+  records_report records;
+  std::size_t regions = 0;  ///< of Open PGL's field
+  double cones_per_segment = 0.0;
+};
+
+/// How the samples of these options are combined.
+inline wfpg::sample_combination combination_of(const render_options& options) {
+  using wfpg::sample_combination;
+  const bool learns = options.method != sampling_method::pt && options.method != sampling_method::records;
+  const bool settled = !learns || !options.load_guide.empty();
+  return options.combine.value_or(settled ? sample_combination::constant : sample_combination::pt_linear);
+}
+
+/// A picture on the way.
+struct checkpoint {
+  int samples = 0;
+  double seconds = 0.0;  ///< of samples so far; what keeping pictures takes is left out
+  image picture;
+};
+
+struct render_result {
+  image picture;
+  std::vector<checkpoint> checkpoints;  ///< where options ask for them
+  render_report report;
+  bool is_stopped = false;  ///< before its budget was spent
+  std::string guide;        ///< a guide file's bytes, where options ask for them
+  std::string state;        ///< a state file's bytes, where options ask for them
+};
+
+/// Where a rendering is; given after every sample.
+struct render_progress {
+  int samples = 0;        ///< done
+  double fraction = 0.0;  ///< of the budget, in [0, 1]
+  double seconds = 0.0;   ///< since rendering began
+  double begun = 0.0;     ///< fraction that a rendering which goes on had before
+};
+using progress_callback = std::function<void(const render_progress&)>;
+
+/// Options with the scene's own size and depth where they name none. Throws std::invalid_argument for options
+/// that cannot be right; the message names what.
+render_options completed(const scene& scene, render_options options);
+
+/// Renders on options.where. Throws std::invalid_argument for options or scenes that cannot be right; the
+/// message names what; std::runtime_error where the device cannot be used; wfpg::file_error where a file to
+/// begin with is not one, or not this rendering's. `progress` may be empty.
+render_result render(const scene& scene, const render_options& options, const progress_callback& progress);
+
+/// The same on a policy, whatever options.where says, with the ray caster of an Accelerated, which is made
+/// from the policy, the scene and its arrays there; instantiated in render_seq.cpp, render_omp.cpp and
+/// render_tbb.cpp.
+template <class Accelerated, class Exec>
+render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
+                        const progress_callback& progress);
+
+/// The same on a GPU, with rays cast by the renderer's own hierarchy or by OptiX. Throws std::runtime_error
+/// where there is none, or where this was built without.
+render_result render_on_cuda(const scene& scene, const render_options& options,
+                             const progress_callback& progress);
+render_result render_on_optix(const scene& scene, const render_options& options,
+                              const progress_callback& progress);
+
+/// The same on exec::tbb, guided by Open PGL. Throws std::runtime_error where this was built without.
+render_result render_with_openpgl(const scene& scene, const render_options& options,
+                                  const progress_callback& progress);
+
+/// False where this was built without Open PGL.
+bool has_openpgl();
+
+inline bool is_wfpg(sampling_method method) {
+  return method == sampling_method::wfpg || method == sampling_method::wfpg_product;
+}
+
+/// What a rendering needs to go on later can be saved.
+inline bool can_be_saved(sampling_method method) {
+  return method == sampling_method::pt || is_wfpg(method);
+}
+
+inline bool is_openpgl(sampling_method method) {
+  return method == sampling_method::openpgl_vmm || method == sampling_method::openpgl_dqt;
+}
+
+}  // namespace render

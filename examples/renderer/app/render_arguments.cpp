@@ -1,0 +1,295 @@
+// Options of the command line, by CLI11.
+#include "app/render_arguments.hpp"
+
+#include "app/image_io.hpp"
+#include "app/number_options.hpp"
+#include "app/option_names.hpp"
+#include "scene/builtin_scenes.hpp"
+#include "scene/gltf_loader.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include <cstdint>
+#include <cstdio>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+namespace render {
+namespace {
+
+// The library's limits.
+constexpr std::uint64_t largest_octree = 4096, largest_level = 12;
+constexpr std::uint64_t largest_count = std::numeric_limits<std::uint32_t>::max();
+constexpr double longest_seconds = 1.0e9;
+
+// CLI11's own checked transformer accepts the numbers behind the names too; names are all that is documented.
+template <class T, class Value>
+CLI::Option* add_choice(CLI::App& app, const std::string& name, Value& value,
+                        const std::map<std::string, T>& choices, const std::string& help) {
+  std::vector<std::string> names;
+  for (const auto& choice : choices) names.push_back(choice.first);
+  return app
+      .add_option_function<std::string>(
+          name, [&value, choices](const std::string& chosen) { value = choices.at(chosen); }, help)
+      ->check(CLI::IsMember(names))
+      ->type_name("NAME");
+}
+
+void parse_size(const std::string& text, render_options& options) {
+  char end = 0;
+  const bool is_size = std::sscanf(text.c_str(), "%9dx%9d%c", &options.width, &options.height, &end) == 2 &&
+                       text.find_first_not_of("0123456789x") == std::string::npos;
+  const auto fits = [](int side) { return side >= 1 && side <= largest_side; };
+  if (!is_size || !fits(options.width) || !fits(options.height) ||
+      std::int64_t(options.width) * options.height > most_pixels)
+    throw CLI::ValidationError("--size", "expected WIDTHxHEIGHT, such as 640x360, each from 1 to " +
+                                             std::to_string(largest_side) + " and 2^28 pixels at most, not " +
+                                             text);
+}
+
+void add_sarsa_options(CLI::App& app, wfpg::sarsa_grid_options& options) {
+  add_choice<wfpg::sarsa_update>(app, "--sarsa-update", options.update, sarsa_update_names(),
+                                 "what directions are taught: SARSA's targets (default), those of all "
+                                 "directions, or what paths gather");
+  add_choice<wfpg::sarsa_sampler>(app, "--sarsa-sampler", options.sampler, sarsa_sampler_names(),
+                                  "inversion over the sphere or hemisphere, rejection, or that mixed with "
+                                  "uniform directions (default)");
+  app.add_option("--sarsa-resolution", options.resolution, "cells along each side of the scene (default: 8)")
+      ->transform(whole_number(1, 64));
+  app.add_option("--sarsa-directions", options.direction_resolution,
+                 "directions along the side of a cell's square, even (default: 16)")
+      ->transform(whole_number(2, 64));
+  app.add_option("--sarsa-step", options.step, "samples after which what was learnt is used (default: 8)")
+      ->transform(whole_number(1, largest_count));
+  app.add_option("--sarsa-learning-rate", options.learning_rate,
+                 "what a new value counts for; 0: as each before (default: 0.05)")
+      ->transform(number(0.0, 1.0));
+}
+
+void add_records_options(CLI::App& app, wfpg::irradiance_records_options& options) {
+  app.add_option("--records-octree", options.octree_resolution,
+                 "voxels a side that records look at (default: 64)")
+      ->transform(power_of_two(1, largest_octree));
+  app.add_option("--records-level", options.record_level, "octree level of records (default: 4, 16 a side)")
+      ->transform(whole_number(0, largest_level));
+  app.add_option("--records-rays", options.emitter_rays,
+                 "rays from emitters, which find what is lit directly (default: 262144)")
+      ->transform(whole_number(1, std::uint64_t(1) << 31));
+  app.add_option("--records-cones", options.cones_per_direction, "of each direction (default: 4)")
+      ->transform(whole_number(1, 256));
+  app.add_option("--records-albedo", options.albedo, "of what emitters light (default: 0.5)")
+      ->transform(number(0.0, 1.0));
+}
+
+/// Options that have an effect only where others are chosen so.
+struct requirement {
+  std::vector<const char*> options;
+  const char* what;
+  bool (*holds)(const render_options&);
+};
+
+const std::vector<requirement>& requirements() {
+  using options = const render_options&;
+  static const std::vector<requirement> all = {
+      {{"--guiding", "--fields", "--octree-resolution", "--field-resolution", "--slot-resolution", "--recast",
+        "--learn", "--light-groups", "--field-budget", "--rays-per-bin", "--min-bin-level",
+        "--deposits-per-leaf", "--cones", "--caster-buffer", "--load-guide", "--save-guide"},
+       "--method wfpg or wfpg-product",
+       [](options o) { return is_wfpg(o.method); }},
+      {{"--field-resolution"},
+       "--fields transient",
+       [](options o) { return o.lifetime == fields::transient; }},
+      {{"--slot-resolution", "--recast", "--learn", "--field-budget"},
+       "--fields kept",
+       [](options o) { return o.lifetime == fields::kept; }},
+      {{"--product-resolution"},
+       "--method wfpg-product",
+       [](options o) { return o.method == sampling_method::wfpg_product; }},
+      {{"--samples-per-leaf"},
+       "--method openpgl-vmm or openpgl-dqt",
+       [](options o) { return is_openpgl(o.method); }},
+      {{"--caster-buffer"}, "--device optix", [](options o) { return o.where == device::optix; }},
+      {{"--caster-buffer"}, "--cones scene", [](options o) { return o.through == cones::scene; }},
+      {{"--guide-fraction"},
+       "a --method other than pt",
+       [](options o) { return o.method != sampling_method::pt; }},
+      {{"--guided-depths"},
+       "--method wfpg, wfpg-product, sarsa or records",
+       [](options o) { return o.method != sampling_method::pt && !is_openpgl(o.method); }},
+      {{"--save-state", "--resume"},
+       "--method pt, wfpg or wfpg-product",
+       [](options o) { return can_be_saved(o.method); }},
+      {{"--sarsa-update", "--sarsa-sampler", "--sarsa-resolution", "--sarsa-directions", "--sarsa-step",
+        "--sarsa-learning-rate"},
+       "--method sarsa",
+       [](options o) { return o.method == sampling_method::sarsa; }},
+      {{"--records-octree", "--records-level", "--records-rays", "--records-cones", "--records-albedo"},
+       "--method records",
+       [](options o) { return o.method == sampling_method::records; }}};
+  return all;
+}
+
+}  // namespace
+
+void report_in_one_line(CLI::App& app, const std::string& program) {
+  app.failure_message([program](const CLI::App*, const CLI::Error& error) {
+    return program + ": " + error.what() + "; --help lists the options\n";
+  });
+}
+
+void add_scene_options(CLI::App& app, scene_arguments& given) {
+  app.add_option("SCENE", given.name, "a .glb or .gltf file, or one of: " + listed_builtin_scenes())
+      ->required();
+  app.add_option("--environment", given.environment,
+                 "light from all directions, OpenEXR or .hdr, equirectangular (default: the scene's)")
+      ->transform(file_path());
+}
+
+void add_method_options(CLI::App& app, render_options& options) {
+  add_choice<sampling_method>(app, "--method", options.method, method_names(),
+                              "path tracing; guided by fields (default), or by their products with BSDFs; by "
+                              "a grid that learns by SARSA; by irradiance records that are made before the "
+                              "first path; by Open PGL's mixtures of lobes or quadtrees");
+  add_choice<guiding>(app, "--guiding", options.mode,
+                      {{"oriented", guiding::oriented}, {"plain", guiding::plain}},
+                      "bins by position and normal (default), or by position alone");
+  add_choice<fields>(app, "--fields", options.lifetime,
+                     {{"kept", fields::kept}, {"transient", fields::transient}},
+                     "kept across depths and samples (default), or made anew each time");
+  add_choice<cones>(app, "--cones", options.through, cones_names(),
+                    "cones of fields find light by rays through the scene (default), by rays through the "
+                    "octree, or as cones through it");
+  add_choice<wfpg::sample_combination>(
+      app, "--combine", options.combine, combination_names(),
+      "how samples add up (default: pt-linear; constant for pt, for records and with "
+      "--load-guide)");
+}
+
+void add_device_option(CLI::App& app, render_options& options) {
+  add_choice<device>(app, "--device", options.where, device_names(),
+                     "TBB (default), OpenMP, one thread, or a GPU");
+}
+
+void add_nee_option(CLI::App& app, render_options& options) {
+  add_choice<bool>(app, "--nee", options.nee, {{"on", true}, {"off", false}},
+                   "next-event estimation toward area lights (default: on)");
+}
+
+void add_budget_options(CLI::App& app, render_options& options) {
+  CLI::Option* const spp = app.add_option("--spp", options.spp, "samples a pixel (default: 64)")
+                               ->transform(whole_number(1, 1 << 30));
+  app.add_option("--seconds", options.seconds, "render for so long instead")
+      ->transform(positive_number(longest_seconds))
+      ->excludes(spp);
+  app.add_option("--seed", options.seed, "of the random numbers (default: 0)")
+      ->transform(whole_number(0, std::numeric_limits<std::uint64_t>::max()));
+}
+
+void add_picture_options(CLI::App& app, render_options& options) {
+  app.add_option_function<std::string>(
+      "--size", [&options](const std::string& text) { parse_size(text, options); },
+      "picture, WIDTHxHEIGHT (default: the scene's)");
+  app.add_option("--max-depth", options.max_depth, "segments of a path (default: the scene's)")
+      ->transform(whole_number(1, largest_depth));
+  app.add_option("--roulette-depth", options.roulette_depth,
+                 "vertex before which Russian roulette ends no path; the first hit is 0 (default: 3)")
+      ->transform(whole_number(1, 1 << 30));
+}
+
+void add_guider_options(CLI::App& app, render_options& options) {
+  app.add_option("--octree-resolution", options.octree_resolution, "voxels a side (default: 128)")
+      ->transform(power_of_two(1, largest_octree));
+  app.add_option("--field-resolution", options.field_resolution,
+                 "cells a side of transient fields at the first vertex (default: 32)")
+      ->transform(whole_number(2, 128));
+  app.add_option("--slot-resolution", options.slot_resolution, "cells a side of kept fields (default: 24)")
+      ->transform(whole_number(2, 128));
+  app.add_option("--recast", options.recast, "a refresh casts one cone in so many again (default: 32)")
+      ->transform(whole_number(1, 1 << 20));
+  add_choice<bool>(app, "--learn", options.learn, {{"on", true}, {"off", false}},
+                   "kept fields learn from paths, beside their cones (default: on)");
+  app.add_option("--light-groups", options.light_groups,
+                 "lights are chosen from so many groups as is learnt; 1: by power (default: 32)")
+      ->transform(whole_number(1, 255));
+  app.add_option("--field-budget", options.field_budget, "memory of kept fields, such as 24MiB (the default)")
+      ->transform(byte_count());
+  app.add_option("--caster-buffer", options.caster_buffer,
+                 "memory of cones in flight to OptiX (default: 16MiB)")
+      ->transform(byte_count());
+  app.add_option("--product-resolution", options.product_resolution,
+                 "blocks a side of wfpg-product's products: 4, 8 or 16 (default: 8)")
+      ->transform(whole_number(4, 16))
+      ->check(CLI::IsMember({4, 8, 16}));
+  app.add_option("--rays-per-bin", options.rays_per_bin, "rays that a bin should have (default: 64)")
+      ->transform(whole_number(1, largest_count));
+  app.add_option("--min-bin-level", options.min_bin_level, "octree level of the largest bins (default: 3)")
+      ->transform(whole_number(0, largest_level));
+  app.add_option("--deposits-per-leaf", options.deposits_per_leaf,
+                 "deposits a leaf of the octree in a sample that is recorded; 0: all, in each (default: 16)")
+      ->transform(whole_number(0, largest_count));
+  app.add_option("--guide-fraction", options.guide_fraction,
+                 "samples drawn from the guide (default: the mode's, as 0)")
+      ->transform(number(0.0, 1.0));
+  app.add_option(
+         "--guided-depths", options.guided_depths,
+         "so many vertices of a path are guided, the first ones (default: all; with --nee on never the "
+         "last of several, whose direction finds emitters alone)")
+      ->transform(whole_number(1, largest_count));
+  app.add_option("--samples-per-leaf", options.samples_per_leaf,
+                 "after which Open PGL splits a leaf of its field (default: 32000)")
+      ->transform(whole_number(8, 1 << 30));
+  add_sarsa_options(app, options.sarsa);
+  add_records_options(app, options.records);
+}
+
+void check_render_options(const CLI::App& app, const render_options& options) {
+  const auto is_given = [&app](const char* name) {
+    const CLI::Option* const option = app.get_option_no_throw(name);
+    return option != nullptr && option->count() > 0;
+  };
+  for (const requirement& required : requirements())
+    for (const char* const name : required.options)
+      if (is_given(name) && !required.holds(options)) throw CLI::RequiresError(name, required.what);
+  // A scene's or a preset's --nee is not the command line's.
+  if (is_given("--light-groups") && is_given("--nee") && !options.nee)
+    throw CLI::RequiresError("--light-groups", "--nee on");
+  const std::string method = "--method " + name_of(method_names(), options.method);
+  if (is_openpgl(options.method) && options.where != device::cpu)
+    throw CLI::RequiresError(method, "--device cpu");
+  if (options.method == sampling_method::records && options.where == device::optix)
+    throw CLI::RequiresError(method, "a --device other than optix");
+}
+
+std::string listed_builtin_scenes() {
+  return CLI::detail::join(builtin_scene_names(), ", ");
+}
+
+scene load_scene(const std::string& name) {
+  if (is_builtin_scene(name)) return make_builtin_scene(name);
+  const std::size_t dot = name.rfind('.');
+  const std::string extension = dot == std::string::npos ? "" : name.substr(dot);
+  if (extension == ".glb" || extension == ".gltf") return load_gltf(name);
+  throw std::invalid_argument("SCENE is " + name + ", expected a .glb or .gltf file or one of " +
+                              listed_builtin_scenes());
+}
+
+scene load_scene(const scene_arguments& given, const render_options& options, const std::string& program,
+                 std::ostream& log) {
+  scene scene = load_scene(given.name);
+  if (!given.environment.empty()) scene.sky = read_environment(given.environment);
+  const std::string begin = program + ": warning: ";
+  for (const std::string& warning : scene.warnings) log << begin << warning << '\n';
+  if (!scene.punctual_lights.empty() && !options.nee)
+    log << begin << "point, spot and directional lights are lost with --nee off\n";
+  if (is_dark(scene)) log << begin << "the scene has no light: the picture is black\n";
+  return scene;
+}
+
+bool is_dark(const scene& scene) {
+  for (const material& m : scene.materials)
+    if (m.emission != vec3(0.0f)) return false;
+  return scene.punctual_lights.empty() && scene.sky.texels.empty() && scene.environment == vec3(0.0f);
+}
+
+}  // namespace render

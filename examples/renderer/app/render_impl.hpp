@@ -1,0 +1,263 @@
+// render_on for any policy: builds what a rendering needs, takes samples until the budget is spent, reports.
+#pragma once
+
+#include "app/guider_report.hpp"
+#include "app/render.hpp"
+#include "app/render_state.hpp"
+#include "app/saved_guider.hpp"
+#include "casters/octree_cones.hpp"
+#include "tracer/records_scene.hpp"
+#include "tracer/unguided.hpp"
+#include "tracer/wavefront.hpp"
+
+#include <wfpg/guides/records/irradiance_records.hpp>
+#include <wfpg/guides/sarsa/sarsa_grid.hpp>
+#include <wfpg/path_guider.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+
+namespace render {
+
+/// Time since it was made.
+class stopwatch {
+ public:
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// Samples taken, and the part of the budget that they used.
+class sample_budget {
+ public:
+  /// `samples`: taken already.
+  sample_budget(const render_options& options, int samples)
+      : spp_(options.spp),
+        seconds_(options.seconds),
+        least_(combination_of(options) == wfpg::sample_combination::discard_first ? 2 : 1),
+        samples_(samples),
+        begun_(options.seconds > 0.0 ? 0.0 : fraction()) {}
+
+  int samples() const { return samples_; }
+  double seconds() const { return clock_.seconds() - left_out_; }
+  bool is_spent() const { return samples_ >= least_ && fraction() >= 1.0; }
+  void count() { ++samples_; }
+  void leave_out(double seconds) { left_out_ += seconds; }
+  render_progress progress() const { return {samples_, std::min(1.0, fraction()), seconds(), begun_}; }
+
+ private:
+  double fraction() const {
+    return seconds_ > 0.0 ? seconds() / seconds_ : static_cast<double>(samples_) / spp_;
+  }
+
+  stopwatch clock_;
+  int spp_;
+  double seconds_;
+  double left_out_ = 0.0;
+  int least_;  ///< the picture of fewer has no weight
+  int samples_;
+  double begun_;  ///< fraction
+};
+
+inline bool is_kept(checkpoint_times times, int samples, bool is_last) {
+  const bool is_power_of_two = (samples & (samples - 1)) == 0;
+  return times == checkpoint_times::all ||
+         (times == checkpoint_times::powers_of_two && (is_power_of_two || is_last));
+}
+
+/// The samples of one rendering, from those that the report has on, whatever their directions come from.
+template <class Exec, class Caster, class Guider>
+void take_samples(path_tracer<Exec, Caster>& tracer, Guider& guider, const pinhole& camera,
+                  const render_options& options, const progress_callback& progress, render_result& result) {
+  sample_budget budget(options, result.report.spp);
+  for (bool is_last = budget.is_spent(); !is_last;) {
+    const auto sample = static_cast<std::uint32_t>(budget.samples());
+    const float weight = wfpg::sample_weight(combination_of(options), sample + 1);
+    tracer.render_sample(guider, camera, sample, weight);
+    budget.count();
+    result.is_stopped = !budget.is_spent() && options.is_stopped && options.is_stopped();
+    is_last = budget.is_spent() || result.is_stopped;
+    if (is_kept(options.checkpoints, budget.samples(), is_last)) {
+      const double seconds = budget.seconds();
+      const stopwatch keeping;
+      result.checkpoints.push_back(
+          {budget.samples(), seconds, {options.width, options.height, tracer.picture()}});
+      budget.leave_out(keeping.seconds());
+    }
+    if (progress) progress(budget.progress());
+  }
+  result.report.spp = budget.samples();
+}
+
+/// Of a path's depths those that are guided. The last direction, where it is not the first, finds emitters
+/// alone: where next-event estimation finds them too, it is left to the BSDF.
+inline std::uint32_t guided_depths(const render_options& options) {
+  const auto all_but_last = static_cast<std::uint32_t>(std::max(options.max_depth - 2, 1));
+  return options.nee ? std::min(options.guided_depths, all_but_last) : options.guided_depths;
+}
+
+/// What every guide is told.
+inline wfpg::sampling_options sampling_options_of(const render_options& options) {
+  wfpg::sampling_options guided;
+  guided.guide_fraction = options.guide_fraction;
+  guided.guided_depths = guided_depths(options);
+  guided.unguided_samples = wfpg::unguided_samples(combination_of(options));
+  guided.seed = options.seed;
+  guided.max_paths = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  guided.max_depth = static_cast<std::uint32_t>(options.max_depth);
+  return guided;
+}
+
+inline wfpg::sarsa_grid_options sarsa_options_of(const render_options& options) {
+  wfpg::sarsa_grid_options guided = options.sarsa;
+  static_cast<wfpg::sampling_options&>(guided) = sampling_options_of(options);
+  return guided;
+}
+
+inline wfpg::irradiance_records_options records_options_of(const scene& host, const render_options& options) {
+  wfpg::irradiance_records_options guided = options.records;
+  static_cast<wfpg::sampling_options&>(guided) = sampling_options_of(options);
+  // Next-event estimation finds emitters, if not behind smooth surfaces.
+  guided.include_emission = !options.nee || has_smooth_surfaces(host);
+  return guided;
+}
+
+/// `shares`: of the groups of lights that there are to choose from.
+inline wfpg::guider_options guider_options_of(const render_options& options,
+                                              const std::vector<float>& shares) {
+  wfpg::guider_options guided;
+  static_cast<wfpg::sampling_options&>(guided) = sampling_options_of(options);
+  guided.octree_resolution = options.octree_resolution;
+  guided.fields =
+      options.lifetime == fields::kept ? wfpg::field_lifetime::kept : wfpg::field_lifetime::transient;
+  guided.field_resolution = options.field_resolution;
+  guided.kept.resolution = options.slot_resolution;
+  guided.kept.recast = options.recast;
+  guided.kept.budget_bytes = options.field_budget;
+  guided.caster_buffer_bytes = options.caster_buffer;
+  if (options.nee && shares.size() > 1) guided.lights.weights = shares;
+  if (options.method == sampling_method::wfpg_product) guided.product_resolution = options.product_resolution;
+  guided.rays_per_bin = options.rays_per_bin;
+  guided.min_bin_level = options.min_bin_level;
+  guided.deposits_per_leaf = options.deposits_per_leaf;
+  guided.mode = options.mode == guiding::plain ? wfpg::guiding_mode::plain : wfpg::guiding_mode::oriented;
+  guided.kept.learn = options.learn;
+  // With next-event estimation emission is worth its MIS weight, which fields that learn find out.
+  guided.include_emission = !options.nee || (options.lifetime == fields::kept && options.learn);
+  return guided;
+}
+
+/// The state that a rendering goes on from; none where options name no file. Throws std::invalid_argument
+/// where it has more samples than it is to have.
+inline render_state begin_state(const scene& scene, const render_options& options) {
+  if (options.resume.empty()) return {};
+  render_state state = read_state(options.resume, scene, options);
+  if (options.seconds <= 0.0)
+    wfpg::require(state.samples <= options.spp, "spp", options.spp,
+                  "no fewer than the rendering to go on with has");
+  return state;
+}
+
+/// Builds what a rendering needs, has its samples taken, and reports. `take` does so with directions from
+/// where it likes:
+///   void operator()(path_tracer<Exec, Caster>&, const scene_view&, const light_distribution<Exec>&,
+///                   const pinhole&, stage_clock& building, render_result&) const;
+template <class Accelerated, class Exec, class Take>
+render_result render_by(const Exec& exec, const scene& scene, const render_options& options,
+                        const Take& take) {
+  const stopwatch total;
+  stage_clock building;
+  render_result result;
+  render_report& report = result.report;
+
+  const device_scene<Exec> geometry(exec, scene);
+  // Groups are for who learns to choose between them.
+  const light_distribution<Exec> lights(exec, scene, is_wfpg(options.method) ? options.light_groups : 1);
+  std::unique_ptr<const Accelerated> accelerated;
+  building.measure(Accelerated::name,
+                   [&] { accelerated = std::make_unique<const Accelerated>(exec, scene, geometry.view()); });
+  const tracer_settings settings{options.width, options.height, static_cast<std::uint32_t>(options.max_depth),
+                                 options.seed, static_cast<std::uint32_t>(options.roulette_depth)};
+  path_tracer<Exec, decltype(accelerated->caster())> tracer(
+      exec, settings, {geometry.view(), lights.view(), options.nee}, accelerated->caster());
+  const pinhole camera(scene.view, options.width, options.height);
+  const render_state before = begin_state(scene, options);
+  if (before.samples > 0) tracer.restore(before.film);
+  report.spp = before.samples;
+  result.guide = before.guide;
+  take(tracer, geometry.view(), lights, camera, building, result);
+  report.segments = tracer.segments();
+  const double paths = double(report.spp) * double(options.width) * double(options.height);
+  report.light_hits_per_path = static_cast<double>(tracer.light_hits()) / paths;
+  if (options.keep_state)
+    result.state = state_bytes(scene, options, {report.spp, tracer.film(), result.guide});
+  result.picture = {options.width, options.height, tracer.picture()};
+  report.seconds.insert(report.seconds.begin(), tracer.seconds().begin(), tracer.seconds().end());
+  report.seconds.insert(report.seconds.begin(), building.seconds().begin(), building.seconds().end());
+  report.total_seconds = total.seconds();
+  return result;
+}
+
+/// Samples guided by irradiance records, which ask the tracer's caster what is smooth.
+template <class Exec, class Caster, class Take>
+void guide_by_records(const Exec& exec, const path_tracer<Exec, Caster>& tracer, const scene& host,
+                      const scene_view& geometry, const render_options& options, const Take& take) {
+  if constexpr (wfpg::is_inline_caster_v<Caster>) {
+    using smooth = smooth_surfaces<Caster>;
+    const wfpg::buffer<wfpg::emitting_triangle, Exec> emitters(exec, emitters_of(host));
+    const wfpg::lit_scene<smooth> lit{
+        {geometry.positions, geometry.triangles}, emitters.view(), {tracer.caster(), geometry}};
+    wfpg::path_guider<Exec, wfpg::irradiance_records<Exec, smooth>> guider(exec, lit,
+                                                                           records_options_of(host, options));
+    take(guider);
+  } else {
+    throw std::runtime_error("--device optix does not support --method records; --device cuda does");
+  }
+}
+
+template <class Accelerated, class Exec>
+render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
+                        const progress_callback& progress) {
+  return render_by<Accelerated>(
+      exec, scene, options,
+      [&](auto& tracer, const scene_view& geometry, const auto& lights, const pinhole& camera,
+          stage_clock& building, render_result& result) {
+        const wfpg::triangle_mesh_view mesh{geometry.positions, geometry.triangles};
+        if (options.method == sampling_method::pt) {
+          unguided<Exec> guider(exec);
+          take_samples(tracer, guider, camera, options, progress, result);
+        } else if (options.method == sampling_method::sarsa) {
+          wfpg::path_guider<Exec, wfpg::sarsa_grid<Exec>> guider(exec, mesh, sarsa_options_of(options));
+          take_samples(tracer, guider, camera, options, progress, result);
+          report_any_guider(guider, result.report);
+        } else if (options.method == sampling_method::records) {
+          guide_by_records(exec, tracer, scene, geometry, options, [&](auto& guider) {
+            take_samples(tracer, guider, camera, options, progress, result);
+            report_records(guider, tracer.segments(), result.report);
+          });
+        } else {
+          const stopwatch build;
+          wfpg::path_guider<Exec> guider = begin_guider(
+              exec, scene, mesh, guider_options_of(options, lights.shares()), options, result.guide);
+          building.add("octree", build.seconds());
+          result.report.octree.build_seconds = build.seconds();
+          // A guide that is loaded has counted another rendering's, one of a state this one's.
+          const wfpg::guider_statistics before =
+              options.load_guide.empty() ? wfpg::guider_statistics() : guider.statistics();
+          if (options.through == cones::scene) {
+            take_samples(tracer, guider, camera, options, progress, result);
+          } else {
+            octree_cone_guider<Exec> with_cones(exec, guider, geometry.environment, options.through);
+            take_samples(tracer, with_cones, camera, options, progress, result);
+          }
+          report_guider(guider, tracer.segments(), result.report, before);
+          result.guide = kept_guide(guider, options);
+        }
+      });
+}
+
+}  // namespace render

@@ -1,0 +1,88 @@
+// The renderer guided by Open PGL, and what its field says of itself.
+#include "app/render_impl.hpp"
+#include "casters/embree_caster.hpp"
+#include "tracer/openpgl_guider.hpp"
+
+#include <filesystem>
+#include <random>
+#include <sstream>
+#include <string>
+
+namespace render {
+namespace {
+
+/// Of all vertices, and a little more, since what a ray hits is beside them by rounding.
+pgl_box3f bounds_of(const scene& scene) {
+  wfpg::bounds3 box;
+  for (const vec3& p : scene.positions) box = wfpg::bounds_union()(box, {p, p});
+  const vec3 more(1e-3f * glm::length(box.extent()));
+  return {to_pgl(box.lower - more), to_pgl(box.upper + more)};
+}
+
+openpgl_options openpgl_options_of(const scene& scene, const render_options& options) {
+  openpgl_options guided;
+  if (options.method == sampling_method::openpgl_dqt)
+    guided.directional = PGL_DIRECTIONAL_DISTRIBUTION_QUADTREE;
+  guided.samples_per_leaf = options.samples_per_leaf;
+  if (options.guide_fraction > 0.0f) guided.guide_fraction = options.guide_fraction;
+  guided.paths = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  guided.guided_depths = guided_depths(options);
+  guided.max_depth = static_cast<std::size_t>(options.max_depth);
+  guided.bounds = bounds_of(scene);
+  return guided;
+}
+
+/// Bytes of the file that the field stores itself in, since its statistics leave out quadtrees' nodes; 0
+/// where the directory for temporary files takes none.
+std::size_t stored_bytes(const openpgl::cpp::Field& field) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path path =
+      fs::temp_directory_path(error) / ("wfpg-field-" + std::to_string(std::random_device()()));
+  const std::uintmax_t bytes = !error && field.Store(path.string()) ? fs::file_size(path, error) : 0;
+  fs::remove(path, error);
+  return error ? 0 : static_cast<std::size_t>(bytes);
+}
+
+/// The column of a table of two lines, one of names, that numbers the leaves; 0 where there is none.
+std::size_t regions_of(const openpgl::cpp::FieldStatistics& statistics) {
+  std::istringstream names(statistics.HeaderCSVString()), values(statistics.ToCSVString());
+  std::string name, value;
+  while (std::getline(names, name, ',') && std::getline(values, value, ','))
+    if (name.find("numCacheRegions") != std::string::npos) return std::stoul(value);
+  return 0;
+}
+
+void report_openpgl(const openpgl_guider& guider, render_report& report) {
+  const std::size_t segments = guider.paths().segment_bytes(), samples = guider.paths().sample_bytes();
+  // Of a field that has been shown no sample there is nothing to ask.
+  if (samples > 0) {
+    report.persistent_bytes = stored_bytes(guider.field());
+    report.used_bytes = report.persistent_bytes;
+    report.regions = regions_of(guider.field().GetSurfaceStatistics());
+  }
+  report.transient_bytes = segments + samples;
+  report.memory = {{"field", report.persistent_bytes}, {"segments", segments}, {"samples", samples}};
+  for (const auto& [stage, seconds] : guider.seconds())
+    report.seconds.emplace_back("guide " + stage, seconds);
+}
+
+}  // namespace
+
+bool has_openpgl() {
+  return true;
+}
+
+render_result render_with_openpgl(const scene& scene, const render_options& options,
+                                  const progress_callback& progress) {
+  const wfpg::exec::tbb exec;
+  return render_by<embree_scene>(exec, scene, options,
+                                 [&](auto& tracer, const scene_view&, const auto&, const pinhole& camera,
+                                     stage_clock&, render_result& result) {
+                                   openpgl_guider guider(exec, openpgl_options_of(scene, options));
+                                   take_samples(tracer, guider, camera, options, progress, result);
+                                   report_openpgl(guider, result.report);
+                                 });
+}
+
+}  // namespace render

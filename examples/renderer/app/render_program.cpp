@@ -1,0 +1,190 @@
+// From arguments to pictures.
+#include "app/render_program.hpp"
+
+#include "app/interruption.hpp"
+#include "app/number_options.hpp"
+#include "app/output_files.hpp"
+#include "app/progress_bar.hpp"
+#include "app/render.hpp"
+#include "app/render_arguments.hpp"
+#include "app/render_state.hpp"
+#include "app/stats_json.hpp"
+#include "scene/builtin_scenes.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <exception>
+#include <optional>
+#include <ostream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace render {
+namespace {
+
+constexpr int failure = 2;
+constexpr int interrupted = 3;
+
+std::string size_name(int width, int height) {
+  return std::to_string(width) + " x " + std::to_string(height);
+}
+
+struct arguments {
+  scene_arguments scene;
+  std::string output, png, stats, reference, save_guide, save_state;
+  float exposure = 1.0f;  ///< of the PNG
+  render_options options;
+};
+
+/// Files are checked before the scene is loaded: rendering takes longer than that.
+void check_files(const arguments& given) {
+  const render_options& options = given.options;
+  std::vector<named_file> outputs = {{"--output", given.output, ".exr"},
+                                     {"--png", given.png, ".png"},
+                                     {"--stats", given.stats, ""},
+                                     {"--save-guide", given.save_guide, ""},
+                                     {"--save-state", given.save_state, ""}};
+  // An interrupted rendering goes on from its newer state.
+  if (given.save_state.empty()) outputs.push_back({"--resume", options.resume, ""});
+  check_outputs(outputs, {{"SCENE", is_builtin_scene(given.scene.name) ? "" : given.scene.name, ""},
+                          {"--environment", given.scene.environment, ""},
+                          {"--reference", given.reference, ""}});
+}
+
+void add_file_options(CLI::App& app, arguments& given) {
+  app.add_option("-o,--output", given.output, "picture, OpenEXR")->transform(file_path());
+  app.add_option("--png", given.png, "picture, sRGB PNG")->transform(file_path());
+  app.add_option("--exposure", given.exposure, "multiplies the PNG's values (default: 1)")
+      ->transform(positive_number(1.0e30))
+      ->needs("--png");
+  app.add_option("--stats", given.stats, "what it cost, JSON")->transform(file_path());
+  app.add_option("--reference", given.reference, "picture to print the error against, OpenEXR")
+      ->transform(file_path());
+}
+
+void add_state_options(CLI::App& app, arguments& given) {
+  app.add_option("--save-guide", given.save_guide,
+                 "where the guide of wfpg or wfpg-product goes at the end: what it has learnt")
+      ->transform(file_path());
+  CLI::Option* const load = app.add_option("--load-guide", given.options.load_guide,
+                                           "guide for wfpg or wfpg-product to begin with, of the same scene")
+                                ->transform(file_path());
+  app.add_option("--save-state", given.save_state,
+                 "where the state of a rendering by pt, wfpg or wfpg-product goes at the end, and when it is "
+                 "interrupted")
+      ->transform(file_path());
+  app.add_option("--resume", given.options.resume,
+                 "state of the rendering to go on with; where it goes when that is interrupted")
+      ->transform(file_path())
+      ->excludes(load);
+}
+
+/// What goes on from an interrupted rendering, or to more samples.
+void save_state(const arguments& given, const render_result& result, std::ostream& log) {
+  const bool updates = given.save_state.empty() && result.is_stopped;
+  const std::string& state = updates ? given.options.resume : given.save_state;
+  if (!state.empty()) write_file(state, result.state);
+  if (!result.is_stopped) return;
+  log << "wfpg-render: interrupted after " << result.report.spp << " samples"
+      << (state.empty() ? "" : "; --resume " + state + " goes on") << '\n';
+}
+
+void print_error(const image_error& error, std::ostream& out) {
+  char line[200];
+  std::snprintf(line, sizeof line, "mse %.6e  relmse %.6e  relmse trimmed %.6e  mse reinhard %.6e\n",
+                error.mse, error.relmse, error.relmse_trimmed, error.mse_reinhard);
+  out << line;
+}
+
+void say(std::ostream& log, const std::exception& error) {
+  log << "wfpg-render: " << reason_of(error) << '\n';
+}
+
+/// Writes all that was asked for, whatever of it fails, and says what does: rendering takes longer than that.
+bool write_all(const arguments& given, const render_result& result, const std::optional<image>& reference,
+               std::ostream& out, std::ostream& log) {
+  bool is_written = true;
+  const auto attempt = [&](const auto& write) {
+    try {
+      write();
+    } catch (const std::exception& error) {
+      say(log, error);
+      is_written = false;
+    }
+  };
+  if (!given.output.empty()) attempt([&] { write_exr(given.output, result.picture); });
+  if (!given.png.empty()) attempt([&] { write_png(given.png, result.picture, given.exposure); });
+  if (!given.save_guide.empty()) attempt([&] { write_file(given.save_guide, result.guide); });
+  attempt([&] { save_state(given, result, log); });
+  std::optional<image_error> error;
+  if (reference) error = compare(result.picture, *reference);
+  if (error) print_error(*error, out);
+  if (!given.stats.empty()) attempt([&] { write_stats(given.stats, result.report, error); });
+  return is_written;
+}
+
+/// The picture that the rendering is compared with, if there is one. Throws std::invalid_argument where it is
+/// of another size.
+std::optional<image> read_reference(const arguments& given, const scene& scene) {
+  if (given.reference.empty()) return std::nullopt;
+  const render_options options = completed(scene, given.options);
+  image reference = read_exr(given.reference);
+  if (reference.width != options.width || reference.height != options.height)
+    throw std::invalid_argument("--reference: " + given.reference + " has " +
+                                size_name(reference.width, reference.height) +
+                                " pixels, the picture will have " + size_name(options.width, options.height));
+  return reference;
+}
+
+int render_scene(arguments& given, std::ostream& out, std::ostream& log) {
+  check_files(given);
+  const scene scene = load_scene(given.scene, given.options, "wfpg-render", log);
+  const std::optional<image> reference = read_reference(given, scene);
+
+  given.options.keep_guide = !given.save_guide.empty();
+  given.options.keep_state = !given.save_state.empty() || !given.options.resume.empty();
+  given.options.is_stopped = is_interrupted;
+  note_interruptions();
+  progress_bar bar;
+  const render_result result =
+      render(scene, given.options, [&bar](const render_progress& p) { bar.show(p); });
+  bar.finish();
+  if (!write_all(given, result, reference, out, log)) return failure;
+  return result.is_stopped ? interrupted : 0;
+}
+
+}  // namespace
+
+int run_program(int argc, const char* const* argv, std::ostream& out, std::ostream& log) {
+  arguments given;
+  CLI::App app{"Renders a scene by wavefront path tracing, with or without path guiding."};
+  report_in_one_line(app, "wfpg-render");
+  add_scene_options(app, given.scene);
+  add_file_options(app, given);
+  add_state_options(app, given);
+  add_method_options(app, given.options);
+  add_device_option(app, given.options);
+  add_nee_option(app, given.options);
+  add_budget_options(app, given.options);
+  add_picture_options(app, given.options);
+  add_guider_options(app, given.options);
+  try {
+    app.parse(argc, argv);
+    if (given.output.empty() && given.png.empty() && given.stats.empty() && given.reference.empty() &&
+        given.save_guide.empty() && given.save_state.empty())
+      throw CLI::RequiredError("one of -o, --png, --stats, --reference, --save-guide, --save-state");
+    check_render_options(app, given.options);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error, out, log) == 0 ? 0 : failure;
+  }
+  try {
+    return render_scene(given, out, log);
+  } catch (const std::exception& error) {
+    say(log, error);
+    return failure;
+  }
+}
+
+}  // namespace render

@@ -1,0 +1,153 @@
+// State files.
+#include "app/render_state.hpp"
+
+#include "app/option_names.hpp"
+#include "scene/scene_checksum.hpp"
+
+#include <wfpg/base/math.hpp>
+#include <wfpg/state/section_file.hpp>
+
+#include <cstdio>
+#include <sstream>
+#include <utility>
+
+namespace render {
+namespace {
+
+using wfpg::section_reader;
+using wfpg::section_writer;
+
+constexpr wfpg::file_kind state_file_kind{{"\x89wfpgR\n\x1a", 8}, 1, "a rendering's state file"};
+
+/// What decides a picture's bits: names as errors say them, and values.
+using named_values = std::vector<std::pair<std::string, std::string>>;
+
+std::string hexadecimal(std::uint64_t value) {
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
+  return text;
+}
+
+void add_guider_values(const render_options& o, named_values& values) {
+  using std::to_string;
+  char fraction[32];
+  std::snprintf(fraction, sizeof fraction, "%.9g", static_cast<double>(o.guide_fraction));
+  values.insert(values.end(), {{"--guiding", o.mode == guiding::plain ? "plain" : "oriented"},
+                               {"--fields", o.lifetime == fields::kept ? "kept" : "transient"},
+                               {"--cones", name_of(cones_names(), o.through)},
+                               {"--octree-resolution", to_string(o.octree_resolution)},
+                               {"--rays-per-bin", to_string(o.rays_per_bin)},
+                               {"--min-bin-level", to_string(o.min_bin_level)},
+                               {"--deposits-per-leaf", to_string(o.deposits_per_leaf)},
+                               {"--guide-fraction", fraction},
+                               {"--guided-depths", to_string(o.guided_depths)}});
+  if (o.lifetime == fields::kept)
+    values.insert(values.end(), {{"--slot-resolution", to_string(o.slot_resolution)},
+                                 {"--recast", to_string(o.recast)},
+                                 {"--learn", o.learn ? "on" : "off"},
+                                 {"--field-budget", to_string(o.field_budget)}});
+  else
+    values.emplace_back("--field-resolution", to_string(o.field_resolution));
+  if (o.method == sampling_method::wfpg_product)
+    values.emplace_back("--product-resolution", to_string(o.product_resolution));
+  if (o.nee) values.emplace_back("--light-groups", to_string(o.light_groups));
+}
+
+named_values values_of(const render_options& o) {
+  named_values values = {{"--size", std::to_string(o.width) + "x" + std::to_string(o.height)},
+                         {"--max-depth", std::to_string(o.max_depth)},
+                         {"--roulette-depth", std::to_string(o.roulette_depth)},
+                         {"--seed", std::to_string(o.seed)},
+                         {"--nee", o.nee ? "on" : "off"},
+                         {"--method", name_of(method_names(), o.method)},
+                         {"--combine", name_of(combination_names(), combination_of(o))}};
+  if (o.method != sampling_method::pt) add_guider_values(o, values);
+  return values;
+}
+
+section_writer options_to_bytes(const scene& scene, const render_options& options) {
+  section_writer bytes;
+  bytes.put_text(scene.name);
+  bytes.put(checksum_of(scene));
+  for (const auto& [option, value] : values_of(options)) {
+    bytes.put_text(option);
+    bytes.put_text(value);
+  }
+  return bytes;
+}
+
+void check_options(section_reader bytes, const std::string& name, const scene& scene,
+                   const render_options& options) {
+  const std::string saved_scene = bytes.get_text();
+  const auto saved_checksum = bytes.get<std::uint64_t>(), checksum = checksum_of(scene);
+  if (saved_checksum != checksum)
+    throw wfpg::file_error(name, "was rendered of scene " + saved_scene + " with checksum " +
+                                     hexadecimal(saved_checksum) + ", not of " + scene.name + " with " +
+                                     hexadecimal(checksum));
+  for (const auto& [option, value] : values_of(options)) {
+    bytes.require(bytes.get_text() == option, "has other options than this wfpg-render");
+    const std::string saved = bytes.get_text();
+    if (saved != value)
+      throw wfpg::file_error(name, "was rendered with " + option + " " + saved + ", not " + value);
+  }
+  bytes.end();
+}
+
+section_writer film_to_bytes(const render_state& state) {
+  section_writer bytes;
+  bytes.put(static_cast<std::uint32_t>(state.samples));
+  bytes.put(state.film.weight);
+  bytes.put(state.film.segments);
+  bytes.put(state.film.light_hits);
+  for (const glm::dvec3& sum : state.film.sums)
+    for (int c = 0; c < 3; ++c) bytes.put(sum[c]);
+  return bytes;
+}
+
+void restore_film(section_reader bytes, std::size_t pixels, render_state& state) {
+  const auto samples = bytes.get<std::uint32_t>();
+  bytes.require(samples >= 1 && samples <= 1u << 30, "has a number of samples out of range");
+  state.samples = static_cast<int>(samples);
+  state.film.weight = bytes.get<double>();
+  bytes.require(state.film.weight >= 0.0 && state.film.weight <= 1e30, "has a weight out of range");
+  state.film.segments = bytes.get<std::uint64_t>();
+  state.film.light_hits = bytes.get<std::uint64_t>();
+  const std::vector<double> sums = bytes.get_all<double>(3 * pixels);
+  bytes.end();
+  state.film.sums.resize(pixels);
+  for (std::size_t i = 0; i < pixels; ++i)
+    state.film.sums[i] = {sums[3 * i], sums[3 * i + 1], sums[3 * i + 2]};
+}
+
+}  // namespace
+
+std::string state_bytes(const scene& scene, const render_options& options, const render_state& state) {
+  std::ostringstream out;
+  wfpg::file_writer file(out, state_file_kind, "the state");
+  section_writer guide;
+  guide.put_text(state.guide);
+  file.section("options", options_to_bytes(scene, options));
+  file.section("film", film_to_bytes(state));
+  file.section("guide", guide);
+  file.end();
+  return out.str();
+}
+
+render_state read_state(std::istream& in, const std::string& name, const scene& scene,
+                        const render_options& options) {
+  wfpg::file_reader file(in, state_file_kind, name);
+  check_options(file.section("options"), name, scene, options);
+  render_state state;
+  restore_film(file.section("film"), std::size_t(options.width) * std::size_t(options.height), state);
+  section_reader guide = file.section("guide");
+  state.guide = guide.get_text();
+  guide.end();
+  file.end();
+  return state;
+}
+
+render_state read_state(const std::string& path, const scene& scene, const render_options& options) {
+  return wfpg::read_file(path, [&](std::istream& in) { return read_state(in, path, scene, options); });
+}
+
+}  // namespace render

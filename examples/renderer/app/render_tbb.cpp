@@ -1,0 +1,12 @@
+// The renderer on the policy exec::tbb: TBB.
+#include "app/render_impl.hpp"
+#include "casters/embree_caster.hpp"
+
+#include <wfpg/exec/tbb.hpp>
+
+namespace render {
+
+template render_result render_on<embree_scene>(const wfpg::exec::tbb&, const scene&, const render_options&,
+                                               const progress_callback&);
+
+}  // namespace render

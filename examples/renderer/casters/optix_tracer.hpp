@@ -1,0 +1,51 @@
+// OptiX's pipeline and the acceleration structure of one mesh, launched on CUDA streams. Needs no nvcc;
+// optix_caster.hpp gives it to the renderer and to the guider.
+#pragma once
+
+#include "casters/optix_parameters.hpp"
+
+#include <wfpg/base/types.hpp>
+#include <wfpg/exec/policy.hpp>
+
+#include <cuda_runtime_api.h>
+
+#include <cstdint>
+#include <memory>
+
+namespace render {
+
+/// What a batch of rays asks; each has a program in optix_programs.cu.
+enum class optix_query { intersect, occluded, cast };
+
+/// Owns what OptiX makes for one mesh. Launches may run on several streams at once.
+class optix_tracer {
+ public:
+  /// Builds on the current device, ordered on `stream`, and waits for it. `memory` hands out device memory
+  /// ordered on that stream and outlives this, as the stream does. Positions and triangles are device memory,
+  /// finite, with every corner below the number of positions; neither is read later. Throws
+  /// wfpg::out_of_memory, and std::runtime_error that says what OptiX needs where it is not there.
+  optix_tracer(cudaStream_t stream, wfpg::memory_resource* memory,
+               wfpg::array_view<const wfpg::vec3> positions, wfpg::array_view<const wfpg::uvec3> triangles);
+  /// Waits for the stream.
+  ~optix_tracer();
+  optix_tracer(const optix_tracer&) = delete;
+  optix_tracer& operator=(const optix_tracer&) = delete;
+
+  /// The mesh's acceleration structure, for optix_parameters::tree.
+  unsigned long long tree() const;
+  /// Bytes of device memory that are kept.
+  std::size_t bytes() const;
+
+  /// The most rays of one launch (the programming guide's limit on a launch's size).
+  static constexpr std::size_t max_rays = std::size_t(1) << 30;
+
+  /// Launches `count` rays, at least one, ordered on `stream`. `parameters` is device memory.
+  void launch(cudaStream_t stream, optix_query query, const optix_parameters* parameters,
+              std::size_t count) const;
+
+ private:
+  struct state;
+  std::unique_ptr<state> state_;
+};
+
+}  // namespace render

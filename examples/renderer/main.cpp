@@ -1,9 +1,0 @@
-// wfpg-render: renders a scene with or without guiding. SIGINT and SIGTERM end it after the sample in flight,
-// with its picture and state. Exit code 0; 2 with a message on failure; 3 where it was interrupted.
-#include "render_program.hpp"
-
-#include <iostream>
-
-int main(int argc, char** argv) {
-  return render::run_program(argc, argv, std::cout, std::cerr);
-}

@@ -1,0 +1,243 @@
+// The BSDF of the renderer: one tagged, trivially copyable type, so that a kernel needs no virtual call.
+// Directions as in <wfpg/host/bsdf.hpp>: world space, unit length, away from the surface.
+#pragma once
+
+#include "materials/metallic_roughness.hpp"
+#include "scene/scene.hpp"
+
+#include <wfpg/host/bsdf.hpp>
+
+#include <type_traits>
+
+namespace render {
+
+/// How one point scatters. Reflecting kinds do so on the side that both normals face; dielectrics' normals
+/// face outward. Directions that the two normals put on different sides carry nothing: no light leaks through
+/// a surface because its shading normal leans.
+struct bsdf {
+  vec3 normal{0.0f, 0.0f, 1.0f};  ///< shading normal, unit length
+  vec3 geometric_normal{0.0f, 0.0f, 1.0f};
+  vec3 colour{0.8f};  ///< material::base_color at this point
+  float alpha = 0.1f;
+  float ior = 1.5f;
+  material_kind kind = material_kind::lambert;
+  unorm8x3 transmitted_colour{};  ///< this and the next: of the two kinds with all lobes
+  lobe_factors factors{};
+
+  WFPG_HD bool is_delta() const { return is_smooth(kind); }
+  WFPG_HD bool transmits() const {
+    switch (kind) {
+      case material_kind::dielectric:
+      case material_kind::thin_dielectric:
+      case material_kind::rough_dielectric:
+        return true;
+      case material_kind::metallic_roughness:
+      case material_kind::thin_metallic_roughness:
+        return factors.transmits();
+      default:
+        return false;
+    }
+  }
+
+  /// f |cos| per channel, per steradian; 0 for delta lobes.
+  WFPG_HD vec3 eval_rgb(vec3 outgoing, vec3 incident) const {
+    if (has_all_lobes()) {
+      const local_pair pair(*this, outgoing, incident);
+      return pair.exists ? lobes(pair.side).eval(pair.outgoing, pair.incident) : vec3(0.0f);
+    }
+    if (is_delta() || !reflects(outgoing, incident)) return vec3(0.0f);
+    const frame local(normal);
+    const vec3 wo = local.to_local(outgoing);
+    const vec3 wi = local.to_local(incident);
+    if (kind == material_kind::lambert) return colour * (wi.z / pi);
+    const vec3 h = glm::normalize(wo + wi);
+    const float facets = ggx{alpha}.eval(wo, wi, h);
+    if (kind == material_kind::conductor) return fresnel_schlick(colour, glm::dot(wo, h)) * facets;
+    const float below = (1.0f - fresnel_dielectric(wo.z, ior)) * (1.0f - fresnel_dielectric(wi.z, ior));
+    return vec3(fresnel_dielectric(glm::dot(wo, h), ior) * facets) + colour * (below * wi.z / pi);
+  }
+  WFPG_HD float eval(vec3 outgoing, vec3 incident) const {
+    if (kind != material_kind::lambert) return wfpg::luminance(eval_rgb(outgoing, incident));
+    return reflects(outgoing, incident) ? wfpg::luminance(colour) * glm::dot(incident, normal) / pi : 0.0f;
+  }
+
+  /// What facets reflect and refract, and how often sample() draws from it.
+  WFPG_HD wfpg::glossy_part glossy(vec3 outgoing) const {
+    if (kind == material_kind::lambert) return {};
+    if (kind == material_kind::conductor) return {1.0f, alpha};
+    const float above = glm::dot(outgoing, normal);
+    if (kind == material_kind::plastic) return {coat_probability(above), alpha};
+    if (has_all_lobes()) return {lobes(side_of(above)).specular_probability(std::abs(above)), alpha};
+    return {};
+  }
+
+  /// Density of sample(), per steradian; 0 for delta lobes.
+  WFPG_HD float pdf(vec3 outgoing, vec3 incident) const {
+    const float coat = glossy(outgoing).share;
+    return (coat > 0.0f ? coat * pdf_part(true, outgoing, incident) : 0.0f) +
+           (coat < 1.0f ? (1.0f - coat) * pdf_part(false, outgoing, incident) : 0.0f);
+  }
+  /// The same of one part.
+  WFPG_HD float pdf_part(bool coat, vec3 outgoing, vec3 incident) const {
+    if (has_all_lobes()) {
+      const local_pair pair(*this, outgoing, incident);
+      return pair.exists ? lobes(pair.side).pdf(coat, pair.outgoing, pair.incident) : 0.0f;
+    }
+    if (is_delta() || is_black() || !reflects(outgoing, incident)) return 0.0f;
+    if (!coat) return glm::dot(incident, normal) / pi;
+    const frame local(normal);
+    const vec3 wo = local.to_local(outgoing);
+    return ggx{alpha}.pdf(wo, glm::normalize(wo + local.to_local(incident)));
+  }
+
+  WFPG_HD wfpg::bsdf_sample sample(vec3 outgoing, vec2 u) const {
+    if (is_black()) return {};
+    if (kind == material_kind::dielectric) return sample_dielectric(outgoing, u.x);
+    if (kind == material_kind::thin_dielectric) return sample_thin_dielectric(outgoing, u.x);
+    if (kind == material_kind::mirror) {
+      const vec3 incident = mirrored(outgoing, normal);
+      return {incident, reflects(outgoing, incident) ? 1.0f : 0.0f};
+    }
+    const float coat = glossy(outgoing).share;
+    const bool from_coat = chosen(u.x, coat);
+    wfpg::bsdf_sample drawn = sample_part(from_coat, outgoing, u);
+    if (drawn.pdf > 0.0f && coat > 0.0f) drawn.pdf = pdf(outgoing, drawn.direction);
+    return drawn;
+  }
+  /// The same from one part, with its density.
+  WFPG_HD wfpg::bsdf_sample sample_part(bool coat, vec3 outgoing, vec2 u) const {
+    if (is_delta() || is_black()) return {};
+    const frame local(normal);
+    vec3 wo = local.to_local(outgoing), wi;
+    if (has_all_lobes()) {
+      const float side = side_of(wo.z);
+      wo = transmits() ? side * wo : wo;
+      if (wo.z <= 0.0f) return {};
+      wi = lobes(side).sample(coat, wo, u);
+      if (wi == vec3(0.0f)) return {};
+      wi = side * wi;
+    } else {
+      if (wo.z <= 0.0f) return {};
+      wi = coat ? mirrored(wo, ggx{alpha}.sample(wo, u)) : cosine_hemisphere(u);
+    }
+    const vec3 incident = glm::normalize(local.to_world(wi));
+    return {incident, pdf_part(coat, outgoing, incident)};
+  }
+
+  /// Value over probability of the delta lobe that joins two directions, per channel.
+  WFPG_HD vec3 delta_weight_rgb(vec3 outgoing, vec3 incident) const {
+    if (kind == material_kind::mirror) return colour;
+    const float above = glm::dot(outgoing, normal);
+    if (above * glm::dot(incident, normal) > 0.0f) return vec3(1.0f);
+    // Radiance is squeezed into a smaller solid angle where the index is larger.
+    const float eta = is_thin() ? 1.0f : relative_ior(above);
+    return colour / (eta * eta);
+  }
+
+  /// What part of the light goes on, roughly and per sample of this BSDF: for Russian roulette.
+  /// Does not see how radiance changes with the index of refraction, which paths that leave again get back.
+  WFPG_HD float reflectance(vec3 outgoing, vec3 incident) const {
+    const float eta = ior_beyond(outgoing, incident);
+    if (is_delta()) return eta * eta * wfpg::luminance(delta_weight_rgb(outgoing, incident));
+    const float density = pdf(outgoing, incident);
+    if (!(density > 0.0f)) return 0.0f;
+    return eta * eta * eval(outgoing, incident) / density;
+  }
+
+  /// The index of refraction where light of `incident` comes from, over that where it goes to.
+  WFPG_HD float ior_beyond(vec3 outgoing, vec3 incident) const {
+    const float above = glm::dot(outgoing, normal);
+    const bool enters = !is_thin() && above * glm::dot(incident, normal) < 0.0f;
+    return enters ? relative_ior(above) : 1.0f;
+  }
+
+ private:
+  WFPG_HD bool has_all_lobes() const {
+    return kind == material_kind::rough_dielectric || kind == material_kind::metallic_roughness ||
+           kind == material_kind::thin_metallic_roughness;
+  }
+  WFPG_HD bool is_thin() const {
+    return kind == material_kind::thin_dielectric || kind == material_kind::thin_metallic_roughness;
+  }
+
+  WFPG_HD bool is_black() const {
+    if (kind == material_kind::metallic_roughness || kind == material_kind::thin_metallic_roughness)
+      return !(factors.specular > 0.0f || wfpg::luminance(colour) > 0.0f ||
+               (factors.diffuse_transmission > 0.0f && wfpg::luminance(vec3(transmitted_colour)) > 0.0f));
+    const bool needs_colour = kind == material_kind::lambert || kind == material_kind::mirror;
+    return needs_colour && !(wfpg::luminance(colour) > 0.0f);
+  }
+
+  WFPG_HD bool reflects(vec3 outgoing, vec3 incident) const {
+    return glm::dot(outgoing, normal) > 0.0f && glm::dot(outgoing, geometric_normal) > 0.0f &&
+           glm::dot(incident, normal) > 0.0f && glm::dot(incident, geometric_normal) > 0.0f;
+  }
+
+  WFPG_HD float relative_ior(float outgoing_cosine) const {
+    return outgoing_cosine > 0.0f ? ior : 1.0f / ior;
+  }
+
+  // How often a plastic's sample comes from its coat: as the two reflect, but neither is ever left out.
+  WFPG_HD float coat_probability(float cosine) const {
+    const float base = wfpg::luminance(colour);
+    if (!(base > 0.0f)) return 1.0f;
+    const float coat = fresnel_dielectric(cosine, ior);
+    return glm::min(0.9f, glm::max(0.1f, coat / (coat + (1.0f - coat) * base)));
+  }
+
+  WFPG_HD static float side_of(float cosine) { return cosine < 0.0f ? -1.0f : 1.0f; }
+
+  /// Two directions turned so that `outgoing` is above the surface, where light can go from one to the other.
+  struct local_pair {
+    vec3 outgoing, incident;
+    float side;
+    bool exists;
+
+    WFPG_HD local_pair(const bsdf& f, vec3 world_outgoing, vec3 world_incident) {
+      const frame local(f.normal);
+      outgoing = local.to_local(world_outgoing);
+      incident = local.to_local(world_incident);
+      side = side_of(outgoing.z);
+      exists = outgoing.z * glm::dot(world_outgoing, f.geometric_normal) > 0.0f &&
+               incident.z * glm::dot(world_incident, f.geometric_normal) > 0.0f &&
+               (f.transmits() || (outgoing.z > 0.0f && incident.z > 0.0f)) && !f.is_black();
+      outgoing = side * outgoing;
+      incident = side * incident;
+    }
+  };
+
+  /// All lobes as the side of `outgoing` sees them.
+  WFPG_HD metallic_roughness lobes(float side) const {
+    lobe_factors shares = factors;
+    if (kind == material_kind::rough_dielectric) shares.specular = shares.transmission = unorm8(1.0f);
+    const bool solid = shares.transmits() && !is_thin();
+    return {colour, vec3(transmitted_colour), shares, alpha, solid ? relative_ior(side) : ior, is_thin()};
+  }
+
+  WFPG_HD wfpg::bsdf_sample sample_dielectric(vec3 outgoing, float u) const {
+    const float above = glm::dot(outgoing, normal);
+    const vec3 facing = above < 0.0f ? -normal : normal;
+    const float cosine = std::abs(above);
+    const float eta = relative_ior(above);
+    const float reflected = fresnel_dielectric(cosine, eta);
+    const bool reflect = u < reflected;
+    const vec3 incident =
+        glm::normalize(reflect ? mirrored(outgoing, facing) : refracted(outgoing, facing, eta));
+    const bool same_side = glm::dot(outgoing, geometric_normal) * glm::dot(incident, geometric_normal) > 0.0f;
+    if (same_side != reflect) return {};
+    return {incident, reflect ? reflected : 1.0f - reflected};
+  }
+
+  WFPG_HD wfpg::bsdf_sample sample_thin_dielectric(vec3 outgoing, float u) const {
+    const float reflected = fresnel_dielectric(std::abs(glm::dot(outgoing, normal)), ior);
+    if (u >= reflected) return {-outgoing, 1.0f - reflected};
+    const vec3 incident = mirrored(outgoing, normal);
+    const bool same_side = glm::dot(outgoing, geometric_normal) * glm::dot(incident, geometric_normal) > 0.0f;
+    return {incident, same_side ? reflected : 0.0f};
+  }
+};
+
+static_assert(wfpg::is_bsdf_v<bsdf> && wfpg::has_separate_parts_v<bsdf> &&
+              std::is_trivially_copyable_v<bsdf>);
+
+}  // namespace render

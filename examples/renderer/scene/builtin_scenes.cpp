@@ -1,0 +1,277 @@
+// The built-in scenes: one function a scene.
+#include "scene/builtin_scenes.hpp"
+
+#include "scene/scene_builder.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace render {
+namespace {
+
+constexpr vec3 red{0.65f, 0.05f, 0.05f};
+constexpr vec3 green{0.12f, 0.45f, 0.15f};
+constexpr vec3 up{0.0f, 1.0f, 0.0f};
+
+/// A block of the published Cornell data: its top, corners in order, and its height; sides go down to the
+/// floor.
+void cornell_block(scene_builder& builder, const vec2 (&top)[4], float height, std::uint32_t material_index) {
+  const vec2 centre = 0.25f * (top[0] + top[1] + top[2] + top[3]);
+  const auto at = [](vec2 p, float y) { return 0.01f * vec3(p.x, y, p.y); };
+  builder.quad({at(top[0], height), at(top[1], height), at(top[2], height), at(top[3], height)}, up,
+               material_index);
+  for (int i = 0; i < 4; ++i) {
+    const vec2 a = top[i], b = top[(i + 1) % 4], out = 0.5f * (a + b) - centre;
+    builder.quad({at(a, 0.0f), at(b, 0.0f), at(b, height), at(a, height)}, {out.x, 0.0f, out.y},
+                 material_index);
+  }
+}
+
+scene cornell_box() {
+  scene_builder b("cornell-box");
+  const auto white = b.diffuse({0.73f, 0.73f, 0.73f}), left = b.diffuse(red), right = b.diffuse(green);
+  const auto light = b.lamp({17.0f, 12.0f, 4.0f});
+  const auto at = [](float x, float y, float z) { return 0.01f * vec3(x, y, z); };
+  // The published room is not quite a box: the left wall leans outwards.
+  b.quad({at(552.8f, 0, 0), at(0, 0, 0), at(0, 0, 559.2f), at(549.6f, 0, 559.2f)}, up, white);
+  b.quad({at(556, 548.8f, 0), at(556, 548.8f, 559.2f), at(0, 548.8f, 559.2f), at(0, 548.8f, 0)}, -up, white);
+  b.quad({at(549.6f, 0, 559.2f), at(0, 0, 559.2f), at(0, 548.8f, 559.2f), at(556, 548.8f, 559.2f)},
+         {0.0f, 0.0f, -1.0f}, white);
+  b.quad({at(0, 0, 559.2f), at(0, 0, 0), at(0, 548.8f, 0), at(0, 548.8f, 559.2f)}, {1.0f, 0.0f, 0.0f}, right);
+  b.quad({at(552.8f, 0, 0), at(549.6f, 0, 559.2f), at(556, 548.8f, 559.2f), at(556, 548.8f, 0)},
+         {-1.0f, 0.0f, 0.0f}, left);
+  cornell_block(b, {{130, 65}, {82, 225}, {240, 272}, {290, 114}}, 165.0f, white);
+  cornell_block(b, {{423, 247}, {265, 296}, {314, 456}, {472, 406}}, 330.0f, white);
+  // Half a unit below the published height, which is the ceiling's: two coplanar surfaces have no order.
+  b.quad({at(343, 548.3f, 227), at(343, 548.3f, 332), at(213, 548.3f, 332), at(213, 548.3f, 227)}, -up,
+         light);
+  // Film 0.025 square, focal length 0.035.
+  b.look(at(278, 273, -800), at(278, 273, 0), 2.0f * std::atan(0.0125f / 0.035f));
+  return b.finish(8);
+}
+
+scene cornell_enclosed() {
+  scene_builder b("cornell-enclosed");
+  const auto white = b.diffuse(vec3(0.75f)), left = b.diffuse(red), right = b.diffuse(green);
+  const auto light = b.lamp({18.0f, 14.0f, 7.0f});
+  material smooth_glass;
+  smooth_glass.kind = material_kind::dielectric;
+  smooth_glass.base_color = vec3(1.0f);
+  const auto glass = b.add(smooth_glass);
+  b.room({{-1.0f, 0.0f, -1.0f}, {1.0f, 2.0f, 1.0f}},
+         {left, right, white, white, white, room_materials::open});
+  b.box({{-0.33f, 0.6f, -0.29f}, {0.6f, 1.2f, 0.6f}, 0.3f}, white);
+  b.box({{0.35f, 0.3f, 0.33f}, {0.6f, 0.6f, 0.6f}, -0.3f}, white);
+  const vec3 lamp_centre(0.0f, 1.8f, 0.0f);
+  b.ceiling_lamp(lamp_centre, {0.47f, 0.38f}, light);
+  b.box({lamp_centre, {0.70f, 0.24f, 0.60f}}, glass);
+  b.look({0.0f, 1.0f, 3.9f}, {0.0f, 1.0f, 0.0f}, 0.686f);
+  return b.finish(8);
+}
+
+/// A box with a wall in its middle that goes to the floor, the ceiling and the back, and leaves a way in
+/// front.
+scene cornell_wall() {
+  scene_builder b("cornell-wall");
+  const auto white = b.diffuse(vec3(0.75f)), left = b.diffuse(red), right = b.diffuse(green);
+  const auto light = b.lamp({60.0f, 48.0f, 27.0f});
+  b.room({{-1.0f, 0.0f, -1.0f}, {1.0f, 2.0f, 1.0f}},
+         {left, right, white, white, white, room_materials::open});
+  for (float sign : {-1.0f, 1.0f})
+    b.parallelogram({0.04f * sign, 0.0f, -1.0f}, {0.0f, 2.0f, 0.0f}, {0.0f, 0.0f, 1.1f},
+                    {{sign, 0.0f, 0.0f}, white});
+  b.parallelogram({-0.04f, 0.0f, 0.1f}, {0.08f, 0.0f, 0.0f}, {0.0f, 2.0f, 0.0f}, {{0.0f, 0.0f, 1.0f}, white});
+  b.box({{-0.55f, 0.6f, -0.35f}, {0.45f, 1.2f, 0.45f}, 0.3f}, white);
+  b.box({{0.5f, 0.25f, -0.1f}, {0.5f, 0.5f, 0.5f}, -0.3f}, white);
+  // So far back that the wall's edge hides it from all of the left half.
+  b.ceiling_lamp({0.55f, 1.99f, -0.7f}, {0.4f, 0.3f}, light);
+  b.look({0.0f, 1.0f, 3.9f}, {0.0f, 1.0f, 0.0f}, 0.686f);
+  return b.finish(8);
+}
+
+/// The separating wall of `ajar`, z in [-0.05, 0.05], with a doorway 1.0 wide and 2.2 high in its middle.
+/// Only the faces that can be seen are made.
+void wall_with_doorway(scene_builder& b, std::uint32_t material_index) {
+  for (float sign : {-1.0f, 1.0f}) {
+    const vec3 facing(0.0f, 0.0f, sign);
+    const float z = 0.05f * sign;
+    b.parallelogram({-2.0f, 0.0f, z}, {1.5f, 0.0f, 0.0f}, {0.0f, 3.0f, 0.0f}, {facing, material_index});
+    b.parallelogram({0.5f, 0.0f, z}, {1.5f, 0.0f, 0.0f}, {0.0f, 3.0f, 0.0f}, {facing, material_index});
+    b.parallelogram({-0.5f, 2.2f, z}, {1.0f, 0.0f, 0.0f}, {0.0f, 0.8f, 0.0f}, {facing, material_index});
+    b.parallelogram({0.5f * sign, 0.0f, -0.05f}, {0.0f, 2.2f, 0.0f}, {0.0f, 0.0f, 0.1f},
+                    {{-sign, 0.0f, 0.0f}, material_index});
+  }
+  b.parallelogram({-0.5f, 2.2f, -0.05f}, {1.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.1f}, {-up, material_index});
+}
+
+scene ajar() {
+  scene_builder b("ajar");
+  const auto white = b.diffuse(vec3(0.75f)), wood = b.diffuse({0.6f, 0.42f, 0.28f});
+  const auto light = b.lamp(vec3(6000.0f));
+  const auto floor = b.glossy(material_kind::plastic, {0.5f, 0.45f, 0.4f}, 0.25f);
+  const auto brass = b.glossy(material_kind::conductor, {0.95f, 0.79f, 0.55f}, 0.2f);
+  // Two rooms of 4 x 3 x 4 and the thickness of the wall between them; z > 0 is the dark one.
+  b.room({{-2.0f, 0.0f, -4.05f}, {2.0f, 3.0f, 4.05f}}, {white, white, floor, white, white, white});
+  wall_with_doorway(b, white);
+  // The hinge is at x = -0.5 and the door opens into the dark room, 0.24 m at its free edge.
+  const vec3 hinge(-0.5f, 1.1f, 0.0f);
+  const float angle = -0.25f;
+  b.box({hinge + turned({0.49f, 0.0f, 0.0f}, angle), {0.98f, 2.18f, 0.04f}, angle}, wood);
+  b.box({{0.85f, 0.3f, 0.95f}, {0.6f, 0.6f, 0.6f}, 0.5f}, brass);
+  // On the side of the door's free edge: the door then hides the lamp from the dark room.
+  b.ceiling_lamp({1.7f, 2.9f, -3.75f}, {0.3f, 0.3f}, light);
+  b.look({-0.4f, 1.6f, 3.85f}, {0.1f, 1.2f, 0.0f}, 0.9f);
+  return b.finish(8);
+}
+
+scene thin_wall() {
+  scene_builder b("thin-wall");
+  const auto white = b.diffuse(vec3(0.75f)), back = b.diffuse(green),
+             divider = b.diffuse({0.7f, 0.6f, 0.45f});
+  const auto light = b.lamp(vec3(200.0f));
+  b.room({{-2.0f, 0.0f, -2.0f}, {2.0f, 3.0f, 2.0f}}, {white, white, white, white, back, white});
+  b.parallelogram({0.0f, 0.0f, -2.0f}, {0.0f, 0.0f, 4.0f}, {0.0f, 2.6f, 0.0f}, {{1.0f, 0.0f, 0.0f}, divider});
+  b.box({{1.1f, 0.35f, -1.0f}, {0.7f, 0.7f, 0.7f}, 0.4f}, white);
+  b.ceiling_lamp({-1.0f, 2.5f, 0.0f}, {0.4f, 0.4f}, light);
+  b.look({1.7f, 1.5f, 1.85f}, {0.6f, 1.5f, -1.0f}, 1.1f);
+  return b.finish(6);
+}
+
+scene glossy_room() {
+  scene_builder b("glossy-room");
+  const auto white = b.diffuse(vec3(0.75f));
+  const auto steel = b.glossy(material_kind::conductor, vec3(0.75f), 0.3f),
+             copper = b.glossy(material_kind::conductor, {0.9f, 0.6f, 0.45f}, 0.3f);
+  const auto light = b.lamp(vec3(150.0f));
+  b.room({{-2.0f, 0.0f, -2.0f}, {2.0f, 3.0f, 2.0f}}, {copper, steel, steel, white, steel, steel});
+  // A trough hides the lamp from below: all light comes by way of the ceiling.
+  b.parallelogram({-1.5f, 2.2f, -1.9f}, {0.5f, 0.0f, 0.0f}, {0.0f, 0.0f, 3.0f}, {-up, white});
+  b.parallelogram({-1.5f, 2.2f, -1.9f}, {0.0f, 0.25f, 0.0f}, {0.0f, 0.0f, 3.0f},
+                  {{-1.0f, 0.0f, 0.0f}, white});
+  b.parallelogram({-1.0f, 2.2f, -1.9f}, {0.0f, 0.25f, 0.0f}, {0.0f, 0.0f, 3.0f}, {{1.0f, 0.0f, 0.0f}, white});
+  b.parallelogram({-1.35f, 2.25f, -1.0f}, {0.2f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.2f}, {up, light});
+  b.box({{0.7f, 0.4f, -0.6f}, {0.8f, 0.8f, 0.8f}, 0.4f}, copper);
+  b.look({0.9f, 1.5f, 1.85f}, {-0.1f, 1.2f, -1.0f}, 1.1f);
+  return b.finish(8);
+}
+
+/// Four rooms in a row, z from 1.5 to -8.5, with three lamps each, and walls without thickness between them
+/// that leave a passage on alternate sides.
+scene many_lamps() {
+  scene_builder b("many-lamps");
+  const auto white = b.diffuse(vec3(0.7f)), left = b.diffuse(red), right = b.diffuse(green);
+  const auto floor = b.glossy(material_kind::plastic, {0.45f, 0.42f, 0.38f}, 0.2f);
+  b.room({{-2.0f, 0.0f, -8.5f}, {2.0f, 3.0f, 1.5f}}, {left, right, floor, white, white, white});
+  const float brightness[4][3] = {
+      {40.0f, 5.0f, 15.0f}, {2.0f, 30.0f, 8.0f}, {60.0f, 1.0f, 15.0f}, {5.0f, 90.0f, 40.0f}};
+  for (int room = 0; room < 4; ++room) {
+    const float z = 0.25f - 2.5f * static_cast<float>(room);
+    if (room > 0)
+      b.parallelogram({room % 2 == 1 ? -2.0f : -0.8f, 0.0f, z + 1.25f}, {2.8f, 0.0f, 0.0f},
+                      {0.0f, 3.0f, 0.0f}, {{0.0f, 0.0f, 1.0f}, white});
+    for (int i = 0; i < 3; ++i)
+      b.ceiling_lamp({1.3f * static_cast<float>(i - 1), 2.6f, z}, {0.3f, 0.15f},
+                     b.lamp(brightness[room][i] * vec3(1.0f, 0.8f, 0.55f)));
+  }
+  b.box({{0.6f, 0.3f, -0.4f}, {0.6f, 0.6f, 0.6f}, 0.4f}, white);
+  scene s = b.finish(8);
+  punctual_light bulb;
+  bulb.position = {-1.6f, 0.9f, -2.0f};
+  bulb.intensity = {0.2f, 0.4f, 1.0f};
+  punctual_light spot;
+  spot.kind = punctual_kind::spot;
+  spot.position = {-1.5f, 2.8f, 0.2f};
+  spot.direction = glm::normalize(vec3(0.6f, -1.0f, -0.4f));
+  spot.intensity = vec3(3.0f);
+  spot.cos_inner = 0.95f;
+  spot.cos_outer = 0.9f;
+  s.punctual_lights = {bulb, spot};
+  s.view.position = {-1.6f, 1.7f, 1.4f};
+  s.view.forward = glm::normalize(vec3(0.75f, -0.12f, -1.0f));
+  s.view.up = up;
+  s.view.vertical_fov = 1.1f;
+  return s;
+}
+
+/// A closed room of 4 x 3.2 x 4 whose walls hold the water; the camera is in it.
+scene caustic_pool() {
+  scene_builder b("caustic-pool");
+  const auto white = b.diffuse(vec3(0.75f)), tiles = b.diffuse({0.35f, 0.55f, 0.6f}),
+             stone = b.diffuse({0.7f, 0.65f, 0.55f});
+  const auto light = b.lamp(vec3(50.0f));
+  material smooth_water;
+  smooth_water.kind = material_kind::dielectric;
+  smooth_water.base_color = vec3(1.0f);
+  smooth_water.ior = 1.33f;
+  const auto water = b.add(smooth_water);
+  b.room({{-2.0f, 0.0f, -2.0f}, {2.0f, 3.2f, 2.0f}}, {tiles, tiles, white, white, tiles, tiles});
+  b.box({{0.7f, 0.3f, -0.9f}, {0.6f, 0.6f, 0.6f}, 0.4f}, stone);
+  // Waves of less than a metre, whose crests focus about as deep as the floor. The sheet goes on behind the
+  // walls, so that no path gets past its edge.
+  const water_surface surface(1.2f, {{{7.3f, 2.9f}, 0.018f, 0.3f},
+                                     {{-4.3f, 8.3f}, 0.013f, 1.7f},
+                                     {{10.9f, -6.4f}, 0.007f, 4.1f},
+                                     {{5.6f, 13.7f}, 0.0045f, 2.6f}});
+  b.water(surface, 2.02f, 64, water);
+  b.ceiling_lamp({0.0f, 3.15f, -0.4f}, {0.4f, 0.4f}, light);
+  b.look({-0.4f, 0.95f, 1.9f}, {0.0f, 0.4f, -0.4f}, 1.2f);
+  return b.finish(8);
+}
+
+scene furnace() {
+  scene_builder b("furnace");
+  material wall;
+  wall.base_color = vec3(0.5f);
+  wall.emission = vec3(1.0f);
+  const auto m = b.add(wall);
+  b.room({vec3(-1.0f), vec3(1.0f)}, {m, m, m, m, m, m});
+  b.look({0.1f, 0.2f, 0.7f}, {0.0f, 0.0f, -1.0f}, 0.9f);
+  return b.finish(8);
+}
+
+using maker = scene (*)();
+
+const std::vector<std::pair<std::string, maker>>& makers() {
+  static const std::vector<std::pair<std::string, maker>> all = {{"cornell-box", cornell_box},
+                                                                 {"cornell-enclosed", cornell_enclosed},
+                                                                 {"cornell-wall", cornell_wall},
+                                                                 {"ajar", ajar},
+                                                                 {"thin-wall", thin_wall},
+                                                                 {"glossy-room", glossy_room},
+                                                                 {"caustic-pool", caustic_pool},
+                                                                 {"many-lamps", many_lamps},
+                                                                 {"furnace", furnace}};
+  return all;
+}
+
+}  // namespace
+
+std::vector<std::string> builtin_scene_names() {
+  std::vector<std::string> names;
+  for (const auto& entry : makers()) names.push_back(entry.first);
+  return names;
+}
+
+bool is_builtin_scene(const std::string& name) {
+  for (const auto& entry : makers())
+    if (entry.first == name) return true;
+  return false;
+}
+
+scene make_builtin_scene(const std::string& name) {
+  std::string known;
+  for (const auto& entry : makers()) {
+    if (entry.first == name) return entry.second();
+    known += (known.empty() ? "" : ", ") + entry.first;
+  }
+  throw std::invalid_argument("unknown built-in scene '" + name + "', known are: " + known);
+}
+
+double furnace_radiance(int max_depth) {
+  double sum = 0.0, term = 1.0;
+  for (int k = 0; k < max_depth; ++k, term *= 0.5) sum += term;
+  return sum;
+}
+
+}  // namespace render

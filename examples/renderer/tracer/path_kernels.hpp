@@ -1,0 +1,341 @@
+// The kernels of a wave: functors of an index, that read and write what path_state.hpp describes.
+// A Recorder is what wfpg::path_guider::recorder() gives, or one that does nothing.
+#pragma once
+
+#include "scene/camera.hpp"
+#include "tracer/path_state.hpp"
+
+#include <wfpg/sampling/mis.hpp>
+#include <wfpg/sampling/sampled_direction.hpp>
+
+namespace render {
+
+/// Which vertex of which sample a wave is at; depth counts vertices from 0, the camera's first hit.
+struct wave_position {
+  random_stream random;
+  std::uint32_t depth = 0;
+  std::uint32_t max_depth = 1;  ///< vertices of a path, at most
+
+  WFPG_HD bool is_last() const { return depth + 1 >= max_depth; }
+  WFPG_HD std::uint32_t first_dimension() const { return depth * dimension::per_vertex; }
+  WFPG_HD vec2 draw(std::uint32_t path, std::uint32_t use) const {
+    return random(path, first_dimension() + use);
+  }
+};
+
+/// The lights as paths meet them: by chance, and by next-event estimation where that is on.
+struct path_lights {
+  scene_view scene;
+  light_view lights;
+  bool next_event = true;
+  wfpg::light_guide_view guide = {};  ///< empty: lights are chosen by power
+
+  /// The group of lights that a vertex asks.
+  WFPG_HD wfpg::light_choice choose(const path_vertex& vertex, float u) const {
+    return guide.empty() ? wfpg::light_choice{} : guide.choose(row(vertex), u);
+  }
+  /// How much more likely than by power a vertex chooses a group.
+  WFPG_HD float preference(const path_vertex& vertex, std::uint32_t group) const {
+    return guide.empty() ? 1.0f : guide.probability(row(vertex), group) / lights.groups[group].share;
+  }
+
+ private:
+  WFPG_HD std::uint32_t row(const path_vertex& vertex) const {
+    return guide.find(vertex.position, vertex.geometric_normal);
+  }
+};
+
+/// Starts a path through each pixel. A Camera is a pinhole, or what has its through().
+template <class Camera>
+struct start_paths {
+  Camera camera;
+  random_stream random;
+  tiled_view<path_state> paths;
+  wfpg::array_view<vec3> radiance;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const auto pixel = static_cast<std::uint32_t>(i);
+    paths.emplace(i, camera.through(pixel, random(pixel, dimension::pixel)));
+    radiance[i] = vec3(0.0f);
+  }
+};
+
+/// What kernels ask an inline caster.
+template <class Caster>
+struct inline_answers {
+  Caster caster;
+
+  WFPG_HD triangle_hit hit(std::size_t, const wfpg::ray& ray) const { return caster.intersect(ray); }
+  WFPG_HD bool is_hidden(std::size_t, const wfpg::ray& ray) const { return caster.occluded(ray); }
+  WFPG_HD void asks_nothing(std::size_t) const {}
+};
+
+/// The same of a batch caster, which the kernel before has left its rays.
+struct batch_hits {
+  wfpg::array_view<const triangle_hit> hits;
+
+  WFPG_HD triangle_hit hit(std::size_t i, const wfpg::ray&) const { return hits[i]; }
+};
+
+/// Leaves a batch caster the rays of which drop_hidden will have the answers.
+struct batch_questions {
+  wfpg::array_view<wfpg::ray> rays;
+
+  WFPG_HD bool is_hidden(std::size_t i, const wfpg::ray& ray) const {
+    rays[i] = ray;
+    return false;
+  }
+  WFPG_HD void asks_nothing(std::size_t i) const { rays[i] = no_ray(); }
+
+  /// One that no batch caster traces.
+  WFPG_HD static wfpg::ray no_ray() {
+    wfpg::ray ray;
+    ray.t_max = 0.0f;
+    return ray;
+  }
+};
+
+/// Leaves a batch caster the rays of the paths.
+struct write_rays {
+  path_queue queue;
+  tiled_view<path_state> paths;
+  wfpg::array_view<wfpg::ray> rays;
+
+  WFPG_HD void operator()(std::size_t slot) const {
+    rays[slot] = batch_questions::no_ray();
+    if (!queue.holds(slot)) return;
+    const path_state& path = paths[queue[slot]];
+    if (path.active) rays[slot] = path.ray();
+  }
+};
+
+/// Finds the next vertex of each path that may still go on, gathers what it emits, and names the queue that
+/// the path goes to.
+template <class Answers, class Recorder>
+struct trace_paths {
+  wave_position at;
+  path_lights world;
+  Answers answers;
+  Recorder recorder;
+  path_queue queue;  ///< of the vertex before
+  tiled_view<path_state> paths;
+  tiled_view<path_vertex> vertices;
+  wfpg::array_view<std::uint32_t> keys;  ///< the material's kind, or excluded
+  wfpg::array_view<vec3> radiance;
+  wfpg::array_view<std::uint32_t> segments;
+  wfpg::array_view<std::uint32_t> light_hits;  ///< segments that ended where light is emitted toward them
+  std::uint32_t excluded;
+
+  WFPG_HD void operator()(std::size_t slot) const {
+    if (!queue.holds(slot)) return;
+    const std::uint32_t id = queue[slot];
+    keys[id] = excluded;
+    const path_state& path = paths[id];
+    if (!path.active) return;
+    ++segments[id];
+    const triangle_hit hit = answers.hit(slot, path.ray());
+    if (!hit.is_hit()) {
+      recorder.escape(id, at.depth, path.throughput);
+      const vec3 sky = world.scene.environment.radiance(path.direction);
+      count_light(id, sky);
+      gather(id, path.throughput * sky * environment_weight(id, path));
+      return end(id);
+    }
+    const hit_surface found = world.scene.surface(hit, -path.direction);
+    const wfpg::surface<bsdf>& surface = found.surface;
+    const vec3 before = path.throughput, throughput = before * absorb(id, path, found);
+    recorder.vertex(id, at.depth, surface.position, surface.outgoing, throughput);
+    count_light(id, found.emission);
+    gather(id, throughput * found.emission * emission_weight(id, path, hit, found));
+    if (at.is_last()) return end(id);
+    vertices.emplace(id, found);
+    keys[id] = static_cast<std::uint32_t>(surface.bsdf.kind);
+  }
+
+ private:
+  WFPG_HD void end(std::uint32_t id) const {
+    paths.update(id, [](path_state& path) { path.active = 0; });
+  }
+
+  // What a solid leaves of the light along the path's last segment, which is inside where it ends at its
+  // back.
+  WFPG_HD vec3 absorb(std::uint32_t id, const path_state& path, const hit_surface& found) const {
+    if (found.absorption == vec3(0.0f)) return vec3(1.0f);
+    const vec3 left = glm::exp(-found.absorption * glm::length(found.surface.position - path.origin));
+    paths.update(id, [&](path_state& p) {
+      p.throughput *= left;
+      p.reflectance *= wfpg::luminance(left);
+    });
+    return left;
+  }
+
+  WFPG_HD void count_light(std::uint32_t id, vec3 emitted) const {
+    if (emitted != vec3(0.0f)) ++light_hits[id];
+  }
+
+  WFPG_HD void gather(std::uint32_t id, vec3 contribution) const {
+    if (contribution == vec3(0.0f)) return;
+    radiance[id] += contribution;
+    recorder.emission(id, at.depth, contribution);
+  }
+
+  WFPG_HD float environment_weight(std::uint32_t id, const path_state& path) const {
+    if (!world.next_event || !(path.pdf > 0.0f)) return 1.0f;
+    const float pdf = world.lights.environment_pdf(world.scene.environment, path.direction);
+    if (!(pdf > 0.0f)) return 1.0f;
+    return wfpg::power_heuristic(path.pdf, pdf * world.preference(vertices[id], world.lights.sky_group()));
+  }
+
+  // Against next-event estimation at the vertex before, which could have found the same point.
+  WFPG_HD float emission_weight(std::uint32_t id, const path_state& path, const triangle_hit& hit,
+                                const hit_surface& found) const {
+    if (!world.next_event || !(path.pdf > 0.0f) || found.emission == vec3(0.0f)) return 1.0f;
+    const vec3 normal = found.surface.geometric_normal;
+    const float cosine = std::abs(glm::dot(normal, path.direction));
+    const float distance = glm::length(found.surface.position - path.origin);
+    const float pdf = world.lights.pdf(found.emitted_luminance) *
+                      world.preference(vertices[id], world.lights.group_of(hit.triangle));
+    return wfpg::power_heuristic(path.pdf, solid_angle_pdf(pdf, distance, cosine));
+  }
+};
+
+/// Next-event estimation up to its weight: draws a point of a light for each slot and looks whether it is
+/// seen.
+template <class Answers>
+struct query_lights {
+  wave_position at;
+  path_lights world;
+  Answers answers;
+  path_queue queue;
+  tiled_view<path_vertex> vertices;
+  tiled_view<light_query> queries;
+
+  WFPG_HD void operator()(std::size_t slot) const {
+    answers.asks_nothing(slot);
+    queries.emplace(slot, queue.holds(slot) ? query(slot, queue[slot]) : light_query{});
+  }
+
+ private:
+  WFPG_HD light_query query(std::size_t slot, std::uint32_t path) const {
+    const path_vertex& vertex = vertices[path];
+    const bsdf scatters = vertex.bsdf();
+    if (scatters.is_delta()) return {};
+    const wfpg::light_choice choice = world.choose(vertex, at.draw(path, dimension::light_group).x);
+    const light_sample light = world.lights.sample(world.scene, vertex.position, choice,
+                                                   [&](std::uint32_t use) { return at.draw(path, use); });
+    const light_query nothing(choice.key);
+    if (!(light.pdf > 0.0f)) return nothing;
+    light_query result = nothing;
+    result.direction = light.direction;
+    result.pdf = light.is_delta ? unrivalled_pdf : light.pdf;
+    result.value = scatters.eval_rgb(vertex.outgoing, light.direction) * light.radiance / light.pdf;
+    if (!(wfpg::luminance(result.value) > 0.0f)) return nothing;
+    return is_hidden(slot, vertex, light) ? nothing : result;
+  }
+
+  WFPG_HD bool is_hidden(std::size_t slot, const path_vertex& vertex, const light_sample& light) const {
+    wfpg::ray ray;
+    ray.origin = leave_surface(vertex.position, vertex.geometric_normal, light.direction, vertex.offset);
+    ray.direction = light.direction;
+    if (!light.is_distant) {
+      ray.t_max = glm::length(light.end - ray.origin);
+      if (!(ray.t_max > 0.0f)) return false;
+      ray.direction = (light.end - ray.origin) / ray.t_max;
+    }
+    return answers.is_hidden(slot, ray);
+  }
+
+  // Beside this every density is as good as 0: nothing else finds a light without extent.
+  static constexpr float unrivalled_pdf = 1e30f;
+};
+
+/// Forgets the light samples that a batch caster found hidden.
+struct drop_hidden {
+  wfpg::array_view<const std::uint32_t> hidden;
+  tiled_view<light_query> queries;
+
+  WFPG_HD void operator()(std::size_t slot) const {
+    if (hidden[slot] != 0) queries.emplace(slot, light_query(queries[slot].choice));
+  }
+};
+
+/// Adds each slot's light sample with its MIS weight, and sends the path along the direction drawn for it.
+template <class Recorder>
+struct shade_paths {
+  wave_position at;
+  Recorder recorder;
+  path_queue queue;
+  tiled_view<path_vertex> vertices;
+  tiled_view<light_query> queries;          ///< empty: no next-event estimation
+  wfpg::array_view<const float> densities;  ///< the mixture's, of the queries' directions
+  wfpg::array_view<const wfpg::sampled_direction> directions;
+  tiled_view<path_state> paths;
+  wfpg::array_view<vec3> radiance;
+  wfpg::light_guide_view lights;
+  std::uint32_t roulette_depth;  ///< paths go on from vertices before it
+
+  WFPG_HD void operator()(std::size_t slot) const {
+    if (!queue.holds(slot)) return;
+    const std::uint32_t id = queue[slot];
+    if (!queries.empty()) add_light(slot, id);
+    recorder.scatter(id, at.depth, directions[slot]);
+    paths.update(id, [&](path_state& path) {
+      const bool goes_on = scatter(vertices[id], directions[slot], path) &&
+                           survive_roulette(path, at.draw(id, dimension::roulette).x);
+      path.active = goes_on ? 1 : 0;
+    });
+  }
+
+ private:
+  // Bounces are spared while a tenth of the light is left: ending those added more noise than it saved time.
+  static constexpr float spared_reflectance = 0.1f;
+
+  WFPG_HD void add_light(std::size_t slot, std::uint32_t id) const {
+    const light_query& query = queries[slot];
+    if (query.direction == vec3(0.0f)) return lights.deposit(id, query.choice, 0.0f);
+    const vec3 scattered = query.value * wfpg::power_heuristic(query.pdf, densities[slot]);
+    lights.deposit(id, query.choice, wfpg::luminance(scattered));
+    const vec3 contribution = paths[id].throughput * scattered;
+    radiance[id] += contribution;
+    recorder.radiance(id, at.depth, contribution);
+  }
+
+  // False where the path ends.
+  WFPG_HD bool scatter(const path_vertex& vertex, const wfpg::sampled_direction& drawn,
+                       path_state& path) const {
+    if (drawn.technique == wfpg::sampling_technique::none || !(drawn.pdf > 0.0f)) return false;
+    const bool delta = drawn.technique == wfpg::sampling_technique::delta;
+    const bsdf scatters = vertex.bsdf();
+    const vec3 weight = delta ? scatters.delta_weight_rgb(vertex.outgoing, drawn.direction)
+                              : scatters.eval_rgb(vertex.outgoing, drawn.direction) / drawn.pdf;
+    if (!(wfpg::luminance(weight) > 0.0f)) return false;
+    path.throughput *= weight;
+    path.reflectance *= scatters.reflectance(vertex.outgoing, drawn.direction);
+    path.pdf = delta ? 0.0f : drawn.pdf;
+    path.origin = leave_surface(vertex.position, vertex.geometric_normal, drawn.direction, vertex.offset);
+    path.direction = drawn.direction;
+    return true;
+  }
+
+  // By the throughput that the path would have if its directions were all drawn from BSDFs. Its real one is
+  // low where guiding is sure of a direction, and those are the paths worth keeping.
+  WFPG_HD bool survive_roulette(path_state& path, float u) const {
+    if (at.depth < roulette_depth) return true;
+    const float probability = glm::min(1.0f, path.reflectance / spared_reflectance);
+    if (!(u < probability)) return false;
+    path.throughput /= probability;
+    path.reflectance /= probability;
+    return true;
+  }
+};
+
+/// Adds a sample to the film.
+struct add_to_film {
+  wfpg::array_view<const vec3> radiance;
+  wfpg::array_view<glm::dvec3> film;
+  double weight;
+
+  WFPG_HD void operator()(std::size_t i) const { film[i] += weight * glm::dvec3(radiance[i]); }
+};
+
+}  // namespace render

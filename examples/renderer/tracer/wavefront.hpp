@@ -1,0 +1,223 @@
+// The path tracer: one sample of every pixel is one wave that goes from vertex to vertex as a whole.
+#pragma once
+
+#include "app/render_state.hpp"
+#include "tracer/path_kernels.hpp"
+#include "tracer/stage_clock.hpp"
+
+#include <wfpg/bins/partitioner.hpp>
+#include <wfpg/exec/buffer.hpp>
+#include <wfpg/host/ray_caster.hpp>
+#include <wfpg/host/wave.hpp>
+
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+namespace render {
+
+struct tracer_settings {
+  int width = 512;              ///< pixels, positive
+  int height = 512;             ///< pixels, positive
+  std::uint32_t max_depth = 8;  ///< vertices of a path and segments from the camera, at least 1
+  std::uint64_t seed = 0;
+  std::uint32_t roulette_depth = 3;  ///< Russian roulette begins at this vertex; the camera's first hit is 0
+};
+
+/// Renders samples of a scene with directions from a guider.
+///
+/// A Caster is one of the guider's that also finds triangles. Inline, it is called inside the kernels:
+///   triangle_hit intersect(const wfpg::ray&) const;  bool occluded(const wfpg::ray&) const;
+/// in batches, between them, and rays with t_max <= t_min are misses:
+///   void intersect(const Exec&, wfpg::array_view<const wfpg::ray>, wfpg::array_view<triangle_hit>) const;
+///   void occluded(const Exec&, wfpg::array_view<const wfpg::ray>, wfpg::array_view<std::uint32_t>) const;
+///
+/// Emission at vertices 1 to max_depth counts; next-event estimation, where it is on, is done at vertices 1
+/// to max_depth - 1, so that both estimate the same sum. Work is ordered by path, never by arrival: one seed
+/// gives one picture on any number of threads.
+template <class Exec, class Caster>
+class path_tracer {
+ public:
+  path_tracer(const Exec& exec, const tracer_settings& settings, const path_lights& world,
+              const Caster& caster)
+      : exec_(exec),
+        settings_(settings),
+        world_(world),
+        caster_(caster),
+        count_(static_cast<std::size_t>(settings.width) * static_cast<std::size_t>(settings.height)),
+        paths_(exec, count_),
+        vertices_(exec, count_),
+        queries_(exec, world.next_event ? count_ : 0),
+        densities_(exec, world.next_event ? count_ : 0),
+        directions_(exec, count_),
+        keys_(exec, count_),
+        segments_(exec, std::vector<std::uint32_t>(count_, 0)),
+        light_hits_(exec, std::vector<std::uint32_t>(count_, 0)),
+        radiance_(exec, count_),
+        film_(exec, std::vector<glm::dvec3>(count_, glm::dvec3(0.0))),
+        partitioner_(exec, count_),
+        rays_(exec, is_inline ? 0 : count_),
+        hits_(exec, is_inline ? 0 : count_),
+        hidden_(exec, is_inline || !world.next_event ? 0 : count_),
+        clock_(exec) {}
+
+  /// Sample number `sample` (from 0) of each pixel; `weight` >= 0 is its share of the picture. Waits for it.
+  /// A Camera is a pinhole, or another that gives rays:
+  ///   wfpg::ray through(std::uint32_t pixel, vec2 offset) const;  offset in [0, 1)² of the pixel
+  template <class Guider, class Camera>
+  void render_sample(Guider& guider, const Camera& camera, std::uint32_t sample, float weight) {
+    wave_position at{{settings_.seed, sample}, 0, settings_.max_depth};
+    clock_.measure("camera", [&] {
+      exec_.for_each(count_, start_paths<Camera>{camera, at.random, paths_.view(), radiance_.view()});
+    });
+    clock_.measure("update", [&] { guider.begin_sample(); });
+    world_.guide = guider.lights();
+    for (path_queue queue{{}, true}; at.depth < at.max_depth; ++at.depth) {
+      trace(guider, at, queue);
+      if (at.is_last()) break;
+      queue = sort_by_material();
+      if (world_.next_event) query(at, queue);
+      sample_directions(guider, at, queue);
+      shade(guider, at, queue);
+    }
+    clock_.measure("update", [&] { guider.end_sample(); });
+    clock_.measure("film", [&] {
+      exec_.for_each(count_, add_to_film{radiance_.view(), film_.view(), static_cast<double>(weight)});
+    });
+    weight_ += static_cast<double>(weight);
+    wfpg::read_element(exec_, radiance_.data());  // waits: who looks at the time sees all of the sample
+    clock_.resolve();
+  }
+
+  /// Weighted mean of the samples, row by row; black where their weights sum to 0.
+  std::vector<vec3> picture() const {
+    std::vector<vec3> pixels;
+    pixels.reserve(count_);
+    for (const glm::dvec3& sum : film_.to_host(exec_))
+      pixels.push_back(weight_ > 0.0 ? vec3(sum / weight_) : vec3(0.0f));
+    return pixels;
+  }
+
+  /// Rays traced to extend paths, shadow rays not among them.
+  std::uint64_t segments() const { return sum_of(segments_, segments_before_); }
+
+  /// Those of them that ended at a surface that emits toward them, or in an environment that does.
+  std::uint64_t light_hits() const { return sum_of(light_hits_, light_hits_before_); }
+
+  /// The samples so far, and to go on from them. Precondition: of a picture of this size.
+  film_state film() const { return {weight_, segments(), light_hits(), film_.to_host(exec_)}; }
+  void restore(const film_state& film) {
+    weight_ = film.weight;
+    segments_before_ = film.segments;
+    light_hits_before_ = film.light_hits;
+    film_ = wfpg::buffer<glm::dvec3, Exec>(exec_, film.sums);
+  }
+
+  const named_seconds& seconds() const { return clock_.seconds(); }
+
+  /// What casts the paths' rays.
+  const Caster& caster() const { return caster_; }
+
+ private:
+  static constexpr bool is_inline = wfpg::is_inline_caster_v<Caster>;
+
+  std::uint64_t sum_of(const wfpg::buffer<std::uint32_t, Exec>& counts, std::uint64_t before) const {
+    const std::vector<std::uint32_t> all = counts.to_host(exec_);
+    return std::accumulate(all.begin(), all.end(), before);
+  }
+
+  template <class Guider>
+  void trace(Guider& guider, const wave_position& at, const path_queue& queue) {
+    clock_.measure("trace", [&] {
+      if constexpr (is_inline) {
+        trace_with(guider, at, queue, inline_answers<Caster>{caster_});
+      } else {
+        exec_.for_each(count_, write_rays{queue, paths_.view(), rays_.view()});
+        caster_.intersect(exec_, wfpg::array_view<const wfpg::ray>(rays_.view()), hits_.view());
+        trace_with(guider, at, queue, batch_hits{hits_.view()});
+      }
+    });
+  }
+
+  template <class Guider, class Answers>
+  void trace_with(Guider& guider, const wave_position& at, const path_queue& queue, const Answers& answers) {
+    auto recorder = guider.recorder();
+    exec_.for_each(count_, trace_paths<Answers, decltype(recorder)>{
+                               at, world_, answers, recorder, queue, paths_.view(), vertices_.view(),
+                               keys_.view(), radiance_.view(), segments_.view(), light_hits_.view(),
+                               wfpg::partitioner<Exec>::excluded});
+  }
+
+  path_queue sort_by_material() {
+    path_queue queue;
+    clock_.measure(
+        "sort", [&] { queue.by_material = partitioner_.partition(exec_, keys_.view(), material_key_bits); });
+    return queue;
+  }
+
+  void query(const wave_position& at, const path_queue& queue) {
+    clock_.measure("lights", [&] {
+      if constexpr (is_inline) {
+        query_with(at, queue, inline_answers<Caster>{caster_});
+      } else {
+        query_with(at, queue, batch_questions{rays_.view()});
+        caster_.occluded(exec_, wfpg::array_view<const wfpg::ray>(rays_.view()), hidden_.view());
+        exec_.for_each(count_, drop_hidden{hidden_.view(), queries_.view()});
+      }
+    });
+  }
+
+  template <class Answers>
+  void query_with(const wave_position& at, const path_queue& queue, const Answers& answers) {
+    exec_.for_each(count_,
+                   query_lights<Answers>{at, world_, answers, queue, vertices_.view(), queries_.view()});
+  }
+
+  template <class Guider>
+  void sample_directions(Guider& guider, const wave_position& at, const path_queue& queue) {
+    clock_.measure("directions", [&] {
+      const wfpg::wave wave{at.depth, count_, queued_surfaces{queue, vertices_.view()},
+                            queued_random{queue, at.random, at.first_dimension() + dimension::direction}};
+      if (world_.next_event)
+        guider.sample_directions(
+            wave, caster_, directions_.view(),
+            wfpg::density_queries{queued_light_directions{queries_.view()}, densities_.view()});
+      else
+        guider.sample_directions(wave, caster_, directions_.view());
+    });
+  }
+
+  template <class Guider>
+  void shade(Guider& guider, const wave_position& at, const path_queue& queue) {
+    clock_.measure("shade", [&] {
+      auto recorder = guider.recorder();
+      exec_.for_each(
+          count_, shade_paths<decltype(recorder)>{at, recorder, queue, vertices_.view(), queries_.view(),
+                                                  densities_.view(), directions_.view(), paths_.view(),
+                                                  radiance_.view(), world_.guide, settings_.roulette_depth});
+    });
+  }
+
+  Exec exec_;
+  tracer_settings settings_;
+  path_lights world_;
+  Caster caster_;
+  std::size_t count_;
+  tiled_array<path_state, Exec> paths_;
+  tiled_array<path_vertex, Exec> vertices_;
+  tiled_array<light_query, Exec> queries_;
+  wfpg::buffer<float, Exec> densities_;
+  wfpg::buffer<wfpg::sampled_direction, Exec> directions_;
+  wfpg::buffer<std::uint32_t, Exec> keys_, segments_, light_hits_;
+  wfpg::buffer<vec3, Exec> radiance_;
+  wfpg::buffer<glm::dvec3, Exec> film_;
+  wfpg::partitioner<Exec> partitioner_;
+  wfpg::buffer<wfpg::ray, Exec> rays_;  // for a batch caster
+  wfpg::buffer<triangle_hit, Exec> hits_;
+  wfpg::buffer<std::uint32_t, Exec> hidden_;
+  double weight_ = 0.0;
+  std::uint64_t segments_before_ = 0, light_hits_before_ = 0;  // of samples that were taken elsewhere
+  policy_clock<Exec> clock_;
+};
+
+}  // namespace render
