@@ -1,5 +1,5 @@
 # cmake -Droot=DIR -P links.cmake: every relative link and picture of the documentation's pages is there.
-file(GLOB pages "${root}/*.md" "${root}/docs/*.md" "${root}/bench/*/*.md")
+file(GLOB pages "${root}/*.md" "${root}/docs/*.md" "${root}/tools/*/*.md")
 set(broken "")
 foreach(page IN LISTS pages)
   file(READ "${page}" text)
