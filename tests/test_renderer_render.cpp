@@ -1,5 +1,7 @@
 // render(): what it refuses, reports and keeps on the way, and guided pictures against path tracing's.
+#include "app/option_names.hpp"
 #include "app/render.hpp"
+#include "casters/embree_caster.hpp"
 #include "scene/builtin_scenes.hpp"
 #include "scene/device_scene.hpp"
 #include "support/catch.hpp"
@@ -12,6 +14,7 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -48,6 +51,22 @@ double mean_of_part(const std::string& name, int max_depth, const int (&columns)
 }
 
 }  // namespace
+
+TEST_CASE("each method has a row and a name", "[renderer]") {
+  CHECK(method_names().size() == std::size(all_methods));
+  for (const method_properties& row : all_methods) {
+    CHECK(&properties_of(row.method) == &row);
+    CHECK(name_of(method_names(), row.method) == row.name);
+  }
+}
+
+TEST_CASE("a policy refuses methods of TBB alone", "[renderer]") {
+  const scene square = square_of({});
+  render_options options;
+  options.method = sampling_method::openpgl_vmm;
+  CHECK_THROWS_AS(render_on<embree_scene>(wfpg::exec::seq(), square, completed(square, options), {}),
+                  std::invalid_argument);
+}
 
 TEST_CASE("scenes and options that cannot be right are refused by name", "[renderer]") {
   const wfpg::exec::seq exec;

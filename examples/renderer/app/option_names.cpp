@@ -3,14 +3,11 @@
 namespace render {
 
 const std::map<std::string, sampling_method>& method_names() {
-  static const std::map<std::string, sampling_method> names = {
-      {"pt", sampling_method::pt},
-      {"wfpg", sampling_method::wfpg},
-      {"wfpg-product", sampling_method::wfpg_product},
-      {"sarsa", sampling_method::sarsa},
-      {"records", sampling_method::records},
-      {"openpgl-vmm", sampling_method::openpgl_vmm},
-      {"openpgl-dqt", sampling_method::openpgl_dqt}};
+  static const std::map<std::string, sampling_method> names = [] {
+    std::map<std::string, sampling_method> result;
+    for (const method_properties& row : all_methods) result.emplace(row.name, row.method);
+    return result;
+  }();
   return names;
 }
 

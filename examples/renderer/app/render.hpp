@@ -2,6 +2,7 @@
 #pragma once
 
 #include "app/image_io.hpp"
+#include "app/methods.hpp"
 #include "tracer/stage_clock.hpp"
 
 #include <wfpg/guides/records/options.hpp>
@@ -17,10 +18,6 @@
 
 namespace render {
 
-/// Path tracing; guided by wfpg's fields, or by their products with BSDFs; by its SARSA grid; by its
-/// irradiance records; by Open PGL's mixtures of von Mises-Fisher lobes, which know of parallax, or by its
-/// quadtrees of directions.
-enum class sampling_method { pt, wfpg, wfpg_product, sarsa, records, openpgl_vmm, openpgl_dqt };
 enum class guiding { oriented, plain };
 enum class fields { kept, transient };
 /// How fields' cones find light: by the scene's ray caster, or through the octree alone, by rays or as cones.
@@ -137,8 +134,7 @@ struct render_report {
 /// How the samples of these options are combined.
 inline wfpg::sample_combination combination_of(const render_options& options) {
   using wfpg::sample_combination;
-  const bool learns = options.method != sampling_method::pt && options.method != sampling_method::records;
-  const bool settled = !learns || !options.load_guide.empty();
+  const bool settled = !properties_of(options.method).learns || !options.load_guide.empty();
   return options.combine.value_or(settled ? sample_combination::constant : sample_combination::pt_linear);
 }
 
@@ -178,7 +174,7 @@ render_result render(const scene& scene, const render_options& options, const pr
 
 /// The same on a policy, whatever options.where says, with the ray caster of an Accelerated, which is made
 /// from the policy, the scene and its arrays there; instantiated in render_seq.cpp, render_omp.cpp and
-/// render_tbb.cpp.
+/// render_tbb.cpp. Throws std::invalid_argument for Open PGL's methods.
 template <class Accelerated, class Exec>
 render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
                         const progress_callback& progress);
@@ -196,18 +192,5 @@ render_result render_with_openpgl(const scene& scene, const render_options& opti
 
 /// False where this was built without Open PGL.
 bool has_openpgl();
-
-inline bool is_wfpg(sampling_method method) {
-  return method == sampling_method::wfpg || method == sampling_method::wfpg_product;
-}
-
-/// What a rendering needs to go on later can be saved.
-inline bool can_be_saved(sampling_method method) {
-  return method == sampling_method::pt || is_wfpg(method);
-}
-
-inline bool is_openpgl(sampling_method method) {
-  return method == sampling_method::openpgl_vmm || method == sampling_method::openpgl_dqt;
-}
 
 }  // namespace render

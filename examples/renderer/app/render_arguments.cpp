@@ -119,7 +119,7 @@ const std::vector<requirement>& requirements() {
        [](options o) { return o.method != sampling_method::pt && !is_openpgl(o.method); }},
       {{"--save-state", "--resume"},
        "--method pt, wfpg or wfpg-product",
-       [](options o) { return can_be_saved(o.method); }},
+       [](options o) { return properties_of(o.method).can_be_saved; }},
       {{"--sarsa-update", "--sarsa-sampler", "--sarsa-resolution", "--sarsa-directions", "--sarsa-step",
         "--sarsa-learning-rate"},
        "--method sarsa",

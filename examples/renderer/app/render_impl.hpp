@@ -17,6 +17,9 @@
 #include <algorithm>
 #include <chrono>
 #include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
 
 namespace render {
 
@@ -162,13 +165,35 @@ inline render_state begin_state(const scene& scene, const render_options& option
   return state;
 }
 
+/// What a method takes its samples with. Everything lives as long as render_by runs.
+template <class Exec, class Caster>
+struct sampling_job {
+  const Exec& exec;
+  const scene& host;
+  const render_options& options;
+  const progress_callback& progress;
+  path_tracer<Exec, Caster>& tracer;
+  const scene_view& geometry;
+  const light_distribution<Exec>& lights;
+  const pinhole& camera;
+  stage_clock& building;  ///< a method adds the time to build its guide
+  render_result& result;  ///< a method adds samples, its guide and what it reports
+
+  wfpg::triangle_mesh_view mesh() const { return {geometry.positions, geometry.triangles}; }
+};
+
+/// A job's samples with directions from `guider`.
+template <class Job, class Guider>
+void take_samples(const Job& job, Guider& guider) {
+  take_samples(job.tracer, guider, job.camera, job.options, job.progress, job.result);
+}
+
 /// Builds what a rendering needs, has its samples taken, and reports. `take` does so with directions from
 /// where it likes:
-///   void operator()(path_tracer<Exec, Caster>&, const scene_view&, const light_distribution<Exec>&,
-///                   const pinhole&, stage_clock& building, render_result&) const;
+///   void operator()(const sampling_job<Exec, Caster>&) const;
 template <class Accelerated, class Exec, class Take>
 render_result render_by(const Exec& exec, const scene& scene, const render_options& options,
-                        const Take& take) {
+                        const progress_callback& progress, const Take& take) {
   const stopwatch total;
   stage_clock building;
   render_result result;
@@ -182,14 +207,17 @@ render_result render_by(const Exec& exec, const scene& scene, const render_optio
                    [&] { accelerated = std::make_unique<const Accelerated>(exec, scene, geometry.view()); });
   const tracer_settings settings{options.width, options.height, static_cast<std::uint32_t>(options.max_depth),
                                  options.seed, static_cast<std::uint32_t>(options.roulette_depth)};
-  path_tracer<Exec, decltype(accelerated->caster())> tracer(
-      exec, settings, {geometry.view(), lights.view(), options.nee}, accelerated->caster());
+  using caster_type = decltype(accelerated->caster());
+  path_tracer<Exec, caster_type> tracer(exec, settings, {geometry.view(), lights.view(), options.nee},
+                                        accelerated->caster());
   const pinhole camera(scene.view, options.width, options.height);
   const render_state before = begin_state(scene, options);
   if (before.samples > 0) tracer.restore(before.film);
   report.spp = before.samples;
   result.guide = before.guide;
-  take(tracer, geometry.view(), lights, camera, building, result);
+  const scene_view view = geometry.view();
+  take(sampling_job<Exec, caster_type>{exec, scene, options, progress, tracer, view, lights, camera, building,
+                                       result});
   report.segments = tracer.segments();
   const double paths = double(report.spp) * double(options.width) * double(options.height);
   report.light_hits_per_path = static_cast<double>(tracer.light_hits()) / paths;
@@ -202,62 +230,84 @@ render_result render_by(const Exec& exec, const scene& scene, const render_optio
   return result;
 }
 
-/// Samples guided by irradiance records, which ask the tracer's caster what is smooth.
-template <class Exec, class Caster, class Take>
-void guide_by_records(const Exec& exec, const path_tracer<Exec, Caster>& tracer, const scene& host,
-                      const scene_view& geometry, const render_options& options, const Take& take) {
+template <class Exec, class Caster>
+void trace_unguided(const sampling_job<Exec, Caster>& job) {
+  unguided<Exec> guider(job.exec);
+  take_samples(job, guider);
+}
+
+template <class Exec, class Caster>
+void guide_by_octree(const sampling_job<Exec, Caster>& job) {
+  const render_options& options = job.options;
+  render_report& report = job.result.report;
+  const stopwatch build;
+  wfpg::path_guider<Exec> guider =
+      begin_guider(job.exec, job.host, job.mesh(), guider_options_of(options, job.lights.shares()), options,
+                   job.result.guide);
+  report.octree.build_seconds = build.seconds();
+  job.building.add("octree", report.octree.build_seconds);
+  // A guide that is loaded has counted another rendering's, one of a state this one's.
+  const wfpg::guider_statistics before =
+      options.load_guide.empty() ? wfpg::guider_statistics() : guider.statistics();
+  if (options.through == cones::scene) {
+    take_samples(job, guider);
+  } else {
+    octree_cone_guider<Exec> with_cones(job.exec, guider, job.geometry.environment, options.through);
+    take_samples(job, with_cones);
+  }
+  report_guider(guider, job.tracer.segments(), report, before);
+  job.result.guide = kept_guide(guider, options);
+}
+
+template <class Exec, class Caster>
+void guide_by_sarsa(const sampling_job<Exec, Caster>& job) {
+  wfpg::path_guider<Exec, wfpg::sarsa_grid<Exec>> guider(job.exec, job.mesh(), sarsa_options_of(job.options));
+  take_samples(job, guider);
+  report_any_guider(guider, job.result.report);
+}
+
+/// Throws std::runtime_error for a caster of batches: records ask the tracer's caster in kernels what is
+/// smooth.
+template <class Exec, class Caster>
+void guide_by_records(const sampling_job<Exec, Caster>& job) {
   if constexpr (wfpg::is_inline_caster_v<Caster>) {
     using smooth = smooth_surfaces<Caster>;
-    const wfpg::buffer<wfpg::emitting_triangle, Exec> emitters(exec, emitters_of(host));
-    const wfpg::lit_scene<smooth> lit{
-        {geometry.positions, geometry.triangles}, emitters.view(), {tracer.caster(), geometry}};
-    wfpg::path_guider<Exec, wfpg::irradiance_records<Exec, smooth>> guider(exec, lit,
-                                                                           records_options_of(host, options));
-    take(guider);
+    const wfpg::buffer<wfpg::emitting_triangle, Exec> emitters(job.exec, emitters_of(job.host));
+    const wfpg::lit_scene<smooth> lit{job.mesh(), emitters.view(), {job.tracer.caster(), job.geometry}};
+    wfpg::path_guider<Exec, wfpg::irradiance_records<Exec, smooth>> guider(
+        job.exec, lit, records_options_of(job.host, job.options));
+    take_samples(job, guider);
+    report_records(guider, job.tracer.segments(), job.result.report);
   } else {
     throw std::runtime_error("--device optix does not support --method records; --device cuda does");
   }
 }
 
+/// Takes a job's samples by its method. Throws std::invalid_argument for Open PGL's methods, which run on TBB
+/// alone.
+template <class Exec, class Caster>
+void take_by_method(const sampling_job<Exec, Caster>& job) {
+  struct method_function {
+    sampling_method method;
+    void (*take)(const sampling_job<Exec, Caster>&);
+  };
+  static constexpr method_function functions[] = {
+      {sampling_method::pt, trace_unguided<Exec, Caster>},
+      {sampling_method::wfpg, guide_by_octree<Exec, Caster>},
+      {sampling_method::wfpg_product, guide_by_octree<Exec, Caster>},
+      {sampling_method::sarsa, guide_by_sarsa<Exec, Caster>},
+      {sampling_method::records, guide_by_records<Exec, Caster>},
+  };
+  for (const method_function& row : functions)
+    if (row.method == job.options.method) return row.take(job);
+  throw std::invalid_argument(std::string("method is ") + properties_of(job.options.method).name +
+                              ", expected one that runs on any policy");
+}
+
 template <class Accelerated, class Exec>
 render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
                         const progress_callback& progress) {
-  return render_by<Accelerated>(
-      exec, scene, options,
-      [&](auto& tracer, const scene_view& geometry, const auto& lights, const pinhole& camera,
-          stage_clock& building, render_result& result) {
-        const wfpg::triangle_mesh_view mesh{geometry.positions, geometry.triangles};
-        if (options.method == sampling_method::pt) {
-          unguided<Exec> guider(exec);
-          take_samples(tracer, guider, camera, options, progress, result);
-        } else if (options.method == sampling_method::sarsa) {
-          wfpg::path_guider<Exec, wfpg::sarsa_grid<Exec>> guider(exec, mesh, sarsa_options_of(options));
-          take_samples(tracer, guider, camera, options, progress, result);
-          report_any_guider(guider, result.report);
-        } else if (options.method == sampling_method::records) {
-          guide_by_records(exec, tracer, scene, geometry, options, [&](auto& guider) {
-            take_samples(tracer, guider, camera, options, progress, result);
-            report_records(guider, tracer.segments(), result.report);
-          });
-        } else {
-          const stopwatch build;
-          wfpg::path_guider<Exec> guider = begin_guider(
-              exec, scene, mesh, guider_options_of(options, lights.shares()), options, result.guide);
-          building.add("octree", build.seconds());
-          result.report.octree.build_seconds = build.seconds();
-          // A guide that is loaded has counted another rendering's, one of a state this one's.
-          const wfpg::guider_statistics before =
-              options.load_guide.empty() ? wfpg::guider_statistics() : guider.statistics();
-          if (options.through == cones::scene) {
-            take_samples(tracer, guider, camera, options, progress, result);
-          } else {
-            octree_cone_guider<Exec> with_cones(exec, guider, geometry.environment, options.through);
-            take_samples(tracer, with_cones, camera, options, progress, result);
-          }
-          report_guider(guider, tracer.segments(), result.report, before);
-          result.guide = kept_guide(guider, options);
-        }
-      });
+  return render_by<Accelerated>(exec, scene, options, progress, [](const auto& job) { take_by_method(job); });
 }
 
 }  // namespace render

@@ -76,13 +76,11 @@ bool has_openpgl() {
 render_result render_with_openpgl(const scene& scene, const render_options& options,
                                   const progress_callback& progress) {
   const wfpg::exec::tbb exec;
-  return render_by<embree_scene>(exec, scene, options,
-                                 [&](auto& tracer, const scene_view&, const auto&, const pinhole& camera,
-                                     stage_clock&, render_result& result) {
-                                   openpgl_guider guider(exec, openpgl_options_of(scene, options));
-                                   take_samples(tracer, guider, camera, options, progress, result);
-                                   report_openpgl(guider, result.report);
-                                 });
+  return render_by<embree_scene>(exec, scene, options, progress, [](const auto& job) {
+    openpgl_guider guider(job.exec, openpgl_options_of(job.host, job.options));
+    take_samples(job, guider);
+    report_openpgl(guider, job.result.report);
+  });
 }
 
 }  // namespace render

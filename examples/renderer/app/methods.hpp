@@ -1,0 +1,47 @@
+// The renderer's methods and what each of them is and can do, in one table.
+#pragma once
+
+namespace render {
+
+/// Path tracing; guided by wfpg's fields, or by their products with BSDFs; by its SARSA grid; by its
+/// irradiance records; by Open PGL's mixtures of von Mises-Fisher lobes, which know of parallax, or by its
+/// quadtrees of directions.
+enum class sampling_method { pt, wfpg, wfpg_product, sarsa, records, openpgl_vmm, openpgl_dqt };
+
+/// What gives directions beside BSDFs: nothing, fields over an octree, a grid, records, Open PGL's field.
+enum class guide_kind { none, octree, sarsa, records, openpgl };
+
+struct method_properties {
+  sampling_method method;
+  const char* name;  ///< of --method, and in reports
+  guide_kind guide;
+  bool learns;        ///< from its samples: later ones have less noise
+  bool can_be_saved;  ///< a rendering's state, to go on from later
+};
+
+inline constexpr method_properties all_methods[] = {
+    {sampling_method::pt, "pt", guide_kind::none, false, true},
+    {sampling_method::wfpg, "wfpg", guide_kind::octree, true, true},
+    {sampling_method::wfpg_product, "wfpg-product", guide_kind::octree, true, true},
+    {sampling_method::sarsa, "sarsa", guide_kind::sarsa, true, false},
+    {sampling_method::records, "records", guide_kind::records, false, false},
+    {sampling_method::openpgl_vmm, "openpgl-vmm", guide_kind::openpgl, true, false},
+    {sampling_method::openpgl_dqt, "openpgl-dqt", guide_kind::openpgl, true, false},
+};
+
+/// The row of a method. Precondition: `method` is one of the enumerators.
+constexpr const method_properties& properties_of(sampling_method method) {
+  const method_properties* row = all_methods;
+  while (row->method != method) ++row;
+  return *row;
+}
+
+constexpr bool is_wfpg(sampling_method method) {
+  return properties_of(method).guide == guide_kind::octree;
+}
+
+constexpr bool is_openpgl(sampling_method method) {
+  return properties_of(method).guide == guide_kind::openpgl;
+}
+
+}  // namespace render
