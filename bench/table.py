@@ -9,7 +9,7 @@ import json
 import re
 import sys
 
-# What a benchmark's floor is: see the sources in bench/cuda/.
+# What a stage's floor is: see the sources beside this one. Where CPUs have another, its label says so.
 FLOORS = {
     "voxelization": "writing the fragments and sorting them",
     "octree_and_cache": "CUB's sort of the codes",
@@ -31,7 +31,7 @@ def print_stages(benchmarks):
     for b in benchmarks:
         stage, *arguments = b["name"].split("/iterations")[0].split("/")
         name = f"`{stage}` {', '.join(a.replace(':', ' ') for a in arguments)}".strip()
-        floor = b.get("label", FLOORS[stage])  # where a build could not have that one
+        floor = b.get("label", FLOORS[stage])  # where it is another
         print(f"| {name} | {floor} | {b['floor_ms']:.3g} | {b['median_ms']:.3g} | {b['ratio']:.2f} |")
 
 

@@ -1,4 +1,5 @@
 // Transient fields of a wave's bins: making them from what their cones hit, and drawing directions from them.
+#include "floors.hpp"
 #include "guide.hpp"
 
 #include <wfpg/bins/spatial_binner.hpp>
@@ -12,7 +13,8 @@
 namespace bench {
 namespace {
 
-constexpr std::uint32_t field_count = 2048, field_size = 128, cells = field_size * field_size;
+constexpr std::uint32_t field_count = sizes::field_count, field_size = sizes::field_size;
+constexpr std::uint32_t cells = field_size * field_size;
 
 using fields_type = wfpg::bin_fields<stored_surfaces>;
 using serve_type = wfpg::serve_ray<stored_surfaces, hashed_numbers, wfpg::no_queries>;
@@ -59,12 +61,13 @@ struct keep_nothing {
   }
 };
 
-/// 2,048 fields of 128² over a wave, their cones already cast.
+/// Fields over a wave, on a GPU 2,048 of 128², their cones already cast.
+template <class Exec>
 class workload {
  public:
-  workload(const exec_policy& exec, render::material_kind kind, std::uint32_t product_resolution)
+  workload(const Exec& exec, render::material_kind kind, std::uint32_t product_resolution)
       : exec(exec),
-        guide(exec, 256),
+        guide(exec, sizes::field_octree),
         points(points_after(exec, 1)),
         permutation(exec, pixels),
         offsets(exec, field_count + 1),
@@ -96,66 +99,65 @@ class workload {
   /// Every field through a sink.
   template <class Sink>
   void make(const Sink& into) const {
-    const std::size_t making = wfpg::field_scratch_bytes(field_size, exec_policy::warps_per_block);
+    const std::size_t making = wfpg::field_scratch_bytes(field_size, Exec::warps_per_block);
     exec.for_each_block(field_count, making + into.scratch_bytes(),
                         wfpg::make_fields<stored_surfaces, wfpg::stored_hits, Sink>{
                             fields, {hits.view(), 0, cells}, into, 0});
   }
 
-  exec_policy exec;
-  guide_of_room guide;
-  wfpg::buffer<room_point, exec_policy> points;
-  wfpg::buffer<std::uint32_t, exec_policy> permutation, offsets, keys, count;
-  wfpg::buffer<wfpg::ray_hit, exec_policy> hits;
-  wfpg::buffer<std::uint32_t, exec_policy> totals;
-  wfpg::buffer<wfpg::sampled_direction, exec_policy> directions;
-  wfpg::buffer<wfpg::product_point, exec_policy> product_points;
+  Exec exec;
+  guide_of_room<Exec> guide;
+  wfpg::buffer<room_point, Exec> points;
+  wfpg::buffer<std::uint32_t, Exec> permutation, offsets, keys, count;
+  wfpg::buffer<wfpg::ray_hit, Exec> hits;
+  wfpg::buffer<std::uint32_t, Exec> totals;
+  wfpg::buffer<wfpg::sampled_direction, Exec> directions;
+  wfpg::buffer<wfpg::product_point, Exec> product_points;
   fields_type fields;
   serve_type serve;
   wfpg::transient_sink<serve_type> sink;
 };
 
 /// From hits to distributions in scratch memory; the floor reads the hits.
+template <class Exec>
 void making_fields(benchmark::State& state) {
-  const exec_policy exec;
-  const workload w(exec, render::material_kind::lambert, 0);
+  const Exec exec;
+  const workload<Exec> w(exec, render::material_kind::lambert, 0);
   compare(
       state, exec, [&] { w.make(keep_nothing{w.totals.data()}); }, copy_of(exec, w.hits.bytes()));
 }
 
 /// What serving every ray of the wave adds to making the fields; the floor reads the surfaces and writes the
 /// directions.
+template <class Exec>
 void serving_rays(benchmark::State& state) {
-  const exec_policy exec;
+  const Exec exec;
   const auto kind = static_cast<render::material_kind>(state.range(1));
-  const workload w(exec, kind, static_cast<std::uint32_t>(state.range(0)));
+  const workload<Exec> w(exec, kind, static_cast<std::uint32_t>(state.range(0)));
   const copy_of floor(exec, w.points.bytes() + w.directions.bytes());
   std::vector<double> served, made, floors;
-  const auto measure = [&] {
-    made.push_back(seconds_of(exec, [&] { w.make(keep_nothing{w.totals.data()}); }));
-    served.push_back(seconds_of(exec, [&] { w.make(w.sink); }));
-    floors.push_back(seconds_of(exec, floor));
-  };
-  for (int i = 0; i < 3; ++i) measure();
-  served.clear();
-  made.clear();
-  floors.clear();
+  const auto make = [&] { w.make(keep_nothing{w.totals.data()}); };
+  const auto make_and_serve = [&] { w.make(w.sink); };
+  for (int i = 0; i < warm_up; ++i) {
+    seconds_of(exec, make);
+    seconds_of(exec, make_and_serve);
+    seconds_of(exec, floor);
+  }
   for (auto _ : state) {
-    measure();
+    made.push_back(seconds_of(exec, make));
+    served.push_back(seconds_of_stage(exec, make_and_serve));
+    floors.push_back(seconds_of(exec, floor));
     state.SetIterationTime(served.back());
   }
-  const double difference = median(served) - median(made);
-  state.counters["median_ms"] = 1.0e3 * difference;
-  state.counters["floor_ms"] = 1.0e3 * median(floors);
-  state.counters["ratio"] = difference / median(floors);
+  report(state, median(served) - median(made), median(floors));
 }
 
-BENCHMARK(making_fields)->Apply(as_stage);
-BENCHMARK(serving_rays)
-    ->ArgNames({"P", "material"})
-    ->Args({0, static_cast<int>(render::material_kind::plastic)})
-    ->Args({8, static_cast<int>(render::material_kind::plastic)})
-    ->Apply(as_stage);
+/// P, the material.
+constexpr argument served_with[][2] = {{0, static_cast<int>(render::material_kind::plastic)},
+                                       {8, static_cast<int>(render::material_kind::plastic)}};
+
+WFPG_BENCH_STAGE(making_fields, no_arguments{});
+WFPG_BENCH_STAGE(serving_rays, {"P", "material"}, served_with);
 
 }  // namespace
 }  // namespace bench

@@ -1,12 +1,16 @@
-// Kept fields: refreshing slots, their casts apart, and serving a wave from slots that are up to date.
+// Kept fields: refreshing slots, their casts apart.
+#include "floors.hpp"
 #include "guide.hpp"
 
 #include <wfpg/path_guider.hpp>
 
+#include <thrust/sequence.h>
+
 namespace bench {
 namespace {
 
-constexpr std::uint32_t slot_count = 4096, slot_size = 24, cells = slot_size * slot_size, recast = 8;
+constexpr std::uint32_t slot_count = sizes::slot_count, slot_size = sizes::slot_size;
+constexpr std::uint32_t cells = slot_size * slot_size, recast = 8;
 
 /// Slots with a history, each with a ray of the wave as origin.
 struct make_slots {
@@ -38,27 +42,31 @@ struct cast_all {
   }
 };
 
-/// 4,096 due slots of 24² cells, a cone in eight cast again, four times the default's; the floor reads what
-/// cells have hit and writes their distributions.
+/// Due slots, on a GPU 4,096 of 24² cells, a cone in eight cast again, four times the default's; the floor
+/// reads what cells have hit and writes their distributions.
+template <class Exec>
 void refreshing_slots(benchmark::State& state) {
-  const exec_policy exec;
-  const guide_of_room guide(exec, 128);
+  const Exec exec;
+  const guide_of_room<Exec> guide(exec, sizes::slot_octree);
   const auto points = points_after(exec, 1);
   const wfpg::array_view<const room_point> given(points.view());
-  const wfpg::buffer<wfpg::detail::field_slot, exec_policy> slots(exec, slot_count);
-  const wfpg::buffer<wfpg::resident_field, exec_policy> fields(exec, slot_count);
-  const wfpg::buffer<std::uint32_t, exec_policy> words(
+  const wfpg::buffer<wfpg::detail::field_slot, Exec> slots(exec, slot_count);
+  const wfpg::buffer<wfpg::resident_field, Exec> fields(exec, slot_count);
+  const wfpg::buffer<std::uint32_t, Exec> words(
       exec, std::size_t(slot_count) * wfpg::grid_distribution::words(slot_size)),
       list(exec, slot_count);
-  const wfpg::buffer<wfpg::cone_hit, exec_policy> found(exec, std::size_t(slot_count) * cells);
-  const wfpg::buffer<wfpg::rough_mean, exec_policy> learnt(exec, found.size());
-  const wfpg::buffer<wfpg::ray_hit, exec_policy> hits(exec, std::size_t(slot_count) * cells);
+  const wfpg::buffer<wfpg::cone_hit, Exec> found(exec, std::size_t(slot_count) * cells);
+  const wfpg::buffer<wfpg::rough_mean, Exec> learnt(exec, found.size());
+  const wfpg::buffer<wfpg::ray_hit, Exec> hits(exec, std::size_t(slot_count) * cells);
   thrust::sequence(exec.thrust(), list.data(), list.data() + slot_count);
 
   const wfpg::kept_field_wave<stored_surfaces> wave{
       pixels, {given}, guide.cache.view(), {}, wfpg::guiding_mode::oriented, 0.7f, 1, {}};
-  const wfpg::buffer<std::uint8_t, exec_policy> settled(exec, slot_count);
-  const wfpg::buffer<std::uint64_t, exec_policy> refreshed(exec, 1);
+  const wfpg::buffer<std::uint8_t, Exec> settled(exec, slot_count);
+  const wfpg::buffer<std::uint64_t, Exec> refreshed(exec, 1);
+  exec.fill_bytes(slots.data(), 0, slots.bytes());
+  exec.fill_bytes(learnt.data(), 0, learnt.bytes());
+  exec.fill_bytes(settled.data(), 0, settled.bytes());
   const wfpg::detail::kept_fields_view kept{{slots.view(), nullptr, 0, settled.data()},
                                             fields.data(),
                                             words.data(),
@@ -74,7 +82,7 @@ void refreshing_slots(benchmark::State& state) {
   const auto renew = [&] { exec.for_each(slot_count, make_slots{slots.view(), fields.data(), given}); };
   const auto build = [&](bool whole) {
     const std::uint32_t cones = builder.cone_count(whole);
-    exec.for_each_block(slot_count, wfpg::field_scratch_bytes(slot_size, exec_policy::warps_per_block),
+    exec.for_each_block(slot_count, wfpg::field_scratch_bytes(slot_size, Exec::warps_per_block),
                         wfpg::detail::build_kept_fields<builder_type, wfpg::stored_hits>{
                             builder, {hits.view(), 0, cones}, list.data(), whole});
   };
@@ -87,39 +95,7 @@ void refreshing_slots(benchmark::State& state) {
       state, exec, [&] { build(false); }, copy_of(exec, found.bytes() + words.bytes()), renew);
 }
 
-/// A wave's rays to their slots, a direction and a density each, where fields would be built, but none is
-/// due; the floor reads the surfaces and writes the directions.
-void serving_kept(benchmark::State& state) {
-  const exec_policy exec;
-  const room_mesh mesh(exec, 100000);
-  wfpg::guider_options options;
-  options.max_rays = pixels;
-  options.deposit_capacity = pixels;
-  options.unguided_samples = 0;
-  options.product_resolution = static_cast<std::uint32_t>(state.range(0));
-  wfpg::path_guider<exec_policy> guider(exec, mesh.view(), options);
-  const auto points = points_after(exec, 1);
-  const wfpg::array_view<const room_point> given(points.view());
-  const wfpg::buffer<wfpg::sampled_direction, exec_policy> directions(exec, pixels);
-  const auto kind = static_cast<render::material_kind>(state.range(1));
-  const wfpg::wave wave{0u, pixels, stored_surfaces{given, kind}, hashed_numbers{}};
-  const auto draw = [&] { guider.sample_directions(wave, room_caster{}, directions.view()); };
-  for (int sample = 0; sample < 17; ++sample) {
-    if (sample > 0) guider.end_sample();
-    guider.begin_sample();
-    exec.for_each(pixels, light_room{guider.cache(), given});
-    draw();
-  }
-  compare(state, exec, draw, copy_of(exec, points.bytes() + directions.bytes()));
-  state.counters["slots"] = guider.statistics().kept.live;
-}
-
-BENCHMARK(refreshing_slots)->Apply(as_stage);
-BENCHMARK(serving_kept)
-    ->ArgNames({"P", "material"})
-    ->Args({0, static_cast<int>(render::material_kind::lambert)})
-    ->Args({8, static_cast<int>(render::material_kind::plastic)})
-    ->Apply(as_stage);
+WFPG_BENCH_STAGE(refreshing_slots, no_arguments{});
 
 }  // namespace
 }  // namespace bench

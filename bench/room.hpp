@@ -17,12 +17,13 @@ using wfpg::vec2;
 using wfpg::vec3;
 
 inline constexpr float ball_radius = 0.25f;
-inline constexpr std::uint32_t width = 1920, height = 1080, pixels = width * height;
+inline constexpr std::uint32_t width = sizes::width, height = sizes::height, pixels = width * height;
 
 /// The walls and the ball as triangles.
+template <class Exec>
 class room_mesh {
  public:
-  room_mesh(const exec_policy& exec, int triangle_count) {
+  room_mesh(const Exec& exec, int triangle_count) {
     std::vector<vec3> positions{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                 {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
     std::vector<wfpg::uvec3> triangles{{0, 1, 2}, {0, 2, 3}, {4, 6, 5}, {4, 7, 6}, {0, 4, 5}, {0, 5, 1},
@@ -52,8 +53,8 @@ class room_mesh {
   std::size_t size() const { return triangles_.size(); }
 
  private:
-  wfpg::buffer<vec3, exec_policy> positions_;
-  wfpg::buffer<wfpg::uvec3, exec_policy> triangles_;
+  wfpg::buffer<vec3, Exec> positions_;
+  wfpg::buffer<wfpg::uvec3, Exec> triangles_;
 };
 
 /// The first hit inside the room, of ball or walls.
@@ -131,8 +132,10 @@ struct store_points {
   WFPG_HD void operator()(std::size_t i) const { points[i] = hits(static_cast<std::uint32_t>(i)); }
 };
 
-inline wfpg::buffer<room_point, exec_policy> points_after(const exec_policy& exec, int bounces) {
-  wfpg::buffer<room_point, exec_policy> points(exec, pixels);
+/// Where the paths of a wave are after `bounces` bounces.
+template <class Exec>
+wfpg::buffer<room_point, Exec> points_after(const Exec& exec, int bounces) {
+  wfpg::buffer<room_point, Exec> points(exec, pixels);
   exec.for_each(pixels, store_points{{bounces}, points.view()});
   return points;
 }

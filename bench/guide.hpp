@@ -20,15 +20,17 @@ struct light_room {
   }
 };
 
+/// The guide of the room: an octree and a cache that has its light.
+template <class Exec>
 struct guide_of_room {
-  wfpg::sparse_voxel_octree<exec_policy> octree;
-  wfpg::exitance_cache<exec_policy> cache;
+  wfpg::sparse_voxel_octree<Exec> octree;
+  wfpg::exitance_cache<Exec> cache;
 
-  guide_of_room(const exec_policy& exec, std::uint32_t resolution, std::size_t queue_capacity = pixels) {
-    const room_mesh mesh(exec, 100000);
+  guide_of_room(const Exec& exec, std::uint32_t resolution, std::size_t queue_capacity = pixels) {
+    const room_mesh<Exec> mesh(exec, sizes::room_triangles);
     auto fragments = wfpg::voxelize(exec, mesh.view(), resolution);
-    octree = wfpg::sparse_voxel_octree<exec_policy>(exec, fragments);
-    cache = wfpg::exitance_cache<exec_policy>(exec, octree, fragments, queue_capacity);
+    octree = wfpg::sparse_voxel_octree<Exec>(exec, fragments);
+    cache = wfpg::exitance_cache<Exec>(exec, octree, fragments, queue_capacity);
     for (int bounces = 0; bounces < 4; ++bounces) {
       const auto points = points_after(exec, bounces);
       exec.for_each(pixels, light_room{cache.view(), wfpg::array_view<const room_point>(points.view())});

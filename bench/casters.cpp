@@ -2,8 +2,8 @@
 // one point in the order in which fields cast them, and the same rays shuffled; among small triangles that
 // fill the unit cube, and in an empty box. Their floor is OptiX's caster of the same rays in the same run,
 // where it was built; else a copy of rays and hits.
-#include "casters/bvh_scene.hpp"
-#include "timing.hpp"
+#include "bvh_scene.hpp"
+#include "floors.hpp"
 #if defined(WFPG_BENCH_OPTIX)
 #include "casters/optix_caster.hpp"
 #endif
@@ -23,8 +23,8 @@ using wfpg::uvec3;
 using wfpg::vec2;
 using wfpg::vec3;
 
-constexpr std::uint32_t bin_count = 2048, resolution = 128, cells = resolution * resolution;
-constexpr std::uint32_t ray_count = bin_count * cells;  // a power of two, for `shuffled`
+constexpr std::uint32_t resolution = sizes::cast_size, cells = resolution * resolution;
+constexpr std::uint32_t ray_count = sizes::cast_points * cells;  // a power of two, for `shuffled`
 
 WFPG_HD vec3 random_point(std::uint64_t stream, std::uint64_t i) {
   const vec2 xy = unit_vec2(hash(hash(stream, 0), i));
@@ -36,9 +36,10 @@ WFPG_HD vec3 random_direction(std::uint64_t stream, std::uint64_t i) {
 
 /// Equilateral triangles in the unit cube, of edge 0.02 where there are 100,000 and as much area in all where
 /// there are more; or the cube's faces.
+template <class Exec>
 class triangles_of {
  public:
-  triangles_of(const exec_policy& exec, std::size_t thousands) {
+  triangles_of(const Exec& exec, std::size_t thousands) {
     std::vector<vec3> positions;
     if (thousands == 0) add_box(positions);
     const float edge = 0.02f * std::sqrt(100.0f / static_cast<float>(thousands));
@@ -68,8 +69,8 @@ class triangles_of {
       }
   }
 
-  wfpg::buffer<vec3, exec_policy> positions_;
-  wfpg::buffer<uvec3, exec_policy> triangles_;
+  wfpg::buffer<vec3, Exec> positions_;
+  wfpg::buffer<uvec3, Exec> triangles_;
 };
 
 /// A permutation of the rays' indices.
@@ -101,14 +102,16 @@ struct cast_inline {
   WFPG_HD void operator()(std::size_t i) const { hits[i] = caster(rays[i]); }
 };
 
+/// Casting one ray after the other; the floor is OptiX's caster or a copy.
+template <class Exec>
 void casting(benchmark::State& state) {
-  const exec_policy exec;
-  const triangles_of mesh(exec, static_cast<std::size_t>(state.range(0)));
-  const wfpg::buffer<wfpg::ray, exec_policy> rays(exec, ray_count);
-  const wfpg::buffer<wfpg::ray_hit, exec_policy> hits(exec, ray_count);
+  const Exec exec;
+  const triangles_of<Exec> mesh(exec, static_cast<std::size_t>(state.range(0)));
+  const wfpg::buffer<wfpg::ray, Exec> rays(exec, ray_count);
+  const wfpg::buffer<wfpg::ray_hit, Exec> hits(exec, ray_count);
   exec.for_each(ray_count, make_ray{rays.data(), state.range(1) != 0});
   const wfpg::array_view<const wfpg::ray> given(rays.view());
-  const render::bvh_scene<exec_policy> hierarchy(exec, mesh.view(), 0.0f);
+  const render::bvh_scene<Exec> hierarchy(exec, mesh.view(), 0.0f);
 #if defined(WFPG_BENCH_OPTIX)
   const render::optix_scene optix(exec, mesh.view().positions, mesh.view().triangles, 0.0f);
   const auto floor = [&] { optix.caster().cast(exec, given, hits.view()); };
@@ -125,14 +128,7 @@ void casting(benchmark::State& state) {
   state.counters["Mrays_a_second"] = 1.0e-3 * ray_count / state.counters["median_ms"];
 }
 
-BENCHMARK(casting)
-    ->ArgNames({"thousands", "in_order"})
-    ->Args({100, 1})
-    ->Args({100, 0})
-    ->Args({1000, 1})
-    ->Args({1000, 0})
-    ->Args({0, 1})
-    ->Apply(as_stage);
+WFPG_BENCH_STAGE(casting, {"thousands", "in_order"}, sizes::casting);
 
 }  // namespace
 }  // namespace bench

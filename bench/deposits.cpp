@@ -1,5 +1,6 @@
 // What the paths of a sample found, into the cache: Eq. 5's back-propagation, the leaves' means, the averages
 // bottom-up.
+#include "floors.hpp"
 #include "guide.hpp"
 
 #include <wfpg/guide/path_recorder.hpp>
@@ -23,12 +24,14 @@ struct record_vertex {
   }
 };
 
-/// 1920 x 1080 paths of four vertices, of some of which one leaf has all; the floor reads the vertices.
+/// A wave's paths of four vertices, of some of which one leaf has all; the floor reads the vertices.
+template <class Exec>
 void depositing(benchmark::State& state) {
-  const exec_policy exec;
-  guide_of_room guide(exec, static_cast<std::uint32_t>(state.range(0)), std::size_t(pixels) * path_length);
-  wfpg::path_recorder<exec_policy> recorder(exec, pixels, path_length, true);
-  std::vector<wfpg::buffer<room_point, exec_policy>> points;
+  const Exec exec;
+  guide_of_room<Exec> guide(exec, static_cast<std::uint32_t>(state.range(0)),
+                            std::size_t(pixels) * path_length);
+  wfpg::path_recorder<Exec> recorder(exec, pixels, path_length, true);
+  std::vector<wfpg::buffer<room_point, Exec>> points;
   for (int bounces = 0; bounces < static_cast<int>(path_length); ++bounces)
     points.push_back(points_after(exec, bounces));
   const auto record = [&] {
@@ -47,12 +50,7 @@ void depositing(benchmark::State& state) {
   state.counters["leaves"] = guide.octree.leaf_count();
 }
 
-BENCHMARK(depositing)
-    ->ArgNames({"resolution", "percent_in_one"})
-    ->Args({128, 0})
-    ->Args({256, 0})
-    ->Args({128, 10})
-    ->Apply(as_stage);
+WFPG_BENCH_STAGE(depositing, {"resolution", "percent_in_one"}, sizes::depositing);
 
 }  // namespace
 }  // namespace bench

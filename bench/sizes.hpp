@@ -1,0 +1,64 @@
+// How large the benchmarks' problems are on each kind of machine.
+#pragma once
+
+#include <cstdint>
+
+namespace bench {
+
+/// What a stage is run with: two arguments a row.
+using argument = std::int64_t;
+
+/// GPUs. Results in bench/results/ are of these sizes.
+struct gpu_sizes {
+  static constexpr int warm_up = 3, iterations = 20;
+
+  // The room and the rays that a wave has in it.
+  static constexpr std::uint32_t width = 1920, height = 1080;
+  static constexpr int room_triangles = 100000;
+
+  static constexpr argument voxelization[][2] = {{1000, 512}};        // thousands of triangles, resolution
+  static constexpr argument octree_and_cache[][2] = {{10000, 1024}};  // thousands of fragments, resolution
+  static constexpr argument binning[][2] = {{256, 0}, {256, 2}};      // resolution, bounces
+  // Resolution, percent of the paths that one leaf has.
+  static constexpr argument depositing[][2] = {{128, 0}, {256, 0}, {128, 10}};
+
+  // Transient fields: bins, cells along an edge, the octree's resolution.
+  static constexpr std::uint32_t field_count = 2048, field_size = 128, field_octree = 256;
+
+  // Kept fields: slots that are due, cells along an edge, the octree's resolution.
+  static constexpr std::uint32_t slot_count = 4096, slot_size = 24, slot_octree = 128;
+  static constexpr int kept_samples = 17;  // that fields learn from before a wave is measured
+
+  // Casting: points, cells along an edge of their directions; thousands of triangles, whether rays are in
+  // order.
+  static constexpr std::uint32_t cast_points = 2048, cast_size = 128;
+  static constexpr argument casting[][2] = {{100, 1}, {100, 0}, {1000, 1}, {1000, 0}, {0, 1}};
+};
+
+/// CPUs: a stage takes about two seconds on one core, all of its iterations together.
+struct cpu_sizes {
+  static constexpr int warm_up = 1, iterations = 5;
+
+  static constexpr std::uint32_t width = 224, height = 126;
+  static constexpr int room_triangles = 20000;
+
+  static constexpr argument voxelization[][2] = {{100, 128}};
+  static constexpr argument octree_and_cache[][2] = {{200, 128}};
+  static constexpr argument binning[][2] = {{64, 0}, {64, 2}};
+  static constexpr argument depositing[][2] = {{64, 0}, {64, 10}};
+
+  static constexpr std::uint32_t field_count = 32, field_size = 64, field_octree = 64;
+  static constexpr std::uint32_t slot_count = 256, slot_size = 24, slot_octree = 64;
+  static constexpr int kept_samples = 9;
+
+  static constexpr std::uint32_t cast_points = 4, cast_size = 128;
+  static constexpr argument casting[][2] = {{20, 1}, {20, 0}, {0, 1}};
+};
+
+#if defined(__CUDACC__)
+using sizes = gpu_sizes;
+#else
+using sizes = cpu_sizes;
+#endif
+
+}  // namespace bench
