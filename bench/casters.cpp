@@ -2,7 +2,7 @@
 // one point in the order in which fields cast them, and the same rays shuffled; among small triangles that
 // fill the unit cube, and in an empty box. Their floor is OptiX's caster of the same rays in the same run,
 // where it was built; else a copy of rays and hits.
-#include "bvh_scene.hpp"
+#include "casters/bvh_scene.hpp"
 #include "floors.hpp"
 #if defined(WFPG_BENCH_OPTIX)
 #include "casters/optix_caster.hpp"

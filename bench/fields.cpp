@@ -17,7 +17,7 @@ constexpr std::uint32_t field_count = sizes::field_count, field_size = sizes::fi
 constexpr std::uint32_t cells = field_size * field_size;
 
 using fields_type = wfpg::bin_fields<stored_surfaces>;
-using serve_type = wfpg::serve_ray<stored_surfaces, hashed_numbers, wfpg::no_queries>;
+using serve_type = wfpg::sample_ray<stored_surfaces, hashed_numbers, wfpg::no_queries>;
 
 /// Rays in runs of equal length, a run a bin of the wave: the rays of one bin lie together.
 struct equal_bins {

@@ -13,11 +13,11 @@ template <class Exec>
 void serving_kept(benchmark::State& state) {
   const Exec exec;
   const room_mesh<Exec> mesh(exec, sizes::room_triangles);
-  wfpg::guider_options options;
+  wfpg::kept_guide_options options;
   options.max_rays = pixels;
   options.deposit_capacity = pixels;
   options.unguided_samples = 0;
-  options.product_resolution = static_cast<std::uint32_t>(state.range(0));
+  if (state.range(0) > 0) options.product_resolution = static_cast<std::uint32_t>(state.range(0));
   wfpg::path_guider<Exec> guider(exec, mesh.view(), options);
   const auto points = points_after(exec, 1);
   const wfpg::array_view<const room_point> given(points.view());
@@ -28,7 +28,7 @@ void serving_kept(benchmark::State& state) {
   for (int sample = 0; sample < sizes::kept_samples; ++sample) {
     if (sample > 0) guider.end_sample();
     guider.begin_sample();
-    exec.for_each(pixels, light_room{guider.cache(), given});
+    exec.for_each(pixels, light_room{guider.guide().cache(), given});
     draw();
   }
   compare(state, exec, draw, copy_of(exec, points.bytes() + directions.bytes()));

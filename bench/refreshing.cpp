@@ -14,7 +14,7 @@ constexpr std::uint32_t cells = slot_size * slot_size, recast = 8;
 
 /// Slots with a history, each with a ray of the wave as origin.
 struct make_slots {
-  wfpg::array_view<wfpg::detail::field_slot> slots;
+  wfpg::array_view<wfpg::field_slot> slots;
   wfpg::resident_field* fields;
   wfpg::array_view<const room_point> points;
   WFPG_HD void operator()(std::size_t i) const {
@@ -27,7 +27,7 @@ struct make_slots {
 };
 
 struct cast_all {
-  wfpg::detail::kept_field_builder<wfpg::kept_field_wave<stored_surfaces>> builder;
+  wfpg::kept_field_builder<wfpg::kept_field_wave<stored_surfaces>> builder;
   wfpg::array_view<wfpg::ray_hit> hits;
   std::uint32_t cones;
   bool whole;
@@ -50,13 +50,13 @@ void refreshing_slots(benchmark::State& state) {
   const guide_of_room<Exec> guide(exec, sizes::slot_octree);
   const auto points = points_after(exec, 1);
   const wfpg::array_view<const room_point> given(points.view());
-  const wfpg::buffer<wfpg::detail::field_slot, Exec> slots(exec, slot_count);
+  const wfpg::buffer<wfpg::field_slot, Exec> slots(exec, slot_count);
   const wfpg::buffer<wfpg::resident_field, Exec> fields(exec, slot_count);
   const wfpg::buffer<std::uint32_t, Exec> words(
       exec, std::size_t(slot_count) * wfpg::grid_distribution::words(slot_size)),
       list(exec, slot_count);
   const wfpg::buffer<wfpg::cone_hit, Exec> found(exec, std::size_t(slot_count) * cells);
-  const wfpg::buffer<wfpg::rough_mean, Exec> learnt(exec, found.size());
+  const wfpg::buffer<wfpg::stochastic_mean16, Exec> learnt(exec, found.size());
   const wfpg::buffer<wfpg::ray_hit, Exec> hits(exec, std::size_t(slot_count) * cells);
   thrust::sequence(exec.thrust(), list.data(), list.data() + slot_count);
 
@@ -67,23 +67,23 @@ void refreshing_slots(benchmark::State& state) {
   exec.fill_bytes(slots.data(), 0, slots.bytes());
   exec.fill_bytes(learnt.data(), 0, learnt.bytes());
   exec.fill_bytes(settled.data(), 0, settled.bytes());
-  const wfpg::detail::kept_fields_view kept{{slots.view(), nullptr, 0, settled.data()},
-                                            fields.data(),
-                                            words.data(),
-                                            found.data(),
-                                            learnt.data(),
-                                            1.0f,
-                                            slot_size,
-                                            recast,
-                                            2,
-                                            refreshed.data()};
-  using builder_type = wfpg::detail::kept_field_builder<wfpg::kept_field_wave<stored_surfaces>>;
+  const wfpg::kept_fields_view kept{{slots.view(), nullptr, 0, settled.data()},
+                                    fields.data(),
+                                    words.data(),
+                                    found.data(),
+                                    learnt.data(),
+                                    1.0f,
+                                    slot_size,
+                                    recast,
+                                    2,
+                                    refreshed.data()};
+  using builder_type = wfpg::kept_field_builder<wfpg::kept_field_wave<stored_surfaces>>;
   const builder_type builder{wave, kept};
   const auto renew = [&] { exec.for_each(slot_count, make_slots{slots.view(), fields.data(), given}); };
   const auto build = [&](bool whole) {
     const std::uint32_t cones = builder.cone_count(whole);
     exec.for_each_block(slot_count, wfpg::field_scratch_bytes(slot_size, Exec::warps_per_block),
-                        wfpg::detail::build_kept_fields<builder_type, wfpg::stored_hits>{
+                        wfpg::build_kept_fields<builder_type, wfpg::stored_hits>{
                             builder, {hits.view(), 0, cones}, list.data(), whole});
   };
   for (const bool whole : {true, false}) {

@@ -30,7 +30,6 @@ struct width_caster {
 namespace {
 
 using namespace wfpg_test;
-using wfpg::field_lifetime;
 using wfpg::guiding_mode;
 using wfpg::svo_cone_caster;
 
@@ -76,8 +75,8 @@ WFPG_TEST_CASE("cone caster: fields of cones are drawn from with their density, 
     for (const field_lifetime lifetime : lifetimes) {
       guided_box<Exec> box(box_options(mode, lifetime));
       box.learn();
-      const wfpg::voxel_opacity<Exec> opacity(box.exec, box.guider.octree());
-      const svo_cone_caster caster(box.guider.cache(), opacity.view());
+      const wfpg::voxel_opacity<Exec> opacity(box.exec, box.guider.guide().octree());
+      const svo_cone_caster caster(box.guider.guide().cache(), opacity.view());
       const test_surface at = make_surface({0.4f, 0, 0.3f}, {0, 1, 0}, {0, 1, 0});
       const std::vector<test_surface> surfaces(400, at);
       const wave_of_surfaces<Exec> wave(box.exec, surfaces);
@@ -104,8 +103,8 @@ WFPG_TEST_CASE("cone caster: kept fields keep what cones gathered until they are
                "[cone_caster]") {
   guided_box<Exec> box(field_lifetime::kept);
   box.learn();
-  const wfpg::voxel_opacity<Exec> opacity(box.exec, box.guider.octree());
-  const svo_cone_caster caster(box.guider.cache(), opacity.view());
+  const wfpg::voxel_opacity<Exec> opacity(box.exec, box.guider.guide().octree());
+  const svo_cone_caster caster(box.guider.guide().cache(), opacity.view());
   const test_surface at = make_surface({0.4f, 0, 0.3f}, {0, 1, 0}, {0, 1, 0});
   const wave_of_surfaces<Exec> wave(box.exec, std::vector<test_surface>(400, at));
   const vec3 to_patch = glm::normalize(vec3(0.8f, 1.0f, 0.8f) - at.position);

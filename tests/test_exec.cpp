@@ -42,6 +42,44 @@ struct no_work {
   WFPG_HD void operator()(Block&, std::size_t) const {}
 };
 
+/// A policy that lacks one member: the derived class hides it.
+template <class Exec>
+struct complete : Exec {};
+template <class Exec>
+struct without_fill : Exec {
+  void fill_bytes() = delete;
+};
+template <class Exec>
+struct without_copy : Exec {
+  void copy_from_host() = delete;
+};
+template <class Exec>
+struct without_sort : Exec {
+  void sort_pairs() = delete;
+};
+template <class Exec>
+struct without_loop : Exec {
+  void for_each() = delete;
+};
+template <class Exec>
+struct without_runs : Exec {
+  void for_each_run() = delete;
+};
+template <class Exec>
+struct without_blocks : Exec {
+  void for_each_block() = delete;
+};
+
+WFPG_TEST_CASE("a policy that lacks a member is none", "[exec]") {
+  CHECK(wfpg::exec::is_execution_policy_v<complete<Exec>>);
+  CHECK_FALSE(wfpg::exec::is_execution_policy_v<without_fill<Exec>>);
+  CHECK_FALSE(wfpg::exec::is_execution_policy_v<without_copy<Exec>>);
+  CHECK_FALSE(wfpg::exec::is_execution_policy_v<without_sort<Exec>>);
+  CHECK_FALSE(wfpg::exec::is_execution_policy_v<without_loop<Exec>>);
+  CHECK_FALSE(wfpg::exec::is_execution_policy_v<without_runs<Exec>>);
+  CHECK_FALSE(wfpg::exec::is_execution_policy_v<without_blocks<Exec>>);
+}
+
 WFPG_TEST_CASE("a policy is one", "[exec]") {
   const Exec exec;
   CHECK(wfpg::exec::is_execution_policy_v<Exec>);

@@ -6,7 +6,7 @@
 #include "support/random_meshes.hpp"
 #include "support/section_bytes.hpp"
 
-#include <wfpg/guides/octree/detail/guide_state.hpp>
+#include <wfpg/detail/guide_sections.hpp>
 #include <wfpg/octree/exitance_cache.hpp>
 
 #include <algorithm>
@@ -357,7 +357,7 @@ class busy_voxel {
     std::memcpy(&mean_bits, &mean, sizeof mean);
     set_number(bytes, leaf(), 8, mean_bits);
     set_number(bytes, leaf() + 8, 4, count);
-    wfpg::detail::state_access::restore(scene_.exec, {"a cache", "cache", bytes}, scene_.cache);
+    wfpg::detail::guide_sections::restore(scene_.exec, {"a cache", "cache", bytes}, scene_.cache);
   }
 
   void add(const std::vector<float>& values) {
@@ -374,7 +374,7 @@ class busy_voxel {
   const vec3 z{0.0f, 0.0f, 1.0f};
 
   std::string state() const {
-    return wfpg::detail::state_access::to_bytes(scene_.exec, scene_.cache).bytes();
+    return wfpg::detail::guide_sections::to_bytes(scene_.exec, scene_.cache).bytes();
   }
   /// Where the leaf's first side is: behind two bytes a node and one an inner node.
   std::size_t leaf() const { return 3 * std::size_t(scene_.tree.node_count()) - scene_.tree.leaf_count(); }

@@ -84,10 +84,10 @@ WFPG_TEST_CASE("field store: a hit remembers the environment, and nonsense as da
 /// How often each cell is cast by so many refreshes in turn.
 std::vector<int> times_cast(std::uint32_t resolution, std::uint32_t recast, std::uint32_t first) {
   std::vector<int> times(resolution * resolution, 0);
-  const std::uint32_t cones = wfpg::detail::refresh_cones(resolution, recast);
+  const std::uint32_t cones = wfpg::refresh_cones(resolution, recast);
   for (std::uint32_t refresh = first; refresh < first + recast; ++refresh)
     for (std::uint32_t cone = 0; cone < cones; ++cone)
-      ++times.at(wfpg::detail::refreshed_cell(cone, refresh, resolution, recast));
+      ++times.at(wfpg::refreshed_cell(cone, refresh, resolution, recast));
   return times;
 }
 
@@ -98,7 +98,7 @@ TEST_CASE("field store: as many refreshes as one in how many cast every cell onc
     for (std::uint32_t resolution = 2; resolution <= 33; ++resolution) {
       const std::uint32_t cells = resolution * resolution;
       INFO("resolution " << resolution << ", one in " << recast);
-      CHECK(wfpg::detail::refresh_cones(resolution, recast) == (cells + recast - 1) / recast);
+      CHECK(wfpg::refresh_cones(resolution, recast) == (cells + recast - 1) / recast);
       for (std::uint32_t first : {1u, 2u, 1000u}) {
         const std::vector<int> times = times_cast(resolution, recast, first);
         const auto end_of_runs = times.begin() + (cells - cells % recast);
@@ -112,10 +112,10 @@ TEST_CASE("field store: the cones of a refresh are spread over rows and columns"
   constexpr std::uint32_t resolution = 24;
   for (std::uint32_t recast : {2u, 4u, 8u, 16u, 32u})
     for (std::uint32_t refresh = 0; refresh < recast; ++refresh) {
-      const std::uint32_t cones = wfpg::detail::refresh_cones(resolution, recast);
+      const std::uint32_t cones = wfpg::refresh_cones(resolution, recast);
       std::set<std::uint32_t> rows, columns;
       for (std::uint32_t cone = 0; cone < cones; ++cone) {
-        const std::uint32_t cell = wfpg::detail::refreshed_cell(cone, refresh, resolution, recast);
+        const std::uint32_t cell = wfpg::refreshed_cell(cone, refresh, resolution, recast);
         rows.insert(cell / resolution);
         columns.insert(cell % resolution);
       }
@@ -127,7 +127,7 @@ TEST_CASE("field store: the cones of a refresh are spread over rows and columns"
 
 TEST_CASE("field store: a refresh casts a cell at least, however few", "[field_store]") {
   for (std::uint32_t recast : {1000u, 0x7fffffffu, 0xfffffdc1u, 0xffffffffu})
-    CHECK(wfpg::detail::refresh_cones(24, recast) == 1);
+    CHECK(wfpg::refresh_cones(24, recast) == 1);
 }
 
 namespace {
@@ -316,10 +316,10 @@ WFPG_TEST_CASE("field store: refreshes follow light that moves without casting a
 /// What a store tells after samples of births, refreshes, refusals and evictions.
 struct store_history {
   std::vector<std::uint64_t> fields;
-  std::uint64_t born = 0, freed = 0, refreshed = 0, refused = 0;
+  std::uint64_t allocated = 0, freed = 0, refreshed = 0, refused = 0;
 
   bool operator==(const store_history& other) const {
-    return fields == other.fields && born == other.born && freed == other.freed &&
+    return fields == other.fields && allocated == other.allocated && freed == other.freed &&
            refreshed == other.refreshed && refused == other.refused;
   }
 };
@@ -348,7 +348,7 @@ store_history history(std::size_t buffer_bytes = inline_cones, batch_box_caster:
     box.end();
     result.refused += box.counts().refused;
   }
-  result.born = box.counts().born;
+  result.allocated = box.counts().allocated;
   result.freed = box.counts().freed;
   result.refreshed = box.counts().refreshed;
   return result;
@@ -356,7 +356,7 @@ store_history history(std::size_t buffer_bytes = inline_cones, batch_box_caster:
 
 WFPG_TEST_CASE("field store: the same bits on any number of threads", "[field_store]") {
   const store_history first = history<Exec>();
-  CHECK(first.born > 90);
+  CHECK(first.allocated > 90);
   CHECK(first.freed > 0);
   CHECK(first.refreshed > 50);
   CHECK(first.refused > 0);

@@ -38,13 +38,13 @@ WFPG_TEST_CASE("field store: budgets of nothing, less than a slot, one slot, and
       CHECK(consistent(box));
       CHECK(guided_otherwise(box, view, wave) == 0);
       const auto last = box.last_wave();
-      CHECK(last.served == count_guided(box.exec(), view, wave.size()));
-      CHECK(last.served + last.unserved == wave.size());
+      CHECK(last.with_field == count_guided(box.exec(), view, wave.size()));
+      CHECK(last.with_field + last.without_field == wave.size());
       CHECK(last.unbinned == 0);
       const bool everyone = budget > 1000000;
-      CHECK(box.counts().live == (everyone ? box.counts().born : budget / a_slot));
+      CHECK(box.counts().live == (everyone ? box.counts().allocated : budget / a_slot));
       CHECK((box.counts().refused > 0) == !everyone);
-      if (everyone) CHECK(last.unserved == 0);
+      if (everyone) CHECK(last.without_field == 0);
     }
   }
 }
@@ -79,7 +79,7 @@ WFPG_TEST_CASE("field store: births cast all cells, refreshes one in so many, on
     box.begin();
     box.settle(wave);
     CHECK(box.log.take() == 7 * c.all);
-    CHECK(box.counts().born == 7);
+    CHECK(box.counts().allocated == 7);
     box.begin();
     CHECK(box.cones(wave) == 7 * c.part);
     CHECK(box.last_wave().part == 7);
@@ -123,7 +123,7 @@ WFPG_TEST_CASE("field store: after many samples one wave in eight builds, whatev
       guided += cones > 0 ? 1 : 0;
       INFO("depth " << depth << ", sample " << box.sample);
       CHECK(cones == ((box.sample + depth) % 8 == 0 ? 16u : 0u));
-      CHECK(box.last_wave().served == (guided > 0 ? 9u : 0u));
+      CHECK(box.last_wave().with_field == (guided > 0 ? 9u : 0u));
       box.end();
     }
     CHECK(guided == 1);
@@ -166,8 +166,8 @@ WFPG_TEST_CASE("field store: waves that build nothing find what others do, and e
                                   : box.find(rays);
       (builds ? built : found) += is_empty ? 0 : 1;
       const auto counts = box.last_wave();
-      CHECK(counts.served == (is_empty ? 0 : 3));
-      CHECK(counts.unserved == 0);
+      CHECK(counts.with_field == (is_empty ? 0 : 3));
+      CHECK(counts.without_field == 0);
       CHECK(counts.unbinned == (is_empty ? 0 : 1));
       CHECK(counts.builds <= 3);
       if (is_empty) continue;
@@ -186,9 +186,9 @@ WFPG_TEST_CASE("field store: who is to find fields only is given none that are n
   box.begin();
   CHECK(box.store.builds_in_wave());
   CHECK(box.find(floor_rays(3)) == std::vector<std::uint32_t>(3, wfpg::no_field));
-  CHECK(box.last_wave().unserved == 3);
+  CHECK(box.last_wave().without_field == 3);
   CHECK(box.cones(floor_rays(3)) == 3 * 16);
-  CHECK(box.last_wave().served == 3);
+  CHECK(box.last_wave().with_field == 3);
 }
 
 WFPG_TEST_CASE("field store: what is invalidated after many samples is cast in the next wave",
@@ -223,7 +223,7 @@ WFPG_TEST_CASE("field store: slots unused for some samples are freed and used ag
     const auto wave = floor_rays(12);
     CHECK(count_guided(box.exec(), box.settle(wave), 12) == 12);
     CHECK(box.log.take() == 8 * 16 + 4 * 4);
-    CHECK(box.counts().born == 20);
+    CHECK(box.counts().allocated == 20);
     CHECK(box.counts().live == 12);
     CHECK(box.counts().refused == 0);
     CHECK(consistent(box));
@@ -304,16 +304,10 @@ WFPG_TEST_CASE("field store: bins are as small as there are slots for, and stay 
 }
 
 TEST_CASE("field store: how many times as many rays as fit the room bins are to have", "[field_store]") {
-  using wfpg::detail::adapt_pressure;
+  using constants = wfpg::build_schedule_constants;
   const auto next = [](std::uint32_t sample, std::uint32_t slots, std::uint32_t used, std::uint32_t refused,
                        std::uint32_t pressure) {
-    wfpg::detail::field_store_state state;
-    state.pressure = pressure;
-    state.used = used;
-    state.refused_births = refused;
-    state.waiting = refused;
-    adapt_pressure{&state, slots, sample}(0);
-    return state.pressure;
+    return wfpg::build_schedule::next_pressure(pressure, used + refused, slots, sample, refused > 0);
   };
   CHECK(next(8, 800, 700, 0, 128) == 128);  // an eighth is free
   CHECK(next(2, 800, 525, 0, 128) == 96);
@@ -326,19 +320,19 @@ TEST_CASE("field store: how many times as many rays as fit the room bins are to 
   CHECK(next(16, 800, 100, 5, 128) == 128);
   CHECK(next(4, 800, 0, 0, 128) == 128);  // nothing was guided
   CHECK(next(4, 0, 0, 9, 128) == 256);
-  CHECK(next(4, 800, 1, 0, adapt_pressure::least) == adapt_pressure::least);
-  CHECK(next(64, 800, 800, 1, adapt_pressure::most) == adapt_pressure::most);
+  CHECK(next(4, 800, 1, 0, constants::least_pressure) == constants::least_pressure);
+  CHECK(next(64, 800, 800, 1, constants::largest_pressure) == constants::largest_pressure);
 }
 
 WFPG_TEST_CASE("field store: levels are chosen anew after samples 1, 2, 4, 8, ...", "[field_store]") {
   kept_box<Exec> box(slots_of(4, 100));
   const auto few = rays_at(floor_place(0), up, 2), many = rays_at(floor_place(0), up, 1000);
   std::set<std::uint32_t> finer_in;
-  std::uint64_t born = 0;
+  std::uint64_t allocated = 0;
   while (box.sample < 20) {
     box.whole_sample(box.sample + 1 == 5 ? many : few);
-    if (box.counts().born > born) finer_in.insert(box.sample);
-    born = box.counts().born;
+    if (box.counts().allocated > allocated) finer_in.insert(box.sample);
+    allocated = box.counts().allocated;
   }
   CHECK(finer_in == std::set<std::uint32_t>{1, 9});
 }

@@ -37,7 +37,7 @@ WFPG_TEST_CASE("field store: a wave casts no more cones than it may, and nobody 
       CHECK(consistent(box));
       if (sample == 0) CHECK(box.counts().refused > 0);
     }
-    CHECK(box.counts().born == (most < 16 ? 0 : 16));
+    CHECK(box.counts().allocated == (most < 16 ? 0 : 16));
     CHECK(count_guided(box.exec(), box.prepare(wave), 16) == (most < 16 ? 0 : 16));
     box.store.invalidate_all(box.exec());
     std::size_t recast = 0;
@@ -110,9 +110,9 @@ WFPG_TEST_CASE("field store: a limit on cones makes no bins larger", "[field_sto
   for (int sample = 0; sample < 4; ++sample) {
     box.begin();
     for (int wave = 0; wave < 8; ++wave) box.prepare(wall_surfaces(600, 1));
-    delayed += box.state().delayed_births;
+    delayed += box.state().delayed;
     box.end();
-    CHECK(box.state().pressure <= wfpg::detail::field_store_state().pressure);
+    CHECK(box.state().pressure <= wfpg::field_store_state().pressure);
   }
   CHECK(box.counts().live == 4 * 8);
   CHECK(delayed > 160 * 4);
@@ -129,7 +129,7 @@ WFPG_TEST_CASE("field store: samples that only count rays leave bins to those th
     box.store.count(box.exec(), surfaces.size(), rays);
     box.end();
   }
-  CHECK(box.state().pressure == wfpg::detail::field_store_state().pressure);
+  CHECK(box.state().pressure == wfpg::field_store_state().pressure);
 }
 
 WFPG_TEST_CASE("field store: fields that may see what moved are cast anew, the others refreshed",
@@ -159,7 +159,7 @@ WFPG_TEST_CASE("field store: fields that may see what moved are cast anew, the o
   CHECK(box.cones(all) == 0);
   box.begin();
   CHECK(box.cones(floor) == none[0]);
-  CHECK(box.counts().born == 11);
+  CHECK(box.counts().allocated == 11);
 }
 
 WFPG_TEST_CASE("field store: invalid fields serve as they are until they are used next", "[field_store]") {
@@ -172,7 +172,7 @@ WFPG_TEST_CASE("field store: invalid fields serve as they are until they are use
   box.begin();
   CHECK(box.cones({wave[1]}) == 64);
   CHECK(box.cones({wave[1], wave[0]}) == 16);
-  CHECK(box.counts().born == 3);
+  CHECK(box.counts().allocated == 3);
   CHECK(field_bits(box.exec(), box.prepare({wave[2]}), 1)[0] != before[2]);
 }
 
@@ -187,8 +187,8 @@ WFPG_TEST_CASE("field store: unusual rays are counted and have no field", "[fiel
   box.begin();
   const guide_view view = box.settle(wave);
   CHECK(box.last_wave().unbinned == 3);
-  CHECK(box.last_wave().unserved == 0);
-  CHECK(box.last_wave().served == 7);
+  CHECK(box.last_wave().without_field == 0);
+  CHECK(box.last_wave().with_field == 7);
   CHECK(count_guided(box.exec(), view, wave.size()) == 7);
   CHECK(count_guided(box.exec(), box.prepare({}), 12) == 0);
 }

@@ -58,11 +58,11 @@ struct with_turns : uniform_guide<Exec> {
   std::uint32_t updates = 0;
 
   wfpg::recording_needs recording() const { return {1, false, 4}; }
-  void learn(const wfpg::guide_sample<Exec>& at, const wfpg::path_recorder<Exec>& paths) {
+  void learn(const wfpg::sample_context<Exec>& at, const wfpg::path_recorder<Exec>& paths) {
     recorded.push_back(paths.recorded());
     learnt_from.push_back(at.number);
   }
-  void update(const wfpg::guide_sample<Exec>& at) {
+  void update(const wfpg::sample_context<Exec>& at) {
     ++updates;
     if (at.recorded) said.push_back(at.number);
   }
@@ -80,7 +80,7 @@ struct with_notes : uniform_guide<Exec> {
   using uniform_guide<Exec>::uniform_guide;
   std::vector<bool> guided;
 
-  void begin_sample(const wfpg::guide_sample<Exec>& at) { guided.push_back(at.guided); }
+  void begin_sample(const wfpg::sample_context<Exec>& at) { guided.push_back(at.guided); }
 };
 
 /// One that has no use for paths.
@@ -93,7 +93,7 @@ struct without_paths : uniform_guide<Exec> {
 WFPG_TEST_CASE("a guide is what has options, a mesh, a view, and learns", "[guide]") {
   using guide = uniform_guide<Exec>;
   CHECK(wfpg::is_guide_v<guide, Exec>);
-  CHECK(wfpg::is_guide_v<wfpg::octree_guide<Exec>, Exec>);
+  CHECK(wfpg::is_guide_v<either_guide<Exec>, Exec>);
   CHECK(wfpg::is_guide_view_v<wfpg::guide_view>);
   CHECK(wfpg::is_guide_view_v<uniform_view>);
   CHECK(!wfpg::is_guide_v<without_options<Exec>, Exec>);
@@ -151,7 +151,7 @@ WFPG_TEST_CASE("a guide that has no sample recorded is refused", "[guide]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   CHECK_THROWS_WITH((wfpg::path_guider<Exec, without_turns<Exec>>(exec, mesh.view())),
-                    "wfpg: settled_turns is 0, expected at least 1");
+                    "wfpg: sample_stride is 0, expected at least 1");
 }
 
 TEST_CASE(
@@ -164,7 +164,7 @@ TEST_CASE(
     return wfpg::detail::recorded_fraction(options, wanted).needs(true);
   };
   const auto is = [](const wfpg::recording_needs& n, std::uint32_t share, std::uint32_t turns) {
-    return n.directions && n.share_shift == share && n.settled_turns == turns;
+    return n.directions && n.fraction_shift == share && n.sample_stride == turns;
   };
   CHECK(is(needs(1000, 0), 0, 1));  // none in particular: all
   CHECK(is(needs(1000, 16000), 0, 1));
@@ -252,10 +252,10 @@ WFPG_TEST_CASE("a guide's share of directions is guide_fraction, after the sampl
 WFPG_TEST_CASE("what is deeper than guided_depths is its BSDF's, by the octree's guide too", "[guide]") {
   const auto surfaces = wall_surfaces(700, 3);
   for (wfpg::guiding_mode mode : {wfpg::guiding_mode::oriented, wfpg::guiding_mode::plain})
-    for (wfpg::field_lifetime lifetime : lifetimes)
+    for (field_lifetime lifetime : lifetimes)
       for (std::uint32_t products : {0u, 4u}) {
-        wfpg::guider_options options = box_options(mode, lifetime);
-        options.product_resolution = products;
+        guider_options options = box_options(mode, lifetime);
+        options.product_resolution = unless_zero(products);
         options.guided_depths = 2;
         guided_box<Exec> box(options);
         box.learn();
@@ -339,10 +339,10 @@ WFPG_TEST_CASE("what paths gather is the same, whichever guide they have", "[gui
   const box_mesh<Exec> mesh(exec);
   constexpr std::size_t paths = 2048;
   constexpr std::uint32_t samples = 24;
-  wfpg::guider_options unguided = tracing_options(paths);
+  guider_options unguided = tracing_options(paths);
   unguided.unguided_samples = samples;
   const estimate expected =
-      estimate_radiance(exec, wfpg::path_guider<Exec>(exec, mesh.view(), unguided), samples, paths);
+      estimate_radiance(exec, octree_guider<Exec>(exec, mesh.view(), unguided), samples, paths);
   const estimate found = estimate_radiance(exec, make_guider(exec, mesh.view(), paths), samples, paths);
   CHECK(std::abs(found.mean - expected.mean) < 4.0 * std::sqrt(found.variance + expected.variance));
   CHECK(std::sqrt(found.variance) < 0.05 * found.mean);
@@ -377,15 +377,15 @@ WFPG_TEST_CASE("a guider that takes another's place gives its own memory back", 
   const box_mesh<Exec> mesh(exec);
   const std::size_t before = resource.bytes_in_use;
   {
-    const wfpg::guider_options options = tracing_options(256);
-    wfpg::path_guider<Exec> first(exec, mesh.view(), options), second(exec, mesh.view(), options);
+    const guider_options options = tracing_options(256);
+    octree_guider<Exec> first(exec, mesh.view(), options), second(exec, mesh.view(), options);
     trace_paths(exec, first, 2, 256, box_caster());
     const std::size_t both = resource.bytes_in_use;
     first = std::move(second);
     CHECK(resource.bytes_in_use < both);
     CHECK(first.statistics().samples == 0);
     const auto picture = trace_paths(exec, first, 3, 256, box_caster());
-    second = wfpg::path_guider<Exec>(exec, mesh.view(), options);
+    second = octree_guider<Exec>(exec, mesh.view(), options);
     CHECK(trace_paths(exec, second, 3, 256, box_caster()) == picture);
   }
   CHECK(resource.bytes_in_use == before);
@@ -399,7 +399,7 @@ WFPG_TEST_CASE("what all guiders tell and check, they do with any guide", "[guid
   CHECK(guider.statistics().samples == 3);
   CHECK(guider.statistics().guided_samples == 2);
   CHECK(guider.options().max_rays == 4096);
-  CHECK(guider.lights().empty());
+  CHECK(wfpg::light_guide_view(guider.lights()).empty());
   const wfpg::memory_report memory = guider.memory();
   CHECK(memory.persistent() == 0);
   CHECK(memory.transient() > 4096 * 8 * 40);

@@ -20,35 +20,35 @@
 namespace {
 
 using namespace wfpg_test;
-using wfpg::field_lifetime;
-using wfpg::guider_options;
 using wfpg::guiding_mode;
 
 constexpr std::size_t paths = 600;
 
 /// A guider that has traced some samples of the box.
-template <class Exec>
-wfpg::path_guider<Exec> trained(const Exec& exec, const guider_options& options, std::uint32_t samples = 3) {
-  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
+template <class Exec, class Options>
+auto trained(const Exec& exec, const Options& options, std::uint32_t samples = 3) {
+  wfpg::path_guider<Exec, wfpg::octree_guide_for<Exec, Options>> guider(exec, box_mesh<Exec>(exec).view(),
+                                                                        options);
   trace_paths(exec, guider, samples, paths, box_caster());
   return guider;
 }
 
-template <class Exec>
-std::string saved(const wfpg::path_guider<Exec>& guider) {
+template <class Exec, class Guide>
+std::string saved(const wfpg::path_guider<Exec, Guide>& guider) {
   std::ostringstream out;
   wfpg::save_guide(guider, out);
   return out.str();
 }
 
-template <class Exec>
-wfpg::path_guider<Exec> loaded(const Exec& exec, const std::string& bytes, const guider_options& options) {
+template <class Exec, class Options>
+auto loaded(const Exec& exec, const std::string& bytes, const Options& options) {
   std::istringstream in(bytes);
   return wfpg::load_guide(exec, in, options);
 }
 
 /// What is wrong with a file's bytes; empty where nothing is.
-std::string fault(const std::string& bytes, const guider_options& options) {
+template <class Options>
+std::string fault(const std::string& bytes, const Options& options) {
   try {
     loaded(one_policy(), bytes, options);
   } catch (const wfpg::file_error& error) {
@@ -57,8 +57,8 @@ std::string fault(const std::string& bytes, const guider_options& options) {
   return "";
 }
 
-guider_options small_options(field_lifetime lifetime = field_lifetime::kept) {
-  guider_options options = tracing_options(paths, guiding_mode::oriented, lifetime);
+wfpg::kept_guide_options small_options() {
+  wfpg::kept_guide_options options = tracing_options(paths);
   options.octree_resolution = 8;
   options.kept.resolution = 4;
   options.kept.budget_bytes = 40 * wfpg::field_store<one_policy>::bytes_a_slot(4);
@@ -68,7 +68,7 @@ guider_options small_options(field_lifetime lifetime = field_lifetime::kept) {
 bool same_counts(const wfpg::guider_statistics& a, const wfpg::guider_statistics& b) {
   bool same = a.samples == b.samples && a.guided_samples == b.guided_samples &&
               a.depths.size() == b.depths.size() && a.kept.live == b.kept.live &&
-              a.kept.born == b.kept.born && a.kept.freed == b.kept.freed &&
+              a.kept.allocated == b.kept.allocated && a.kept.freed == b.kept.freed &&
               a.kept.refreshed == b.kept.refreshed && a.kept.refused == b.kept.refused &&
               a.deposits.total() == b.deposits.total() && a.dropped_vertices == b.dropped_vertices &&
               a.build.skipped() == b.build.skipped();
@@ -78,33 +78,39 @@ bool same_counts(const wfpg::guider_statistics& a, const wfpg::guider_statistics
   return same;
 }
 
+/// A guider that is saved and loaded is as it was, and traces the same paths.
+template <class Exec, class Options>
+void check_goes_on(const Exec& exec, const Options& options) {
+  auto first = trained(exec, options, 5);
+  const std::string bytes = saved(first);
+  auto second = loaded(exec, bytes, options);
+  CHECK(saved(second) == bytes);
+  CHECK(same_counts(first.statistics(), second.statistics()));
+  CHECK((second.statistics().kept.live > 0) == (std::is_same_v<Options, wfpg::kept_guide_options>));
+
+  const auto picture = trace_paths(exec, first, 4, paths, box_caster());
+  CHECK(trace_paths(exec, second, 4, paths, box_caster()) == picture);
+  CHECK(saved(first) == saved(second));
+  CHECK(same_counts(first.statistics(), second.statistics()));
+  decltype(first) fresh(exec, box_mesh<Exec>(exec).view(), options);
+  CHECK(trace_paths(exec, fresh, 4, paths, box_caster()) != picture);
+}
+
 WFPG_TEST_CASE("a guider that was saved and loaded goes on to the bit", "[guide_file]") {
   const Exec exec;
   for (const field_lifetime lifetime : lifetimes)
     for (const guiding_mode mode : {guiding_mode::oriented, guiding_mode::plain})
       for (const std::uint32_t product : {0u, 4u}) {
         INFO(name_of(lifetime) << ", products " << product << ", plain " << (mode == guiding_mode::plain));
-        guider_options options = tracing_options(paths, mode, lifetime);
-        options.product_resolution = product;
-        wfpg::path_guider<Exec> first = trained(exec, options, 5);
-        const std::string bytes = saved(first);
-        wfpg::path_guider<Exec> second = loaded(exec, bytes, options);
-        CHECK(saved(second) == bytes);
-        CHECK(same_counts(first.statistics(), second.statistics()));
-        CHECK((second.statistics().kept.live > 0) == (lifetime == field_lifetime::kept));
-
-        const auto picture = trace_paths(exec, first, 4, paths, box_caster());
-        CHECK(trace_paths(exec, second, 4, paths, box_caster()) == picture);
-        CHECK(saved(first) == saved(second));
-        CHECK(same_counts(first.statistics(), second.statistics()));
-        wfpg::path_guider<Exec> fresh(exec, box_mesh<Exec>(exec).view(), options);
-        CHECK(trace_paths(exec, fresh, 4, paths, box_caster()) != picture);
+        guider_options either = tracing_options(paths, mode, lifetime);
+        if (product > 0) either.product_resolution = product;
+        with_own_options(either, [&](const auto& options) { check_goes_on(exec, options); });
       }
 }
 
 WFPG_TEST_CASE("fields without room, invalidated or without light go on to the bit", "[guide_file]") {
   const Exec exec;
-  guider_options options = small_options();
+  wfpg::kept_guide_options options = small_options();
   options.octree_resolution = 32;
   for (const bool moved : {false, true}) {  // where nothing did, waves take turns to build fields from now on
     wfpg::path_guider<Exec> first = trained(exec, options, 40);
@@ -122,7 +128,7 @@ WFPG_TEST_CASE("fields without room, invalidated or without light go on to the b
 
 WFPG_TEST_CASE("fields that wait for their cones are counted in a loaded guide, too", "[guide_file]") {
   const Exec exec;
-  guider_options options = small_options();
+  wfpg::kept_guide_options options = small_options();
   options.octree_resolution = 32;
   options.kept.budget_bytes *= 100;
   options.kept.max_wave_cones = 3 * 16;  // three births a wave
@@ -141,12 +147,12 @@ WFPG_TEST_CASE("fields that wait for their cones are counted in a loaded guide, 
 
 WFPG_TEST_CASE("a guide that not all samples teach any more goes on to the bit", "[guide_file]") {
   const Exec exec;
-  guider_options options = small_options();
+  wfpg::kept_guide_options options = small_options();
   options.octree_resolution = 8;
   options.deposits_per_leaf = 1;
   for (const bool dark : {false, true}) {  // from then on all samples are recorded for a while
     wfpg::path_guider<Exec> first = trained(exec, options, 41);
-    REQUIRE(first.guide().recording().settled_turns == 4);
+    REQUIRE(first.guide().recording().sample_stride == 4);
     if (dark) first.forget_light();
     wfpg::path_guider<Exec> second = loaded(exec, saved(first), options);
     CHECK(trace_paths(exec, second, 9, paths, box_caster()) ==
@@ -166,8 +172,8 @@ struct tell_lights {
   }
 };
 
-guider_options options_with_lights() {
-  guider_options options = small_options();
+wfpg::kept_guide_options options_with_lights() {
+  wfpg::kept_guide_options options = small_options();
   options.lights.weights = {1.0f, 2.0f, 0.5f};
   options.lights.resolution = 4;
   return options;
@@ -202,14 +208,14 @@ WFPG_TEST_CASE("choices of lights are saved and loaded to the bit", "[guide_file
 
 WFPG_TEST_CASE("a guider without samples or without surfaces can be saved", "[guide_file]") {
   const Exec exec;
-  const guider_options options = small_options();
+  const wfpg::kept_guide_options options = small_options();
   for (const bool empty : {false, true}) {
     const wfpg::path_guider<Exec> first =
         empty ? wfpg::path_guider<Exec>(exec, wfpg::triangle_mesh_view{}, options)
               : trained(exec, options, 0);
     wfpg::path_guider<Exec> second = loaded(exec, saved(first), options);
     CHECK(saved(second) == saved(first));
-    CHECK(second.octree().leaf_count() == first.octree().leaf_count());
+    CHECK(second.guide().octree().leaf_count() == first.guide().octree().leaf_count());
     CHECK(trace_paths(exec, second, 2, paths, box_caster()).size() == 2 * paths);
   }
 }
@@ -217,11 +223,11 @@ WFPG_TEST_CASE("a guider without samples or without surfaces can be saved", "[gu
 WFPG_TEST_CASE("a warm start guides from the first sample on, with other options", "[guide_file]") {
   const Exec exec;
   const std::string bytes = saved(trained(exec, small_options()));
-  guider_options options = small_options();
+  wfpg::kept_guide_options options = small_options();
   options.max_paths = 200;
   options.max_depth = 2;
   options.seed = 7;
-  options.rays_per_bin = 8;
+  options.binning.rays_per_bin = 8;
   options.kept.budget_bytes *= 2;
   wfpg::path_guider<Exec> warm = loaded(exec, bytes, options);
   CHECK(warm.statistics().depths.size() == 2);
@@ -235,18 +241,18 @@ WFPG_TEST_CASE("a warm start guides from the first sample on, with other options
 
 WFPG_TEST_CASE("fields that learn and fields that cannot take over from one another", "[guide_file]") {
   const Exec exec;
-  const guider_options learning = small_options();
-  guider_options without_paths = learning;  // nothing to learn from
+  const wfpg::kept_guide_options learning = small_options();
+  wfpg::kept_guide_options without_paths = learning;  // nothing to learn from
   without_paths.max_paths = 0;
   without_paths.max_rays = paths;
   const std::string bytes = saved(trained(exec, learning));
   const wfpg::path_guider<Exec> second = loaded(exec, bytes, without_paths);
-  CHECK(second.learnt().empty());
+  CHECK(second.guide().learnt().empty());
   CHECK(second.statistics().kept.live > 0);
   const std::string other = saved(second);
   CHECK(other.size() < bytes.size());
   wfpg::path_guider<Exec> third = loaded(exec, other, learning);
-  CHECK_FALSE(third.learnt().empty());
+  CHECK_FALSE(third.guide().learnt().empty());
   CHECK(third.statistics().kept.live == second.statistics().kept.live);
   CHECK(saved(third).size() == bytes.size());
   wfpg::path_guider<Exec> forgetful = loaded(exec, bytes, learning);
@@ -257,7 +263,7 @@ WFPG_TEST_CASE("fields that learn and fields that cannot take over from one anot
 }
 
 TEST_CASE("guide files that are cut off, altered or foreign are told apart", "[guide_file]") {
-  const guider_options options = small_options();
+  const wfpg::kept_guide_options options = small_options();
   const std::string bytes = saved(trained(one_policy(), options));
   REQUIRE(fault(bytes, options).empty());
 
@@ -314,7 +320,7 @@ TEST_CASE("guide files that are cut off, altered or foreign are told apart", "[g
 }
 
 TEST_CASE("guide files cut off anywhere are refused", "[guide_file]") {
-  const guider_options options = small_options();
+  const wfpg::kept_guide_options options = small_options();
   const std::string bytes = saved(trained(one_policy(), options));
   std::size_t read = 0;
   for (std::size_t size = 0; size < bytes.size(); size += 1 + size / 50)
@@ -323,31 +329,33 @@ TEST_CASE("guide files cut off anywhere are refused", "[guide_file]") {
 }
 
 TEST_CASE("guide files of other options are refused by the option's name", "[guide_file]") {
-  const guider_options options = options_with_lights();
+  const wfpg::kept_guide_options options = options_with_lights();
   const std::string bytes = saved(trained(one_policy(), options));
   const auto refused = [&](const char* name, auto change) {
-    guider_options other = options;
+    wfpg::kept_guide_options other = options;
     change(other);
     const std::string message = fault(bytes, other);
     INFO(message);
     CHECK(message.find(std::string("option ") + name + " ") != std::string::npos);
   };
-  refused("octree_resolution", [](guider_options& o) { o.octree_resolution = 16; });
-  refused("mode", [](guider_options& o) { o.mode = guiding_mode::plain; });
-  refused("fields", [](guider_options& o) { o.fields = field_lifetime::transient; });
-  refused("kept.resolution", [](guider_options& o) { o.kept.resolution = 8; });
-  refused("kept.learn", [](guider_options& o) { o.kept.learn = false; });
-  refused("kept.budget_bytes", [](guider_options& o) { o.kept.budget_bytes /= 40; });
-  refused("lights.resolution", [](guider_options& o) { o.lights.resolution = 8; });
-  refused("lights.weights.size()", [](guider_options& o) { o.lights.weights = {1.0f, 1.0f}; });
-  guider_options invalid = options;
-  invalid.rays_per_bin = 0;
+  refused("octree_resolution", [](wfpg::kept_guide_options& o) { o.octree_resolution = 16; });
+  refused("mode", [](wfpg::kept_guide_options& o) { o.mode = guiding_mode::plain; });
+  wfpg::transient_guide_options transient;
+  static_cast<wfpg::octree_guide_options&>(transient) = options;
+  CHECK(fault(bytes, transient).find("option fields ") != std::string::npos);
+  refused("kept.resolution", [](wfpg::kept_guide_options& o) { o.kept.resolution = 8; });
+  refused("kept.learn", [](wfpg::kept_guide_options& o) { o.kept.learn = false; });
+  refused("kept.budget_bytes", [](wfpg::kept_guide_options& o) { o.kept.budget_bytes /= 40; });
+  refused("lights.resolution", [](wfpg::kept_guide_options& o) { o.lights.resolution = 8; });
+  refused("lights.weights.size()", [](wfpg::kept_guide_options& o) { o.lights.weights = {1.0f, 1.0f}; });
+  wfpg::kept_guide_options invalid = options;
+  invalid.binning.rays_per_bin = 0;
   CHECK_THROWS_AS(loaded(one_policy(), bytes, invalid), std::invalid_argument);
 }
 
 TEST_CASE("a guide file has the octree's resolution, which a host's own fragments decide", "[guide_file]") {
   const one_policy exec;
-  guider_options options = small_options();
+  wfpg::kept_guide_options options = small_options();
   wfpg::path_guider<one_policy> guider(exec, wfpg::voxelize(exec, box_mesh<one_policy>(exec).view(), 16),
                                        options);
   trace_paths(exec, guider, 3, paths, box_caster());
@@ -360,7 +368,7 @@ TEST_CASE("a guide file has the octree's resolution, which a host's own fragment
 }
 
 TEST_CASE("what is in a guide file is checked, whatever its checksums say", "[guide_file]") {
-  const guider_options options = small_options();
+  const wfpg::kept_guide_options options = small_options();
   const std::string bytes = saved(trained(one_policy(), options));
   const std::uint64_t infinity = 0x7f800000u, nan = 0x7ff8000000000000ull;
   const auto refused = [&](const char* section, std::size_t at, std::size_t n, std::uint64_t value,
@@ -376,13 +384,14 @@ TEST_CASE("what is in a guide file is checked, whatever its checksums say", "[gu
   refused("octree", section_of(bytes, "octree").size - 8, 8, 8 * 8 * 8, "has leaves out of order");
 
   const wfpg::path_guider<one_policy> guider = loaded(one_policy(), bytes, options);
-  const std::size_t nodes = guider.octree().node_count(), leaves = guider.octree().leaf_count();
+  const std::size_t nodes = guider.guide().octree().node_count(),
+                    leaves = guider.guide().octree().leaf_count();
   refused("cache", 0, 2, 0xff00, "has normals that are none");
   refused("cache", 3 * nodes - leaves, 8, nan, "has radiance that is negative or not finite");
   refused("cache", 3 * nodes - leaves, 8, 1ull << 63 | 0x3ff0000000000000ull,
           "has radiance that is negative or not finite");
   refused("counts", 0, 4, 0x80000000u, "has samples without end");
-  refused("counts", 4, 4, 36, "settles after samples that are to come");
+  refused("counts", 4, 4, 36, "warms up until after samples that are to come");
   refused("levels", 0, 4, 4, "has more samples than there were");
   refused("levels", 4, 4, 36, "has more samples than there were");
   refused("levels", 8 + 5 * leaves - 1, 1, 4, "has a level below the leaves");
@@ -413,7 +422,7 @@ TEST_CASE("what is in a guide file is checked, whatever its checksums say", "[gu
 /// Bytes altered anywhere behind right checksums are refused or give a guider that guides.
 TEST_CASE("guide files with anything in them do no harm", "[guide_file]") {
   const one_policy exec;
-  const guider_options options = small_options();
+  const wfpg::kept_guide_options options = small_options();
   const std::string bytes = saved(trained(exec, options));
   const std::vector<section_place> places = sections_of(bytes);
   random_numbers random(5);
@@ -437,7 +446,7 @@ TEST_CASE("guide files with anything in them do no harm", "[guide_file]") {
 
 TEST_CASE("guide files replace one another whole", "[guide_file]") {
   const one_policy exec;
-  const guider_options options = small_options();
+  const wfpg::kept_guide_options options = small_options();
   const temporary_folder folder;
   const std::string path = folder.file("a.guide");
   folder.write("a.guide", "something older");

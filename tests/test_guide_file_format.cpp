@@ -22,28 +22,28 @@
 namespace {
 
 using namespace wfpg_test;
-using wfpg::guider_options;
 
 constexpr std::size_t paths = 600;
 
-template <class Exec>
-std::string saved(const wfpg::path_guider<Exec>& guider) {
+template <class Exec, class Guide>
+std::string saved(const wfpg::path_guider<Exec, Guide>& guider) {
   std::ostringstream out;
   wfpg::save_guide(guider, out);
   return out.str();
 }
 
-guider_options learning_options() {
-  guider_options options = tracing_options(paths);
+wfpg::kept_guide_options learning_options() {
+  wfpg::kept_guide_options options = tracing_options(paths);
   options.octree_resolution = 16;
   options.lights.weights = {1.0f, 2.0f, 0.5f};
   options.lights.resolution = 4;
   return options;
 }
 
-template <class Exec>
-wfpg::path_guider<Exec> trained(const Exec& exec, const guider_options& options) {
-  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
+template <class Exec, class Options>
+auto trained(const Exec& exec, const Options& options) {
+  wfpg::path_guider<Exec, wfpg::octree_guide_for<Exec, Options>> guider(exec, box_mesh<Exec>(exec).view(),
+                                                                        options);
   trace_paths(exec, guider, 4, paths, box_caster());
   return guider;
 }
@@ -76,8 +76,9 @@ std::vector<format_row> table_of(const std::string& text) {
 
 /// How many of each unit a guider has, by counting fields in its file.
 std::map<std::string, std::size_t> units_of(const wfpg::path_guider<one_policy>& guider,
-                                            const guider_options& options, const std::string& bytes) {
-  const wfpg::sparse_voxel_octree_view tree = guider.octree().view();
+                                            const wfpg::kept_guide_options& options,
+                                            const std::string& bytes) {
+  const wfpg::sparse_voxel_octree_view tree = guider.guide().octree().view();
   const std::size_t cells = std::size_t(options.kept.resolution) * options.kept.resolution;
   const std::string fields = payload_of(bytes, "fields");
   std::size_t live = 0, built = 0;
@@ -99,7 +100,7 @@ std::map<std::string, std::size_t> units_of(const wfpg::path_guider<one_policy>&
 
 TEST_CASE("the table of a guide file says what is written", "[guide_file]") {
   const one_policy exec;
-  const guider_options options = learning_options();
+  const wfpg::kept_guide_options options = learning_options();
   const wfpg::path_guider<one_policy> guider = trained(exec, options);
   const std::string bytes = saved(guider), text = page();
   CHECK(text.find("A guide file of version " + std::to_string(wfpg::detail::guide_file_kind.version) + ",") !=
@@ -121,7 +122,7 @@ TEST_CASE("the table of a guide file says what is written", "[guide_file]") {
   CHECK(sizes.size() == sections_of(bytes).size());  // "end", too, which has nothing
 }
 
-std::string refusal_of(const std::string& bytes, const guider_options& options,
+std::string refusal_of(const std::string& bytes, const wfpg::kept_guide_options& options,
                        const wfpg::triangle_mesh_view* mesh = nullptr) {
   std::istringstream in(bytes);
   try {
@@ -137,7 +138,7 @@ std::string refusal_of(const std::string& bytes, const guider_options& options,
 }
 
 TEST_CASE("a guide of another scene is refused by its tag", "[guide_file]") {
-  guider_options options = learning_options();
+  wfpg::kept_guide_options options = learning_options();
   options.scene_tag = 0x123456789abcdefull;
   const std::string bytes = saved(trained(one_policy(), options));
   CHECK(refusal_of(bytes, options).empty());
@@ -149,7 +150,7 @@ TEST_CASE("a guide of another scene is refused by its tag", "[guide_file]") {
 
 TEST_CASE("a guide of other triangles is refused by its octree", "[guide_file]") {
   const one_policy exec;
-  const guider_options options = learning_options();
+  const wfpg::kept_guide_options options = learning_options();
   const std::string bytes = saved(trained(exec, options));
   const box_mesh<one_policy> box(exec);
   const wfpg::triangle_mesh_view same = box.view();
@@ -195,7 +196,7 @@ class counting_policy : public wfpg::exec::cpu_policy<counting_policy, 8> {
 
 TEST_CASE("guides are saved and loaded by a few copies of whole buffers", "[guide_file]") {
   const counting_policy exec;
-  const guider_options options = learning_options();
+  const wfpg::kept_guide_options options = learning_options();
   const wfpg::path_guider<counting_policy> guider = trained(exec, options);
   REQUIRE(guider.statistics().kept.live > 50);
   counting_policy::copies = 0;

@@ -343,7 +343,7 @@ WFPG_TEST_CASE("irradiance records: what paths gather keeps its mean, variance i
   for (const float fraction : {0.0f, 0.3f, 1.0f})
     for (const bool include_emission : {true, false}) {
       INFO("fraction " << fraction << (include_emission ? "" : ", without emission"));
-      options.guide_fraction = fraction;
+      options.guide_fraction = unless_zero(fraction);
       options.include_emission = include_emission;
       options.floor = fraction == 1.0f ? 1.0f : 0.01f;  // weights are bounded, as a test of means needs
       const estimate found = estimate_of(guided_paths(exec, options));

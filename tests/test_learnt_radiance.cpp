@@ -16,7 +16,7 @@
 using namespace wfpg_test;
 using wfpg::learnt_mean;
 using wfpg::mixed_with;
-using wfpg::rough_mean;
+using wfpg::stochastic_mean16;
 
 TEST_CASE("learnt mean: of up to 255 values, to a part in 2^16 each time", "[learnt_radiance]") {
   learnt_mean mean;
@@ -63,7 +63,7 @@ TEST_CASE("rough mean: exact where it can be", "[learnt_radiance]") {
   random_numbers random(2);
   for (std::uint32_t n : {1u, 2u, 3u, 4u, 6u, 8u, 12u, 16u, 24u, 32u, 48u, 64u, 96u, 128u, 192u})
     for (const double value : {0.0, 0x1p-63, 1.0, 1.5, 1.03125, 63.0, 0x1p63}) {
-      rough_mean mean;
+      stochastic_mean16 mean;
       CHECK(mean.count() == 0);
       CHECK(mean.mean() == 0.0f);
       mean.add(value * n, n, random.below(0xffffffffu));
@@ -74,7 +74,7 @@ TEST_CASE("rough mean: exact where it can be", "[learnt_radiance]") {
 
 TEST_CASE("rough mean: of values too small or too large, the nearest there is", "[learnt_radiance]") {
   for (const std::uint32_t random : {0u, 0xffffffffu}) {
-    rough_mean small, large;
+    stochastic_mean16 small, large;
     small.add(1e-30, 1, random);
     CHECK(small.mean() == 0.0f);
     large.add(1e30, 1, random);
@@ -91,7 +91,7 @@ TEST_CASE("rough mean: what it rounds it does not shift", "[learnt_radiance]") {
     double means = 0.0, squares = 0.0, counts = 0.0, exact = 0.0;
     for (std::uint32_t i = 0; i < values; ++i) exact += (1.0 + i % 7) / values;
     for (int trial = 0; trial < trials; ++trial) {
-      rough_mean mean;
+      stochastic_mean16 mean;
       for (std::uint32_t i = 0; i < values; ++i) mean.add(1.0 + i % 7, 1, random.below(0xffffffffu));
       means += static_cast<double>(mean.mean()) / trials;
       squares += static_cast<double>(mean.mean() * mean.mean()) / trials;
@@ -107,7 +107,7 @@ TEST_CASE("rough mean: what it rounds it does not shift", "[learnt_radiance]") {
 
 TEST_CASE("rough mean: old values fade once there are 192", "[learnt_radiance]") {
   random_numbers random(4);
-  rough_mean mean;
+  stochastic_mean16 mean;
   mean.add(1000.0, 1000, 0);
   CHECK(mean.mean() == 1.0f);
   CHECK(mean.count() == 192);
@@ -118,7 +118,7 @@ TEST_CASE("rough mean: old values fade once there are 192", "[learnt_radiance]")
 }
 
 TEST_CASE("a cone counts for so many values beside a mean", "[learnt_radiance]") {
-  rough_mean mean;
+  stochastic_mean16 mean;
   CHECK(mixed_with(mean, 5.0f, 1.0f) == 5.0f);
   mean.add(6.0, 3, 0);
   CHECK(mixed_with(mean, 6.0f, 1.0f) == 3.0f);
@@ -147,13 +147,14 @@ struct told_fields {
     return {const_view<wfpg::resident_field>(fields), 2, queue.view()};
   }
   /// Mean and count of every cell, of fields that are all in use.
-  std::vector<rough_mean> means() {
+  std::vector<stochastic_mean16> means() {
     queue.sum(exec);
-    wfpg::detail::field_slot in_use;
+    wfpg::field_slot in_use;
     in_use.last_used = 1;
-    const wfpg::buffer<wfpg::detail::field_slot, Exec> slots(
-        exec, std::vector<wfpg::detail::field_slot>(fields.size(), in_use));
-    const wfpg::buffer<rough_mean, Exec> means(exec, std::vector<rough_mean>(fields.size() * cells));
+    const wfpg::buffer<wfpg::field_slot, Exec> slots(exec,
+                                                     std::vector<wfpg::field_slot>(fields.size(), in_use));
+    const wfpg::buffer<stochastic_mean16, Exec> means(exec,
+                                                      std::vector<stochastic_mean16>(fields.size() * cells));
     exec.for_each_block(fields.size(), 0,
                         wfpg::detail::fold_learnt{slots.view(), 1, cells, queue.view(), means.data()});
     return means.to_host(exec);
@@ -171,7 +172,7 @@ WFPG_HD std::uint32_t told_field(std::uint32_t i) {
 
 WFPG_TEST_CASE("learnt radiance: means of many threads' values, whatever their order", "[learnt_radiance]") {
   constexpr std::uint32_t threads = 5000, fields = 8;
-  std::vector<rough_mean> first;
+  std::vector<stochastic_mean16> first;
   for (const bool backwards : {false, true}) {
     told_fields<Exec> told(fields, threads);
     const wfpg::learnt_radiance_view view = told.view();
@@ -180,7 +181,7 @@ WFPG_TEST_CASE("learnt radiance: means of many threads' values, whatever their o
       const std::uint32_t i = backwards ? threads - 1 - n : n;
       view.deposit(told_field(i), up, told_value(i));
     });
-    const std::vector<rough_mean> means = told.means();
+    const std::vector<stochastic_mean16> means = told.means();
     for (std::uint32_t field = 0; field < fields; ++field) {
       double sum = 0.0, count = 0.0;
       for (std::uint32_t i = 0; i < threads; ++i)
@@ -193,7 +194,8 @@ WFPG_TEST_CASE("learnt radiance: means of many threads' values, whatever their o
         mean += static_cast<double>(means[4 * field + cell].mean());
       CHECK(std::abs(mean / (sum / count) - 1.0) < 1.0 / 32);
     }
-    if (backwards) CHECK(std::memcmp(first.data(), means.data(), means.size() * sizeof(rough_mean)) == 0);
+    if (backwards)
+      CHECK(std::memcmp(first.data(), means.data(), means.size() * sizeof(stochastic_mean16)) == 0);
     first = means;
   }
 }
@@ -216,7 +218,7 @@ WFPG_TEST_CASE("learnt radiance: nonsense, and what is of no field, is dropped",
     view.deposit(0, up, -0.0f);
     view.deposit(1, up, 5.0f);  // one too many
   });
-  const std::vector<rough_mean> means = told.means();
+  const std::vector<stochastic_mean16> means = told.means();
   std::uint32_t counts[2] = {0, 0};
   float sums[2] = {0.0f, 0.0f};
   for (std::uint32_t i = 0; i < 8; ++i) {

@@ -335,7 +335,7 @@ void check_two_lobes(const Exec& exec, chi_square_family& family) {
       family.add(report.frequencies, "BSDF " + std::to_string(family.size()));
     }
 
-    const wfpg::mixture_shares shares = mixture.shares_of(s);
+    const wfpg::mixture_fractions shares = mixture.fractions_of(s);
     CHECK(shares.guide + shares.glossy + shares.smooth == Approx(1.0f));
     const double guide = double(shares.guide), guided = double(count(drawn, sampling_technique::guide));
     CHECK(std::abs(guided / samples - guide) <= 4.0 * std::sqrt(guide * (1.0 - guide) / samples));

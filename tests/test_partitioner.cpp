@@ -64,7 +64,7 @@ void check_partition(const Exec& exec, wfpg::partitioner<Exec>& partitioner, con
   permutation.resize(expected.permutation.size());
   CHECK((permutation == expected.permutation));
   CHECK((to_host(exec, view.offsets.subview(0, groups + 1)) == expected.offsets));
-  const indices through = to_host(exec, view.group_through);
+  const indices prefix = to_host(exec, view.group_prefix);
   std::size_t wrong = 0;
   const auto described = evaluate(exec, groups, [=] WFPG_HD(std::size_t group) {
     return group_record{view.key(group), view.begin(group), view.size(group)};
@@ -74,7 +74,7 @@ void check_partition(const Exec& exec, wfpg::partitioner<Exec>& partitioner, con
     wrong += described[group].begin != expected.offsets[group];
     wrong += described[group].size != expected.offsets[group + 1] - expected.offsets[group];
     for (std::uint32_t i = expected.offsets[group]; i < expected.offsets[group + 1]; ++i)
-      wrong += through[i] != group + 1;
+      wrong += prefix[i] != group + 1;
   }
   CHECK(wrong == 0);
   CHECK((device_keys.to_host(exec) == keys));

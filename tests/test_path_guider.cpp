@@ -15,10 +15,7 @@
 #include <vector>
 
 using namespace wfpg_test;
-using wfpg::field_lifetime;
-using wfpg::guider_options;
 using wfpg::guiding_mode;
-using wfpg::path_guider;
 using wfpg::sampled_direction;
 using wfpg::sampling_technique;
 
@@ -37,11 +34,15 @@ const std::vector<bad_option>& bad_options() {
       {"octree", [](guider_options& o) { o.octree_resolution = 0; }},
       {"octree", [](guider_options& o) { o.octree_resolution = 3; }},
       {"octree", [](guider_options& o) { o.octree_resolution = 1u << 20; }},
-      {"rays_per_bin", [](guider_options& o) { o.rays_per_bin = 0; }},
-      {"field_resolution", [](guider_options& o) { o.field_resolution = 1; }},
-      {"field_resolution", [](guider_options& o) { o.field_resolution = 129; }},
-      {"min_field_resolution", [](guider_options& o) { o.min_field_resolution = 0; }},
-      {"min_field_resolution", [](guider_options& o) { o.min_field_resolution = 500; }},
+      {"rays_per_bin", [](guider_options& o) { o.binning.rays_per_bin = 0; }},
+      {"field_resolution",
+       [](guider_options& o) { o.fields = field_lifetime::transient, o.field_resolution = 1; }},
+      {"field_resolution",
+       [](guider_options& o) { o.fields = field_lifetime::transient, o.field_resolution = 129; }},
+      {"min_field_resolution",
+       [](guider_options& o) { o.fields = field_lifetime::transient, o.min_field_resolution = 0; }},
+      {"min_field_resolution",
+       [](guider_options& o) { o.fields = field_lifetime::transient, o.min_field_resolution = 500; }},
       {"guide_fraction", [](guider_options& o) { o.guide_fraction = -0.1f; }},
       {"guide_fraction", [](guider_options& o) { o.guide_fraction = 1.5f; }},
       {"guide_fraction", [](guider_options& o) { o.guide_fraction = nan; }},
@@ -76,7 +77,7 @@ const std::vector<bad_option>& bad_options() {
       {"max_paths times max_depth", [](guider_options& o) {
          o.max_paths = std::size_t(1) << 31;
          o.max_depth = 1024;
-         o.deposit_capacity = 0;
+         o.deposit_capacity.reset();
        }}};
   return list;
 }
@@ -87,7 +88,7 @@ WFPG_TEST_CASE("path guider: options out of range are named", "[path_guider]") {
   for (const bad_option& bad : bad_options()) {
     guider_options options;
     bad.spoil(options);
-    const std::string message = refusal([&] { path_guider<Exec>(exec, mesh.view(), options); });
+    const std::string message = refusal([&] { octree_guider<Exec>(exec, mesh.view(), options); });
     INFO("expected: " << bad.name << ", message: " << message);
     CHECK(message.find(bad.name) != std::string::npos);
   }
@@ -96,7 +97,7 @@ WFPG_TEST_CASE("path guider: options out of range are named", "[path_guider]") {
   good.field_resolution = 128;
   good.min_field_resolution = 2;
   good.octree_resolution = 1;
-  CHECK(refusal([&] { path_guider<Exec>(exec, mesh.view(), good); }).empty());
+  CHECK(refusal([&] { octree_guider<Exec>(exec, mesh.view(), good); }).empty());
 }
 
 WFPG_TEST_CASE("path guider: waves beyond the capacity, and outputs that are too small", "[path_guider]") {
@@ -133,7 +134,7 @@ WFPG_TEST_CASE("path guider: no rays, and no capacity for any", "[path_guider]")
     CHECK(box.guider.statistics().depths[0].bins == 0);
 
     guider_options options = box_options(guiding_mode::oriented, lifetime);
-    options.max_rays = 0;
+    options.max_rays.reset();
     guided_box<Exec> incapable(options);
     incapable.learn();
     CHECK(incapable.sample({}).empty());
@@ -215,7 +216,7 @@ WFPG_TEST_CASE("path guider: an empty mesh guides nothing and works", "[path_gui
   const Exec exec;
   for (field_lifetime lifetime : lifetimes) {
     const guider_options options = tracing_options(64, guiding_mode::oriented, lifetime);
-    path_guider<Exec> guider(exec, wfpg::triangle_mesh_view{}, options);
+    octree_guider<Exec> guider(exec, wfpg::triangle_mesh_view{}, options);
     CHECK(!guider.guided());
     const auto picture = trace_paths(exec, guider, 3, 64, box_caster{});
     CHECK(std::all_of(picture.begin(), picture.end(), [](float x) { return std::isfinite(x); }));
@@ -229,8 +230,8 @@ WFPG_TEST_CASE("path guider: an empty mesh guides nothing and works", "[path_gui
     const auto statistics = guider.statistics();
     CHECK(statistics.guided_samples == 0);
     CHECK(statistics.deposits.outside > 0);
-    CHECK(statistics.kept.born == 0);
-    CHECK(guider.octree().leaf_count() == 0);
+    CHECK(statistics.kept.allocated == 0);
+    CHECK(guider.guide().octree().leaf_count() == 0);
     const bool kept = lifetime == field_lifetime::kept;
     CHECK(guider.memory().persistent() < 4096 + (kept ? options.kept.budget_bytes : 0));
   }
@@ -244,11 +245,11 @@ int count_toward_patch(field_lifetime lifetime) {
   const wfpg::buffer<wfpg::surface_fragment, Exec> device(exec, hits);
   guider_options options = box_options(guiding_mode::oriented, lifetime);
   options.octree_resolution = 8;
-  path_guider<Exec> guider(exec,
-                           wfpg::fragments_from_samples(exec, const_view<wfpg::surface_fragment>(device), 8,
-                                                        {vec3(0.0f), vec3(1.0f)}),
-                           options);
-  deposit_on_walls(exec, guider.cache(), 40,
+  octree_guider<Exec> guider(exec,
+                             wfpg::fragments_from_samples(exec, const_view<wfpg::surface_fragment>(device), 8,
+                                                          {vec3(0.0f), vec3(1.0f)}),
+                             options);
+  deposit_on_walls(exec, guider.guide().cache(), 40,
                    [](std::uint32_t f, float u, float v) { return emitted(face_point(f, u, v)); });
   guider.end_sample();
   guider.begin_sample();
@@ -292,7 +293,7 @@ WFPG_TEST_CASE("path guider: what is not finite is dropped and counted, and guid
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   for (field_lifetime lifetime : lifetimes) {
-    path_guider<Exec> guider(exec, mesh.view(), tracing_options(64, guiding_mode::oriented, lifetime));
+    octree_guider<Exec> guider(exec, mesh.view(), tracing_options(64, guiding_mode::oriented, lifetime));
     trace_paths(exec, guider, 1, 64, box_caster{});
     guider.begin_sample();
     const wave_of_surfaces<Exec> surfaces(exec, wall_surfaces(64, 9));
@@ -311,7 +312,7 @@ WFPG_TEST_CASE("path guider: what is not finite is dropped and counted, and guid
 WFPG_TEST_CASE("path guider: vertices out of range are dropped and counted", "[path_guider]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
-  path_guider<Exec> guider(exec, mesh.view(), tracing_options(4));
+  octree_guider<Exec> guider(exec, mesh.view(), tracing_options(4));
   guider.begin_sample();
   const auto recorder = guider.recorder();
   exec.for_each(1, [=] WFPG_HD(std::size_t) {

@@ -19,8 +19,6 @@
 namespace {
 
 using namespace wfpg_test;
-using wfpg::field_lifetime;
-using wfpg::guider_options;
 using wfpg::guiding_mode;
 using wfpg::sampled_direction;
 using wfpg::sampling_technique;
@@ -36,7 +34,7 @@ void for_each_kind(const F& f) {
       for (const std::uint32_t products : {0u, 4u}) {
         INFO(name_of(lifetime) << ", plain " << (mode == guiding_mode::plain) << ", products " << products);
         guider_options options = box_options(mode, lifetime);
-        options.product_resolution = products;
+        options.product_resolution = unless_zero(products);
         f(options);
       }
 }
@@ -239,7 +237,7 @@ WFPG_TEST_CASE("path guider: surfaces that are not finite draw nothing without a
   for_each_kind([&](const guider_options& options) {
     guided_box<Exec> box(options);
     box.learn();
-    const wfpg::svo_ray_caster marcher(box.guider.octree().view(), 1.0f);
+    const wfpg::svo_ray_caster marcher(box.guider.guide().octree().view(), 1.0f);
     CHECK(count_unsound(box.sample_again(surfaces)) == 0);
     CHECK(count_unsound(box.sample_again(surfaces, marcher)) == 0);
     const auto depth = box.guider.statistics().depths[0];
@@ -305,7 +303,7 @@ WFPG_TEST_CASE("path guider: vertices and directions that lead nowhere are dropp
                "[path_guider][faults]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
-  wfpg::path_guider<Exec> guider(exec, mesh.view(), tracing_options(3));
+  octree_guider<Exec> guider(exec, mesh.view(), tracing_options(3));
   guider.begin_sample();
   exec.for_each(3, record_nowhere{guider.recorder()});
   CHECK(guider.statistics().dropped_vertices == 6);

@@ -19,8 +19,6 @@
 #include <vector>
 
 using namespace wfpg_test;
-using wfpg::field_lifetime;
-using wfpg::guider_options;
 using wfpg::guiding_mode;
 
 namespace {
@@ -137,7 +135,7 @@ class drawn_anew {
 guider_options small_fields(field_lifetime lifetime, std::uint32_t resolution) {
   guider_options options = box_options(guiding_mode::oriented, lifetime);
   options.octree_resolution = 8;
-  options.rays_per_bin = 1000;
+  options.binning.rays_per_bin = 1000;
   options.field_resolution = options.min_field_resolution = options.kept.resolution = resolution;
   options.kept.budget_bytes = 1 << 16;
   options.deposit_capacity = 16;
@@ -257,7 +255,7 @@ WFPG_TEST_CASE("path guider: products evaluate BSDFs at other points in each sam
   for (const field_lifetime lifetime : lifetimes)
     for (const bool glass : {false, true}) {
       guider_options options = small_fields(lifetime, 8);
-      options.product_resolution = p;
+      options.product_resolution = unless_zero(p);
       guided_box<Exec> box(options);
       const wfpg::grid_distribution grid(nullptr, p);
       const wfpg::directional_field domain =
@@ -331,7 +329,7 @@ WFPG_TEST_CASE("path guider: what was learnt of lights is forgotten with all lig
     guider_options options = box_options(guiding_mode::oriented, lifetime);
     options.lights.weights = {4.0f, 2.0f, 1.0f};
     options.lights.resolution = 4;
-    options.rays_per_bin = 1000;  // the place keeps its field
+    options.binning.rays_per_bin = 1000;  // the place keeps its field
     guided_box<Exec> box(options);
     const test_surface at = make_surface({0.3f, 0.0f, 0.3f}, {0, 1, 0}, {0, 1, 0});
     const vec3 direction = glm::normalize(vec3(-0.3f, 0.8f, 0.4f));  // where the patch is not
@@ -346,7 +344,8 @@ WFPG_TEST_CASE("path guider: what was learnt of lights is forgotten with all lig
     };
     const auto learn = [&] {
       const wfpg::guide_view view = box.guider.prepare(wave.get(), box_caster{});
-      box.exec.for_each(300, find_light{box.guider.lights(), box.guider.learnt(), view, at, direction});
+      box.exec.for_each(300,
+                        find_light{box.guider.lights(), box.guider.guide().learnt(), view, at, direction});
     };
     box.guider.begin_sample();
     const knowledge before = known();

@@ -10,8 +10,6 @@
 #include <vector>
 
 using namespace wfpg_test;
-using wfpg::field_lifetime;
-using wfpg::guider_options;
 using wfpg::guiding_mode;
 using wfpg::sampled_direction;
 
@@ -46,7 +44,7 @@ std::vector<sampled_direction> sample_prepared(guided_box<Exec>& box,
 WFPG_TEST_CASE("path guider: both forms draw the same directions from the same numbers, bit for bit",
                "[path_guider]") {
   for (guider_options options : kinds_of_guiding()) {
-    options.rays_per_bin = 8;  // bins with more and with fewer rays than these
+    options.binning.rays_per_bin = 8;  // bins with more and with fewer rays than these
     guided_box<Exec> fused(options), prepared(options), batch(options), prepared_batch(options);
     for (guided_box<Exec>* box : {&fused, &prepared, &batch, &prepared_batch}) box->learn();
     const auto surfaces = mixed_surfaces(700, 4);
@@ -75,7 +73,7 @@ WFPG_TEST_CASE("path guider: both forms agree, and count alike, where few waves 
   for (guiding_mode mode : modes)
     for (std::uint32_t products : {0u, 4u}) {
       guider_options options = box_options(mode, field_lifetime::kept);
-      options.product_resolution = products;
+      options.product_resolution = unless_zero(products);
       guided_box<Exec> fused(options), prepared(options);
       fused.learn();
       prepared.learn();

@@ -18,8 +18,6 @@
 #include <vector>
 
 using namespace wfpg_test;
-using wfpg::field_lifetime;
-using wfpg::guider_options;
 using wfpg::guiding_mode;
 using wfpg::sampled_direction;
 using wfpg::sampling_technique;
@@ -80,7 +78,7 @@ WFPG_TEST_CASE("path guider: cones start off the surface, on the side that it is
       INFO(describe(options) << ", surface at " << from.surface.position.x << ", " << from.surface.position.y
                              << ", " << from.surface.position.z);
       guided_box<Exec> inlined(options), batched(options);
-      const float voxel = inlined.guider.octree().view().grid().voxel_size();
+      const float voxel = inlined.guider.guide().octree().view().grid().voxel_size();
       cone_log<Exec> log(inlined.exec, 2000);
       std::vector<wfpg::ray> batch;
       const std::vector<test_surface> wave(5, from.surface);
@@ -161,12 +159,13 @@ template <class Exec>
 double learnt_share(std::uint32_t products, drawn_by form, sampling_technique technique) {
   constexpr std::size_t rays = 1000;
   guider_options options = box_options();
-  options.product_resolution = products;
-  options.max_paths = options.max_rays = rays;
+  options.product_resolution = unless_zero(products);
+  options.max_paths = rays;
+  options.max_rays = rays;
   options.max_depth = 2;
-  options.deposit_capacity = 0;
-  options.deposits_per_leaf = 0;  // all paths are recorded
-  options.min_bin_level = 5;      // a field for each place from the beginning
+  options.deposit_capacity.reset();
+  options.deposits_per_leaf.reset();  // all paths are recorded
+  options.binning.min_level = 5;      // a field for each place from the beginning
   guided_box<Exec> box(options);
   std::vector<test_surface> surfaces;
   for (std::size_t i = 0; i < rays; ++i) {
@@ -238,7 +237,7 @@ struct key_of_ray {
 template <class Exec>
 std::set<std::uint32_t> live_keys(const guided_box<Exec>& box) {
   std::set<std::uint32_t> keys;
-  for (const std::uint32_t key : box.guider.field_keys())
+  for (const std::uint32_t key : box.guider.guide().field_keys(box.exec))
     if (key != 0xffffffffu) keys.insert(key);
   return keys;
 }
@@ -250,8 +249,9 @@ WFPG_TEST_CASE("path guider: rays that were not guided count where fields are ch
     options.unguided_samples = 1;
     guided_box<Exec> box(options);
     const wfpg::buffer<test_surface, Exec> stored(box.exec, surfaces);
-    const auto keys = evaluate(box.exec, surfaces.size(),
-                               key_of_ray{box.guider.octree().view(), const_view<test_surface>(stored)});
+    const auto keys =
+        evaluate(box.exec, surfaces.size(),
+                 key_of_ray{box.guider.guide().octree().view(), const_view<test_surface>(stored)});
     const std::set<std::uint32_t> expected(keys.begin(), keys.end());
     REQUIRE(expected.size() > 20);
     const wave_of_surfaces<Exec> wave(box.exec, surfaces);
@@ -276,8 +276,9 @@ WFPG_TEST_CASE("path guider: rays that got no field count where fields are chose
   options.kept.max_wave_cones = 256;  // one birth a wave
   guided_box<Exec> box(options);
   const wfpg::buffer<test_surface, Exec> stored(box.exec, surfaces);
-  const auto keys = evaluate(box.exec, surfaces.size(),
-                             key_of_ray{box.guider.octree().view(), const_view<test_surface>(stored)});
+  const auto keys =
+      evaluate(box.exec, surfaces.size(),
+               key_of_ray{box.guider.guide().octree().view(), const_view<test_surface>(stored)});
   box.guider.begin_sample();
   box.sample(surfaces);
   const wfpg::guider_statistics first = box.guider.statistics();

@@ -55,7 +55,7 @@ static_assert(wfpg::exec::is_execution_policy_v<failing_policy>);
 enum class afterwards { again, next_sample };
 
 /// Some samples, of which the k-th loop fails; `failed_step`: the step that threw.
-std::vector<wfpg::sampled_direction> sample_with_fault(wfpg::path_guider<failing_policy>& guider,
+std::vector<wfpg::sampled_direction> sample_with_fault(octree_guider<failing_policy>& guider,
                                                        loop_count& loops, std::size_t k, afterwards then,
                                                        int& failed_step) {
   stepwise_samples<failing_policy> samples(guider);
@@ -78,20 +78,20 @@ std::vector<wfpg::sampled_direction> sample_with_fault(wfpg::path_guider<failing
 }
 
 /// Fails at each loop of some samples; how many there were.
-std::size_t fail_in_samples(const wfpg::guider_options& options, afterwards then) {
+std::size_t fail_in_samples(const guider_options& options, afterwards then) {
   const box_mesh<failing_policy> mesh{failing_policy()};
   std::vector<wfpg::sampled_direction> expected;
   for (std::size_t k = 0;; ++k) {
     int failed_step;
     loop_count loops;
-    wfpg::path_guider<failing_policy> guider(failing_policy(loops), mesh.view(), options);
+    octree_guider<failing_policy> guider(failing_policy(loops), mesh.view(), options);
     const auto drawn = sample_with_fault(guider, loops, k, then, failed_step);
     if (k == 0) expected = drawn;
     INFO("loop " << k << ", step " << failed_step);
     // A wave that is asked for again counts its rays again, which decides where kept fields are.
     const bool is_alike = failed_step < 0 || failed_step == stepwise_samples<failing_policy>::begin ||
                           failed_step == stepwise_samples<failing_policy>::end ||
-                          options.fields == wfpg::field_lifetime::transient;
+                          options.fields == field_lifetime::transient;
     if (then == afterwards::again && is_alike) CHECK(same_draws(drawn, expected));
     check_guides(guider);
     if (k > 0 && failed_step < 0) return k - 1;
@@ -102,13 +102,13 @@ TEST_CASE("path guider: each loop of samples fails in its turn, and the call is 
           "[path_guider]") {
   std::size_t covered = 0;
   for_each_stepwise_options(
-      [&](const wfpg::guider_options& options) { covered += fail_in_samples(options, afterwards::again); });
+      [&](const guider_options& options) { covered += fail_in_samples(options, afterwards::again); });
   CHECK(covered > 4 * 50);
   SUCCEED(covered << " loops");
 }
 
 TEST_CASE("path guider: the same where fields lack room, so that bins follow it", "[path_guider]") {
-  wfpg::guider_options options = stepwise_options(wfpg::field_lifetime::kept, 0);
+  guider_options options = stepwise_options(field_lifetime::kept, 0);
   options.kept.budget_bytes /= 2;
   CHECK(fail_in_samples(options, afterwards::again) > 50);
 }
@@ -116,9 +116,8 @@ TEST_CASE("path guider: the same where fields lack room, so that bins follow it"
 TEST_CASE("path guider: each loop of samples fails in its turn, and the sample is given up",
           "[path_guider]") {
   std::size_t covered = 0;
-  for_each_stepwise_options([&](const wfpg::guider_options& options) {
-    covered += fail_in_samples(options, afterwards::next_sample);
-  });
+  for_each_stepwise_options(
+      [&](const guider_options& options) { covered += fail_in_samples(options, afterwards::next_sample); });
   CHECK(covered > 4 * 50);
   SUCCEED(covered << " loops");
 }

@@ -19,9 +19,6 @@
 namespace {
 
 using namespace wfpg_test;
-using wfpg::field_lifetime;
-using wfpg::guider_options;
-using wfpg::path_guider;
 using wfpg::sampled_direction;
 
 WFPG_TEST_CASE("path guider: each allocation of its construction fails in its turn",
@@ -31,7 +28,7 @@ WFPG_TEST_CASE("path guider: each allocation of its construction fails in its tu
   for_each_stepwise_options([&](const guider_options& options) {
     failing_resource resource;
     const Exec exec = Exec().with_resource(&resource);
-    covered += fail_at_each(resource, [&] { const path_guider<Exec> guider(exec, mesh.view(), options); });
+    covered += fail_at_each(resource, [&] { const octree_guider<Exec> guider(exec, mesh.view(), options); });
   });
   CHECK(covered > 4 * 30);
   tell_failed(covered);
@@ -42,10 +39,11 @@ enum class afterwards { again, next_sample };
 
 /// Some samples, of which one allocation fails, the k-th; the directions that were drawn. `failed_step`: the
 /// step that threw.
-template <class Exec>
-std::vector<sampled_direction> sample_with_fault(path_guider<Exec>& guider, failing_resource& resource,
-                                                 std::size_t k, afterwards then, int& failed_step) {
-  stepwise_samples<Exec> samples(guider);
+template <class Exec, class Guide>
+std::vector<sampled_direction> sample_with_fault(wfpg::path_guider<Exec, Guide>& guider,
+                                                 failing_resource& resource, std::size_t k, afterwards then,
+                                                 int& failed_step) {
+  stepwise_samples<Exec, Guide> samples(guider);
   failed_step = -1;
   resource.fail_at(k);
   for (std::uint32_t sample = 0; sample < 4; ++sample) {
@@ -67,12 +65,12 @@ template <class Exec>
 std::size_t fail_in_samples(const guider_options& options, const box_mesh<Exec>& mesh, afterwards then) {
   int failed_step = -1;
   failing_resource unfailing;
-  path_guider<Exec> sound(Exec().with_resource(&unfailing), mesh.view(), options);
+  octree_guider<Exec> sound(Exec().with_resource(&unfailing), mesh.view(), options);
   const auto expected = sample_with_fault(sound, unfailing, 0, then, failed_step);
   for (std::size_t k = 1;; ++k) {
     failing_resource resource;
     {
-      path_guider<Exec> guider(Exec().with_resource(&resource), mesh.view(), options);
+      octree_guider<Exec> guider(Exec().with_resource(&resource), mesh.view(), options);
       const auto drawn = sample_with_fault(guider, resource, k, then, failed_step);
       INFO("allocation " << k << ", step " << failed_step);
       // A wave that is asked for again counts its rays again, which decides where kept fields are.
@@ -113,19 +111,22 @@ WFPG_TEST_CASE("each allocation of loading a guide fails in its turn", "[guide_f
   const box_mesh<Exec> mesh{Exec()};
   std::size_t covered = 0;
   for_each_stepwise_options([&](const guider_options& options) {
-    path_guider<Exec> guider(Exec(), mesh.view(), options);
-    int failed_step;
-    failing_resource unused;
-    sample_with_fault(guider, unused, 0, afterwards::again, failed_step);
-    std::ostringstream out;
-    wfpg::save_guide(guider, out);
+    with_own_options(options, [&](const auto& own) {
+      using guide = wfpg::octree_guide_for<Exec, std::decay_t<decltype(own)>>;
+      wfpg::path_guider<Exec, guide> guider(Exec(), mesh.view(), own);
+      int failed_step;
+      failing_resource unused;
+      sample_with_fault(guider, unused, 0, afterwards::again, failed_step);
+      std::ostringstream out;
+      wfpg::save_guide(guider, out);
 
-    failing_resource resource;
-    const Exec exec = Exec().with_resource(&resource);
-    covered += fail_at_each(resource, [&] {
-      std::istringstream in(out.str());
-      path_guider<Exec> loaded = wfpg::load_guide(exec, in, options);
-      check_guides(loaded);
+      failing_resource resource;
+      const Exec exec = Exec().with_resource(&resource);
+      covered += fail_at_each(resource, [&] {
+        std::istringstream in(out.str());
+        auto loaded = wfpg::load_guide(exec, in, own);
+        check_guides(loaded);
+      });
     });
   });
   CHECK(covered > 4 * 30);
@@ -144,29 +145,32 @@ WFPG_TEST_CASE("path guider: what a resource throws by itself comes through", "[
   const guider_options options = stepwise_options(field_lifetime::kept, 0);
   for (const std::size_t k : {1, 2, 7, 20}) {
     resource.fail_at(k);
-    CHECK_THROWS_AS((path_guider<Exec>(exec, mesh.view(), options)), std::length_error);
+    CHECK_THROWS_AS((octree_guider<Exec>(exec, mesh.view(), options)), std::length_error);
     CHECK(resource.live() == 0);
   }
 }
 
 /// The bytes of a guide after some samples.
 template <class Exec>
-std::string guide_with(unsigned char poison, wfpg::field_lifetime lifetime) {
+std::string guide_with(unsigned char poison, field_lifetime lifetime) {
   poisoning_resource<Exec> resource(poison);
   constexpr std::size_t paths = 300;
-  wfpg::guider_options options = tracing_options(paths, wfpg::guiding_mode::oriented, lifetime);
+  guider_options options = tracing_options(paths, wfpg::guiding_mode::oriented, lifetime);
   options.product_resolution = 4;
   options.lights.weights = {1.0f, 2.0f};
   const Exec exec = Exec().with_resource(&resource);
-  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
-  trace_paths(exec, guider, 4, paths, box_caster());
-  std::ostringstream out;
-  wfpg::save_guide(guider, out);
-  return out.str();
+  return with_own_options(options, [&](const auto& own) {
+    using guide = wfpg::octree_guide_for<Exec, std::decay_t<decltype(own)>>;
+    wfpg::path_guider<Exec, guide> guider(exec, box_mesh<Exec>(exec).view(), own);
+    trace_paths(exec, guider, 4, paths, box_caster());
+    std::ostringstream out;
+    wfpg::save_guide(guider, out);
+    return out.str();
+  });
 }
 
 WFPG_TEST_CASE("a guider reads nothing that it has not written", "[path_guider][memory]") {
-  for (const wfpg::field_lifetime lifetime : lifetimes) {
+  for (const field_lifetime lifetime : lifetimes) {
     INFO(name_of(lifetime));
     const std::string zeros = guide_with<Exec>(0x00, lifetime);
     CHECK((guide_with<Exec>(0xcd, lifetime) == zeros));

@@ -13,8 +13,6 @@
 #include <vector>
 
 using namespace wfpg_test;
-using wfpg::field_lifetime;
-using wfpg::guider_options;
 using wfpg::guiding_mode;
 using wfpg::sampled_direction;
 using wfpg::sampling_technique;
@@ -109,9 +107,9 @@ WFPG_TEST_CASE("path guider: densities are the mixture's of field and BSDF", "[p
   for (guider_options options : kinds_of_guiding())
     for (float fraction : {0.0f, 0.25f, 1.0f}) {
       INFO(describe(options) << ", fraction " << fraction);
-      options.guide_fraction = fraction;
-      options.rays_per_bin = 400;
-      options.min_bin_level = 1;
+      options.guide_fraction = unless_zero(fraction);
+      options.binning.rays_per_bin = 400;
+      options.binning.min_level = 1;
       guided_box<Exec> box(options);
       box.learn();
       std::vector<test_surface> surfaces(450, make_surface({0.4f, 0, 0.4f}, {0, 1, 0}, {0, 1, 0}));
@@ -264,7 +262,7 @@ mean_radiance trace_mean(guider_options options, bool guided) {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   if (!guided) options.unguided_samples = samples;
-  wfpg::path_guider<Exec> guider(exec, mesh.view(), options);
+  octree_guider<Exec> guider(exec, mesh.view(), options);
   double sum = 0.0, squares = 0.0;
   for (float radiance : trace_paths(exec, guider, samples, paths, box_caster{})) {
     sum += double(radiance);
@@ -298,7 +296,7 @@ std::vector<float> picture(std::uint64_t seed, field_lifetime lifetime, bool bat
   guider_options options = tracing_options(800, guiding_mode::oriented, lifetime);
   options.octree_resolution = 4;  // many deposits in one voxel, whose order threads change
   options.seed = seed;
-  wfpg::path_guider<Exec> guider(exec, mesh.view(), options);
+  octree_guider<Exec> guider(exec, mesh.view(), options);
   batch_box_caster::log log;
   return batch ? trace_paths(exec, guider, 4, 800, batch_box_caster{{}, &log})
                : trace_paths(exec, guider, 4, 800, box_caster{});

@@ -17,8 +17,6 @@
 namespace {
 
 using namespace wfpg_test;
-using wfpg::field_lifetime;
-using wfpg::guider_options;
 
 constexpr std::size_t billions = std::size_t(1) << 31;
 
@@ -47,7 +45,7 @@ outcome make_guider(const guider_options& options) {
   outcome result;
   try {
     result.refused = refusal(
-        [&] { const wfpg::path_guider<Exec> guider(Exec().with_resource(&little), mesh.view(), options); });
+        [&] { const octree_guider<Exec> guider(Exec().with_resource(&little), mesh.view(), options); });
   } catch (const wfpg::out_of_memory& error) {
     result.missing = error.bytes();
   }
@@ -59,7 +57,7 @@ guider_options options_of(field_lifetime lifetime) {
   options.octree_resolution = 8;
   options.fields = lifetime;
   options.kept.budget_bytes = 1 << 16;
-  options.deposits_per_leaf = 0;
+  options.deposits_per_leaf.reset();
   return options;
 }
 
@@ -69,7 +67,7 @@ WFPG_TEST_CASE("path guider: deposits and vertices beyond 2^31 are refused by na
     options.deposit_capacity = billions + 1;
     CHECK(make_guider<Exec>(options).refused.find("deposit_capacity is 2147483649") != std::string::npos);
 
-    options.deposit_capacity = 0;
+    options.deposit_capacity.reset();
     options.max_depth = 4;
     options.max_paths = billions / 4 + 1;
     const outcome vertices = make_guider<Exec>(options);

@@ -17,7 +17,6 @@
 namespace {
 
 using namespace wfpg_test;
-using wfpg::field_lifetime;
 
 #if defined(__CUDACC__)
 constexpr std::size_t threads = 4, paths = 100;  // racecheck takes minutes for each guider
@@ -50,11 +49,11 @@ std::vector<float> picture_of(std::size_t i) {
   const Exec exec;
   const field_lifetime lifetime = lifetimes[i % 2];
   const auto mode = i / 2 % 2 == 0 ? wfpg::guiding_mode::oriented : wfpg::guiding_mode::plain;
-  wfpg::guider_options options = tracing_options(paths, mode, lifetime);
-  options.product_resolution = (i + i / 2 + i / 4) % 2 == 0 ? 0 : 4;
+  guider_options options = tracing_options(paths, mode, lifetime);
+  options.product_resolution = unless_zero(std::uint32_t((i + i / 2 + i / 4) % 2 == 0 ? 0 : 4));
   options.octree_resolution = 16;
   options.seed = i;
-  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
+  octree_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
   return trace_paths(exec, guider, 3, paths, box_caster());
 }
 
@@ -89,7 +88,7 @@ std::vector<float> read_all(const wfpg::exitance_cache_view& cache) {
 WFPG_TEST_CASE("one octree and cache are read by many threads", "[path_guider][threads]") {
   guided_box<Exec> box;
   box.learn();
-  const wfpg::exitance_cache_view cache = box.guider.cache();
+  const wfpg::exitance_cache_view cache = box.guider.guide().cache();
   const std::vector<float> alone = read_all(cache);
   std::vector<std::vector<float>> together(threads);
   at_the_same_time([&](std::size_t i) { together[i] = read_all(cache); });

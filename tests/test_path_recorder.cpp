@@ -34,8 +34,9 @@ struct recording {
   cached_scene<Exec> scene;
   wfpg::path_recorder<Exec> recorder;
 
-  recording(std::size_t paths, std::uint32_t max_depth, bool include_emission, std::uint32_t share_shift = 0)
-      : scene(row(), 1000), recorder(scene.exec, paths, max_depth, include_emission, share_shift) {}
+  recording(std::size_t paths, std::uint32_t max_depth, bool include_emission,
+            std::uint32_t fraction_shift = 0)
+      : scene(row(), 1000), recorder(scene.exec, paths, max_depth, include_emission, fraction_shift) {}
 
   static wfpg::voxel_fragments<Exec> row() {
     std::vector<voxel_normal> list;
@@ -435,8 +436,8 @@ WFPG_TEST_CASE("the environment is no surface, and the cache gets nothing for it
     const path_in_numbers path = evaluate(r.scene.exec, [=] WFPG_HD() {
       const wfpg::recorded_path recorded(paths, 0);
       vec3 direction(0.0f);
-      const bool leads = recorded.leads(1, direction);
-      return path_in_numbers{recorded.vertices(), recorded.surfaces(), leads ? direction.z : 0.0f};
+      const bool has_direction = recorded.has_direction(1, direction);
+      return path_in_numbers{recorded.vertices(), recorded.surfaces(), has_direction ? direction.z : 0.0f};
     });
     CHECK(path.vertices == 3);
     CHECK(path.surfaces == 2);

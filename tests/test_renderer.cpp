@@ -3,6 +3,7 @@
 #include "casters/embree_caster.hpp"
 #include "scene/builtin_scenes.hpp"
 #include "support/catch.hpp"
+#include "support/either_guide.hpp"
 #include "support/pictures.hpp"
 #include "tracer/unguided.hpp"
 #include "tracer/wavefront.hpp"
@@ -138,15 +139,15 @@ TEST_CASE("next-event estimation changes the noise, not the mean", "[renderer]")
 
 TEST_CASE("a batch caster gives the pictures of an inline one", "[renderer]") {
   using exec_policy = wfpg::exec::tbb;
-  using guider = wfpg::path_guider<exec_policy>;
+  using guider = wfpg_test::octree_guider<exec_policy>;
   const scene scene = make_builtin_scene("cornell-enclosed");
   const device_scene<exec_policy> geometry(exec_policy(), scene);
   for (const bool nee : {false, true}) {
     const setup with{32, 6, nee, 5, 6};
     CHECK(same_bits(trace<exec_policy>(scene, with), trace<exec_policy, batch_caster>(scene, with)));
-    for (const wfpg::field_lifetime lifetime :
-         {wfpg::field_lifetime::kept, wfpg::field_lifetime::transient}) {
-      wfpg::guider_options options;
+    for (const wfpg_test::field_lifetime lifetime :
+         {wfpg_test::field_lifetime::kept, wfpg_test::field_lifetime::transient}) {
+      wfpg_test::guider_options options;
       options.octree_resolution = 32;
       options.fields = lifetime;
       options.field_resolution = options.kept.resolution = 16;

@@ -3,6 +3,7 @@
 #include "casters/embree_caster.hpp"
 #include "materials/materials.hpp"
 #include "scene/builtin_scenes.hpp"
+#include "support/either_guide.hpp"
 #include "support/products.hpp"
 #include "tracer/unguided.hpp"
 #include "tracer/wavefront.hpp"
@@ -133,17 +134,17 @@ TEST_CASE("glossy parts leave the guide less, the narrower they are", "[renderer
     wfpg::surface<bsdf> s;
     s.normal = s.outgoing = up;
     s.bsdf = {up, up, vec3(0.8f, 0.5f, 0.3f), alpha, 1.5f, kind};
-    return mixture.shares_of(s);
+    return mixture.fractions_of(s);
   };
-  const wfpg::mixture_shares lambert = shares(material_kind::lambert, 0.1f);
+  const wfpg::mixture_fractions lambert = shares(material_kind::lambert, 0.1f);
   CHECK((lambert.guide == 0.6f && lambert.glossy == 0.0f));
-  const wfpg::mixture_shares mirror_like = shares(material_kind::conductor, 0.01f);
+  const wfpg::mixture_fractions mirror_like = shares(material_kind::conductor, 0.01f);
   CHECK(mirror_like.guide == Approx(0.6f * wfpg::guided_part(0.01f, 0.5f)));
   CHECK(mirror_like.smooth == Approx(0.0f).margin(1e-6));
-  const wfpg::mixture_shares coated = shares(material_kind::plastic, 0.1f);
+  const wfpg::mixture_fractions coated = shares(material_kind::plastic, 0.1f);
   CHECK(coated.guide < 0.6f);
   CHECK(coated.guide > mirror_like.guide);
-  for (const wfpg::mixture_shares& s : {lambert, mirror_like, coated})
+  for (const wfpg::mixture_fractions& s : {lambert, mirror_like, coated})
     CHECK(s.guide + s.glossy + s.smooth == Approx(1.0f));
 }
 
@@ -176,15 +177,14 @@ double share_below(std::uint32_t product_resolution, int samples) {
   constexpr int side = 64;
   render::path_tracer<exec_policy, render::embree_caster> tracer(
       exec, {side, side, 6, 1}, {geometry.view(), lights.view(), true}, accelerated.caster());
-  wfpg::guider_options options;
+  guider_options options;
   options.mode = wfpg::guiding_mode::plain;
-  options.fields = wfpg::field_lifetime::transient;
-  options.product_resolution = product_resolution;
+  options.fields = field_lifetime::transient;
+  options.product_resolution = unless_zero(product_resolution);
   options.include_emission = false;
   options.max_paths = side * side;
   options.max_depth = 6;
-  wfpg::path_guider<exec_policy> guider(exec, {geometry.view().positions, geometry.view().triangles},
-                                        options);
+  octree_guider<exec_policy> guider(exec, {geometry.view().positions, geometry.view().triangles}, options);
   const render::pinhole camera(scene.view, side, side);
   for (int i = 0; i < samples; ++i) tracer.render_sample(guider, camera, std::uint32_t(i), 1.0f);
 

@@ -99,7 +99,7 @@ TEST_CASE("a rendering that is stopped and goes on gives the picture of one that
       CHECK(third.report.light_hits_per_path == whole.report.light_hits_per_path);
       CHECK(third.report.cones_per_segment == whole.report.cones_per_segment);
       CHECK(third.report.slots.live == whole.report.slots.live);
-      CHECK(third.report.slots.born == whole.report.slots.born);
+      CHECK(third.report.slots.allocated == whole.report.slots.allocated);
       CHECK_FALSE(same_bits(second.picture, whole.picture));
     }
 }

@@ -123,7 +123,7 @@ WFPG_TEST_CASE("sarsa grid: what paths gather keeps its mean, and variance is le
         INFO(name_of(update) << ", " << name_of(sampler) << ", fraction " << fraction);
         options.update = update;
         options.sampler = sampler;
-        options.guide_fraction = fraction;
+        options.guide_fraction = unless_zero(fraction);
         options.floor = fraction > 0.0f ? 1.0f : 0.01f;  // weights are bounded, as a test of means needs
         const estimate found = guided_estimate(exec, options);
         CHECK(std::abs(found.mean - unguided.mean) < 4.0 * std::sqrt(found.variance + unguided.variance));

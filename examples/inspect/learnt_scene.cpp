@@ -8,12 +8,18 @@
 #include <wfpg/bins/spatial_binner.hpp>
 #include <wfpg/exec/tbb.hpp>
 
+#include <variant>
+
 namespace inspect {
 namespace {
 
 using exec_policy = wfpg::exec::tbb;
 using caster_type = decltype(std::declval<const render::embree_scene&>().caster());
 using tracer_type = render::path_tracer<exec_policy, caster_type>;
+
+using kept_guider = wfpg::path_guider<exec_policy>;
+using transient_guider = wfpg::path_guider<exec_policy, wfpg::transient_guide<exec_policy>>;
+using guider_type = std::variant<kept_guider, transient_guider>;
 
 constexpr std::uint64_t reference_seed = 0x5eed0fed;
 
@@ -78,49 +84,57 @@ struct learnt_scene::state {
         lights_by_power(exec, scene),
         accelerated(exec, scene, geometry.view()),
         camera(scene.view, options.width, options.height),
-        guider(render::begin_guider(exec, scene, {geometry.view().positions, geometry.view().triangles},
-                                    render::guider_options_of(options, lights.shares()), options, "")) {}
+        guider(begin(scene)) {}
+
+  guider_type begin(const render::scene& scene) {
+    const wfpg::triangle_mesh_view mesh{geometry.view().positions, geometry.view().triangles};
+    if (options.lifetime == render::fields::kept)
+      return render::begin_guider(exec, scene, mesh, render::kept_options_of(options, lights.shares()),
+                                  options, "");
+    return render::begin_guider(exec, scene, mesh, render::transient_options_of(options, lights.shares()),
+                                options, "");
+  }
 
   void learn(const render::progress_callback& progress) {
     tracer_type tracer(exec, settings_of(options), {geometry.view(), lights.view(), options.nee},
                        accelerated.caster());
-    render::take_samples(tracer, guider, camera, options, progress, rendering);
+    std::visit([&](auto& g) { render::take_samples(tracer, g, camera, options, progress, rendering); },
+               guider);
     rendering.picture = {options.width, options.height, tracer.picture()};
-    render::report_guider(guider, tracer.segments(), rendering.report);
+    std::visit([&](auto& g) { render::report_guider(g, tracer.segments(), rendering.report); }, guider);
   }
 
   /// Fields as the next sample's camera rays find them.
   void look() {
     const std::size_t pixels = rendering.picture.pixels.size();
     hits = hits_of(exec, geometry.view(), accelerated.caster(), camera, pixels);
-    guider.begin_sample();
-    fields =
-        guider.prepare(wfpg::wave{0, pixels, hit_surfaces{hits.data()}, no_random{}}, accelerated.caster());
-    if (options.lifetime == render::fields::kept)
-      find_kept_bins();
-    else
-      find_transient_bins();
+    std::visit(
+        [&](auto& g) {
+          g.begin_sample();
+          fields =
+              g.prepare(wfpg::wave{0, pixels, hit_surfaces{hits.data()}, no_random{}}, accelerated.caster());
+          find_bins(g);
+        },
+        guider);
   }
 
-  void find_kept_bins() {
-    const std::vector<std::uint32_t> keys = guider.field_keys();
+  void find_bins(const kept_guider& g) {
+    const std::vector<std::uint32_t> keys = g.guide().field_keys(exec);
     for (std::uint32_t pixel = 0; pixel < hits.size(); ++pixel) {
       const std::uint32_t number = fields.mixture(pixel).number;
       bins.push_back(number < keys.size() ? keys[number] : no_bin);
     }
-    field_bytes =
-        wfpg::field_store<exec_policy>::bytes_a_slot(guider.options().kept.resolution, options.learn);
+    field_bytes = wfpg::field_store<exec_policy>::bytes_a_slot(g.options().kept.resolution, options.learn);
   }
 
   /// The guider's own are those of Algorithm 2, too.
-  void find_transient_bins() {
-    const wfpg::guider_options& told = guider.options();
-    wfpg::spatial_binner<exec_policy> binner(exec, guider.octree().view(),
-                                             {told.min_bin_level, told.rays_per_bin}, hits.size());
-    const wfpg::bins_view found =
-        binner.bin(exec, hits.size(), wfpg::wave_rays<hit_surfaces>{hit_surfaces{hits.data()}, told.mode});
+  void find_bins(const transient_guider& g) {
+    wfpg::spatial_binner<exec_policy> binner(exec, g.guide().octree().view(), g.options().binning,
+                                             hits.size());
+    const wfpg::bins_view found = binner.bin(
+        exec, hits.size(), wfpg::wave_rays<hit_surfaces>{hit_surfaces{hits.data()}, g.options().mode});
     bins.assign(found.ray_keys.data(), found.ray_keys.data() + hits.size());
-    field_bytes = wfpg::grid_distribution::words(guider.field_resolution(0)) * sizeof(std::uint32_t) +
+    field_bytes = wfpg::grid_distribution::words(g.guide().field_resolution(0)) * sizeof(std::uint32_t) +
                   sizeof(wfpg::resident_field);
   }
 
@@ -131,7 +145,7 @@ struct learnt_scene::state {
   render::light_distribution<exec_policy> lights_by_power;  // for who does not learn to choose
   render::embree_scene accelerated;
   render::pinhole camera;
-  wfpg::path_guider<exec_policy> guider;
+  guider_type guider;
   render::render_result rendering;
   std::vector<render::hit_surface> hits;
   wfpg::guide_view fields;
@@ -174,11 +188,11 @@ const std::vector<std::uint32_t>& learnt_scene::bins() const {
   return state_->bins;
 }
 wfpg::exitance_cache_view learnt_scene::cache() const {
-  return state_->guider.cache();
+  return std::visit([](const auto& g) { return g.guide().cache(); }, state_->guider);
 }
 
 guide_bytes learnt_scene::bytes() const {
-  const wfpg::memory_report memory = state_->guider.memory();
+  const wfpg::memory_report memory = std::visit([](const auto& g) { return g.memory(); }, state_->guider);
   return {state_->field_bytes, memory.persistent(), memory.transient()};
 }
 

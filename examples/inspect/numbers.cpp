@@ -102,7 +102,7 @@ json numbers_of_place(const learnt_scene& learnt, std::uint32_t pixel) {
 }
 
 json numbers_of(const findings& found, const pixel_sampler& sampler) {
-  const wfpg::mixture_shares shares = sampler.shares();
+  const wfpg::mixture_fractions shares = sampler.shares();
   const bool has_field = !sampler.field().empty();
   json numbers{{"field_resolution", has_field ? json(found.cells.resolution()) : json()},
                {"mixture_fraction", sampler.fraction()},

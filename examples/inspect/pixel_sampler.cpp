@@ -20,9 +20,9 @@ pixel_sampler::pixel_sampler(const wfpg::guide_view& view, std::uint32_t ray, co
   if (draws_product_) product_ = view.product(ray, surface_, words_);
 }
 
-wfpg::mixture_shares pixel_sampler::shares() const {
+wfpg::mixture_fractions pixel_sampler::shares() const {
   if (plain_.field.empty()) return {};
-  return draws_product_ ? product_.shares_of(surface_) : plain_.shares_of(surface_);
+  return draws_product_ ? product_.fractions_of(surface_) : plain_.fractions_of(surface_);
 }
 
 wfpg::sampled_direction pixel_sampler::sample(float u_technique, vec2 u) const {

@@ -26,7 +26,7 @@ class pixel_sampler {
   /// Of guided samples, before glossy parts take theirs; 0 without a field.
   float fraction() const { return plain_.fraction; }
   /// What of the samples each part draws.
-  wfpg::mixture_shares shares() const;
+  wfpg::mixture_fractions shares() const;
 
   /// As basic_guide_mixture has them.
   wfpg::sampled_direction sample(float u_technique, vec2 u) const;

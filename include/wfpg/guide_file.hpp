@@ -1,8 +1,12 @@
-// A guider's state on disk: octree, cache, kept fields with what they learnt, and the samples so far. A
-// guider that is loaded goes on as the one that was saved would have: with the same options and the same
-// waves it draws the same directions, to the bit on the CPU policies, whichever of them saved it.
+// Saves a guider's state to a file or stream and loads it: octree, cache, kept fields with what they learnt,
+// choices of lights, and counts. A loaded guider goes on where the saved one stopped. With equal options and
+// waves it samples the directions that the saved one would have sampled. On the CPU policies they are equal
+// to the bit, whichever of these policies saved the file.
 //
-// A guide file of version 3, little-endian; detail/section_file.hpp has what is around the sections.
+// Source: wfpg's own. Cost: O(bytes), and loading builds the octree. Memory: a file has about 40 bytes a leaf
+// and 10 F² a kept field.
+//
+// A guide file of version 3, little-endian; state/section_file.hpp has what is around the sections.
 //
 //   section  content                                              bytes
 //   options  scene_tag                                            8
@@ -37,67 +41,86 @@
 //   lights   learnt mean: of learning nodes, faces and groups     4 a mean
 //
 // Cells and rows are those of fields with a fraction above 0. All else that a guider has follows from these.
-// About 40 bytes a leaf and 10 F² a field; detail/guide_state.hpp and kept_state.hpp say what is checked.
+// detail/guide_sections.hpp says what is checked.
 #pragma once
 
-#include <wfpg/guides/octree/detail/guide_state.hpp>
+#include <wfpg/detail/guide_state.hpp>
 #include <wfpg/path_guider.hpp>
 
 #include <istream>
 #include <ostream>
 #include <string>
+#include <type_traits>
 
 namespace wfpg {
 
-/// Writes a guider's state, between end_sample() and begin_sample(); waits for the work before it. `name` is
-/// what errors call the stream. Throws file_error where the stream takes no more.
-template <class Exec>
-void save_guide(const path_guider<Exec>& guider, std::ostream& out, const std::string& name = "the guide") {
+/// The guide that load_guide() returns a guider of: kept_guide for kept_guide_options, else transient_guide.
+template <class Exec, class Options>
+using octree_guide_for = std::conditional_t<std::is_base_of_v<kept_guide_options, Options>, kept_guide<Exec>,
+                                            transient_guide<Exec>>;
+
+/// Writes a guider's state to a stream. Call it between end_sample() and begin_sample(). `Guide` is
+/// kept_guide or transient_guide. Open the stream in binary mode. Error messages call it `name`. Throws
+/// file_error where a write fails. Waits for the work before it.
+template <class Exec, class Guide>
+void save_guide(const path_guider<Exec, Guide>& guider, std::ostream& out,
+                const std::string& name = "the guide") {
   file_writer file(out, detail::guide_file_kind, name);
   detail::state_access::save(guider, file);
 }
 
-/// Writes a guider's state to a file: under a name of its own beside it, then renamed, so that an old file is
-/// replaced by a whole one or not at all. Throws file_error.
-template <class Exec>
-void save_guide(const path_guider<Exec>& guider, const std::string& path) {
+/// Writes a guider's state to the file `path`. It writes a temporary file beside it and then renames that. So
+/// an old file is replaced by a complete one, or not at all. Throws file_error.
+template <class Exec, class Guide>
+void save_guide(const path_guider<Exec, Guide>& guider, const std::string& path) {
   replace_file(path, [&](std::ostream& out) { save_guide(guider, out, path); });
 }
 
-/// A guider in the state that was saved. These options must be what they were: scene_tag, octree_resolution,
-/// mode, fields, kept.resolution, kept.learn, the number of lights.weights and lights.resolution; and
-/// kept.budget_bytes must have room. Others may differ, and are not in the file. Reads up to the guide's end
-/// and no further. Throws file_error that says what is wrong: no guide file, another version, where it is
-/// truncated, which section is altered, which option differs; std::invalid_argument for options out of range,
-/// out_of_memory. Memory is bounded by what is there, not by what the file says. O(bytes), and the octree is
-/// built.
-template <class Exec>
-path_guider<Exec> load_guide(const Exec& exec, std::istream& in, const guider_options& options,
-                             const std::string& name = "the guide") {
+/// Reads a guider's state from a stream and returns a guider in that state. `Options` is kept_guide_options
+/// or transient_guide_options and decides the guide. Reads up to the end of the guide's data and no further.
+///
+/// These options must equal those of the saved guider:
+/// - scene_tag, octree_resolution, mode, the kind of fields,
+/// - kept.resolution, kept.learn,
+/// - the number of lights.weights, and lights.resolution.
+///
+/// kept.budget_bytes must have room for the saved fields. Other options are not in the file and may differ.
+///
+/// Throws file_error, whose message says what is wrong:
+/// - It is no guide file, or one of another version.
+/// - It is truncated, with the place.
+/// - A section was altered, or an option differs, with its name.
+///
+/// Throws std::invalid_argument for options out of range, and out_of_memory. The data that is there bounds
+/// the memory, not the sizes that the file claims.
+template <class Exec, class Options>
+auto load_guide(const Exec& exec, std::istream& in, const Options& options,
+                const std::string& name = "the guide") {
   file_reader file(in, detail::guide_file_kind, name);
-  return detail::state_access::load(exec, file, options, nullptr);
+  return detail::state_access::load<octree_guide_for<Exec, Options>>(exec, file, options, nullptr);
 }
 
-/// A guider in the state that a file holds, of which nothing may be left over. Throws as the stream's form
-/// does.
-template <class Exec>
-path_guider<Exec> load_guide(const Exec& exec, const std::string& path, const guider_options& options) {
+/// Reads a guider's state from the file `path`. Throws file_error also where data follows the guide's; else
+/// as the form above, for streams.
+template <class Exec, class Options>
+auto load_guide(const Exec& exec, const std::string& path, const Options& options) {
   return read_file(path, [&](std::istream& in) { return load_guide(exec, in, options, path); });
 }
 
-/// A guider in the state that was saved, of a scene in hand: file_error, too, where the octree is not that of
-/// `mesh`. Another cube, or one leaf in 100, makes it another scene. Voxelizes the mesh.
-template <class Exec>
-path_guider<Exec> load_guide(const Exec& exec, triangle_mesh_view mesh, std::istream& in,
-                             const guider_options& options, const std::string& name = "the guide") {
+/// Reads a guider's state from a stream, and checks that it is of the scene `mesh`. Throws file_error also
+/// where the file's octree is not that of the mesh. Their cubes must be equal, and 99 of 100 leaves in both:
+/// devices and compilers round touching voxels differently. The check voxelizes the mesh.
+template <class Exec, class Options>
+auto load_guide(const Exec& exec, triangle_mesh_view mesh, std::istream& in, const Options& options,
+                const std::string& name = "the guide") {
   file_reader file(in, detail::guide_file_kind, name);
-  return detail::state_access::load(exec, file, options, &mesh);
+  return detail::state_access::load<octree_guide_for<Exec, Options>>(exec, file, options, &mesh);
 }
 
-/// A guider in the state that a file holds, of a scene in hand. Throws as the stream's form does.
-template <class Exec>
-path_guider<Exec> load_guide(const Exec& exec, triangle_mesh_view mesh, const std::string& path,
-                             const guider_options& options) {
+/// Reads a guider's state from the file `path`, and checks that it is of the scene `mesh`. Nothing may follow
+/// the guide's data.
+template <class Exec, class Options>
+auto load_guide(const Exec& exec, triangle_mesh_view mesh, const std::string& path, const Options& options) {
   return read_file(path, [&](std::istream& in) { return load_guide(exec, mesh, in, options, path); });
 }
 

@@ -1,6 +1,6 @@
-// The facade: what a wavefront path tracer needs to guide its paths, and with an exec/ header all it
-// includes. Paper, Algorithm 1. What directions come from is a guide, the paper's (octree_guide.hpp) unless
-// told otherwise (guide.hpp). A sample, from the renderer's side:
+// The facade: guides the paths of a wavefront path tracer. A renderer includes this header and one of exec/.
+// Directions come from a Guide (guide/guide.hpp); the default is kept_guide. A sample, from the renderer's
+// side:
 //
 //   guider.begin_sample();
 //   for (std::uint32_t depth = 0; depth < max_depth; ++depth) {
@@ -9,6 +9,17 @@
 //     shade(...);              // the renderer's; records radiance
 //   }
 //   guider.end_sample();
+//
+// A policy is one of exec::cuda, tbb, omp and seq; arrays of the renderer lie in memory that it can reach. A
+// guider is made so, for a picture that is rendered as one wave:
+//
+//   wfpg::kept_guide_options options;
+//   options.max_paths = pixels;
+//   wfpg::path_guider<Exec> guider(exec, mesh, options);
+//
+// Source: Yalçıner & Akyüz, "Path Guiding for Wavefront Path Tracing", 2024, Algorithm 1.
+// Cost: the guide's, and on the device one kernel a wave that samples directions, unless the guide does.
+// Memory: the guide's, the recorder's (path_recorder.hpp), and scratch memory that samples use again.
 #pragma once
 
 #include <wfpg/exec/buffer.hpp>
@@ -17,7 +28,7 @@
 #include <wfpg/guide/path_recorder.hpp>
 #include <wfpg/guide/sample_rays.hpp>
 #include <wfpg/guide/statistics.hpp>
-#include <wfpg/guides/octree/octree_guide.hpp>
+#include <wfpg/guides/octree/kept_guide.hpp>
 #include <wfpg/host/ray_caster.hpp>
 #include <wfpg/host/wave.hpp>
 
@@ -27,110 +38,123 @@
 
 namespace wfpg {
 
-/// Guides the paths of a wavefront path tracer over one scene. Movable, not copyable; calls come from one
-/// thread at a time. A throw leaves it usable. After the first sample of the largest wave nothing is
-/// allocated from the policy.
-template <class Exec, class Guide = octree_guide<Exec>>
+/// Guides the paths of a wavefront path tracer over one scene. `Exec` is an execution policy: where loops run
+/// and memory lies. Movable, not copyable. One thread at a time may call it. An exception leaves it usable.
+/// Once a sample had the largest waves, samples allocate nothing more from the policy.
+///
+/// In each sample call begin_sample(), then sample_directions() or prepare() for each wave, then
+/// end_sample(). Call invalidate(), invalidate_all() and forget_light() between samples. Reruns with the same
+/// policy, options and waves sample the same directions.
+///
+/// `Guide` has the five parts that guide/guide.hpp lists. Where one is missing, the compiler's message says
+/// which.
+template <class Exec, class Guide = kept_guide<Exec>>
 class path_guider {
  public:
-  static_assert(exec::is_execution_policy_v<Exec>,
-                "Exec needs resource, with_resource, thrust, warp_width and warps_per_block");
+  static_assert(exec::detail::require_policy<Exec>());
   static_assert(detail::require_guide<Guide, Exec>());
 
-  /// What it can be told: guider_options for the octree.
+  /// The guide's options, derived from sampling_options: kept_guide_options by default.
   using options_type = typename Guide::options_type;
-  /// What the renderer's kernels draw from: guide_view for the octree.
+  /// What kernels sample from, trivially copyable: guide_view for the octree's guides.
   using view_type = typename Guide::view_type;
 
-  /// A guider over triangles, read only here. Throws std::invalid_argument for options out of range,
-  /// out_of_memory.
+  /// Makes a guider over triangles, world space. `mesh` refers to the policy's memory, and only the
+  /// constructor reads it. The policy's memory resource must outlive the guider. Throws std::invalid_argument
+  /// for options out of range, and out_of_memory.
   path_guider(const Exec& exec, triangle_mesh_view mesh, const options_type& options = {})
       : path_guider(in_scene{}, exec, mesh, options) {}
 
-  /// A guider over another scene that the guide takes, such as voxel_fragments<Exec> for the octree: of
-  /// geometry that is not triangles, or of hit points (fragments_from_samples).
+  /// Makes a guider over another scene that the guide's constructor takes. The octree's guides take
+  /// voxel_fragments<Exec>: those of geometry that is not triangles, or of hit points
+  /// (fragments_from_samples). irradiance_records takes a lit_scene. Throws as the constructor over
+  /// triangles.
   template <class Scene, class = std::enable_if_t<std::is_constructible_v<Guide, const Exec&, const Exec&,
                                                                           Scene, const options_type&>>>
   path_guider(const Exec& exec, Scene&& scene, const options_type& options = {})
       : path_guider(in_scene{}, exec, std::forward<Scene>(scene), options) {}
 
-  /// Takes all of another, which is not used again but to be assigned to.
+  /// Move constructor. The moved-from guider may only be assigned to or destroyed.
   path_guider(path_guider&& other) = default;
-  /// The same; what it had goes first.
+  /// Move assignment. Frees all memory that this guider held; `other` may then only be assigned to or
+  /// destroyed.
   path_guider& operator=(path_guider&& other);
 
-  /// Begins a sample: one wave of paths, or several. Forgets recorded paths that were not deposited.
+  /// Begins a sample of one or more waves. Clears recorded paths that end_sample() has not learnt from. If it
+  /// throws, call it again: it begins the sample of that number.
   void begin_sample();
 
-  /// Draws the next directions of a wave's rays, fields and all, in one call: directions[ray] for each ray.
-  /// `caster` is the host's ray caster, inline or batch. `queries`: directions whose densities the same
-  /// fields answer. Throws std::invalid_argument where the wave exceeds max_rays or an output is smaller than
-  /// the wave; what a caster throws.
+  /// Samples the next directions of a wave's rays: makes or refreshes fields, then writes directions[ray].
+  ///
+  /// `w` has the rays' surfaces and random numbers, and their depth, which statistics count by. `directions`
+  /// must have an element for each ray; inactive rays get the technique `none` and the density 0.
+  /// `caster` is the renderer's ray caster, inline or batch (ray_caster.hpp). `queries` asks for the density
+  /// of one further direction a ray, as next-event estimation needs it for MIS. Throws std::invalid_argument
+  /// where the wave exceeds max_rays or an output is smaller than the wave, and what the caster throws. Rays
+  /// of unguided samples, and from guided_depths on, sample their BSDFs.
   template <class Surfaces, class Random, class Caster, class Queries = no_queries>
   void sample_directions(const wave<Surfaces, Random>& w, const Caster& caster,
                          array_view<sampled_direction> directions, const Queries& queries = {});
 
-  /// The same in two steps: what the renderer's kernels sample from. `w.random` is not read. Holds until the
-  /// next call. Kept fields are only refreshed for it. Transient ones are made resident, in 4 (F² + F) bytes
-  /// a bin of the wave with most bins, and half more; it waits for the number of bins.
+  /// First half of sample_directions(): makes or refreshes the wave's fields and returns a view of them. The
+  /// renderer's own kernels sample from it, with the ray's index in the wave. It is valid until the next call
+  /// of the guider. `w.random` is not read. Kept fields cost no more memory so. Transient fields all stay in
+  /// memory: 4 (F² + F) bytes a bin of the wave with most bins, and half more. The call then waits for the
+  /// number of bins. Throws as sample_directions() does.
   template <class Surfaces, class Random, class Caster>
   view_type prepare(const wave<Surfaces, Random>& w, const Caster& caster);
 
-  /// Deposits what was recorded and updates the guide.
+  /// Ends the sample: the guide learns from the recorded paths, if this sample is recorded, and updates
+  /// itself. What it learns changes directions from the next sample on, or later: a guide may wait for the
+  /// end of a step of several samples.
   void end_sample();
 
-  /// Geometry moved inside `bounds` (world space, old and new place): kept fields that may see it are cast
-  /// anew when they are next used. Until the octree is built anew the cache knows the old geometry only.
+  /// Geometry moved inside `bounds`, world space, which hold its old and its new place. Kept fields that may
+  /// see it are cast anew when they are next used. The octree and its cache keep the old geometry; make a new
+  /// guider to change them.
   void invalidate(const bounds3& bounds) { guide_.invalidate(exec_, bounds); }
-  /// The same of all fields.
+  /// Geometry moved anywhere: every kept field is cast anew when it is next used.
   void invalidate_all() { guide_.invalidate_all(exec_); }
-  /// Forgets all cached light, and what kept fields and choices of lights learnt: for lights that moved.
-  /// Fields follow without being cast anew.
+  /// Lights moved: the guide forgets all radiance that it learnt. Kept fields take up the change without
+  /// being cast anew. The next 32 samples are all recorded, as at the beginning.
   void forget_light() {
     guide_.forget_light(exec_);
-    settled_after_ = samples_ + recording_needs::settling_samples;
+    warm_up_end_ = samples_ + recording_needs::warm_up_samples;
   }
 
-  /// Where the renderer's kernels record their paths in the sample that has begun: a path_recorder_view, or a
-  /// no_path_recorder where the guide has no use for them.
+  /// Returns the view with which the renderer's kernels record their paths. It is valid for the current
+  /// sample. A path_recorder_view, or a no_path_recorder for a guide that reads no paths.
   auto recorder() const {
     if constexpr (Guide::records_paths)
       return recorder_.view();
     else
       return no_path_recorder{};
   }
-  /// Which lights next-event estimation is to ask, in this sample; empty without options.lights.weights.
-  light_guide_view lights() const { return guide_.lights(); }
-  /// Where kernels deposit, and what they read, without the recorder. Of the octree, as those that follow. A
-  /// host that deposits by itself makes room for it by `deposit_capacity`.
-  exitance_cache_view cache() const { return guide_.cache(); }
-  /// Where they tell kept fields what their directions found, without it; empty where fields do not learn.
-  learnt_radiance_view learnt() const { return guide_.learnt(); }
-  /// The octree; its view goes to an svo_ray_caster.
-  const sparse_voxel_octree<Exec>& octree() const { return guide_.octree(); }
-  /// Cells along a side of transient fields at a depth.
-  std::uint32_t field_resolution(std::uint32_t depth) const { return guide_.field_resolution(depth); }
-  /// A kept field, by the number that mixtures and directions have of it: node · orientations + orientation,
-  /// or 0xffffffff where the number is not in use. Empty where fields are transient. Waits for the work
-  /// before it.
-  std::vector<std::uint32_t> field_keys() const { return guide_.field_keys(exec_); }
+  /// Returns the view that chooses lights for next-event estimation, valid for the current sample. A
+  /// light_guide_view, or no_light_choices for a guide that does not choose lights.
+  auto lights() const { return guide_.lights(); }
 
-  /// Where directions come from.
+  /// The guide, to look at what it learnt.
   const Guide& guide() const { return guide_; }
-  /// What it was told, with max_rays completed.
+  /// The options that the constructor got. An unset max_rays is replaced by max_paths.
   const options_type& options() const { return options_; }
-  /// Whether the sample that has begun is guided.
+  /// Whether the current sample is guided: unguided_samples are over, and the guide is not empty.
   bool guided() const { return is_guided(samples_); }
 
-  /// What it has done so far. Waits for the work before it.
+  /// Returns counts and times since construction; see statistics.hpp. Waits for the work before it, so that
+  /// calling it for each sample slows a device down. `dropped_vertices` and `deposits` tell of calls out of
+  /// range: look at them when guiding does not help.
   guider_statistics statistics() const;
-  /// What it holds, by part. Does not wait.
+  /// Returns the bytes of each part that it holds in the policy's memory. Does not wait.
   memory_report memory() const;
 
  private:
   friend struct detail::state_access;
+  // Tells the private constructor from the public ones, which take any scene.
   struct in_scene {};
 
+  // Members are made in their order below: the guide needs the policy that allocates from working memory, and
+  // the recorder needs to know what the guide wants recorded.
   template <class Scene>
   path_guider(in_scene, const Exec& exec, Scene&& scene, const options_type& options)
       : options_(completed(options)),
@@ -139,47 +163,60 @@ class path_guider {
         guide_(exec, exec_, std::forward<Scene>(scene), options_),
         needs_(guide_.recording()),
         recorder_(exec_, Guide::records_paths ? options_.max_paths : 0, options_.max_depth,
-                  options_.include_emission, needs_.share_shift, needs_.directions) {
-    require(needs_.settled_turns >= 1, "settled_turns", needs_.settled_turns, "at least 1");
+                  options_.include_emission, needs_.fraction_shift, needs_.directions) {
+    require(needs_.sample_stride >= 1, "sample_stride", needs_.sample_stride, "at least 1");
   }
 
+  /// Checks the options that all guides have, and sets max_rays. The guide checks its own. Runs before any
+  /// memory is allocated.
   static options_type completed(options_type options) {
     detail::require_valid(static_cast<const sampling_options&>(options));
-    if (options.max_rays == 0) options.max_rays = options.max_paths;
+    if (!options.max_rays) options.max_rays = options.max_paths;
     return options;
   }
+  /// Fails to compile where the renderer's types lack what they need; throws where the wave is too large.
   template <class Surfaces, class Random, class Caster>
   void check(const wave<Surfaces, Random>& w, const Caster& caster) const;
+  /// Random seed of a sample; all that the guider draws for the sample follows from it.
   std::uint64_t seed_of(std::uint32_t sample) const { return hash(options_.seed, sample); }
+  /// Whether the guide takes part in a sample, counted from 1.
   bool is_guided(std::uint32_t sample) const { return sample > options_.unguided_samples && !guide_.empty(); }
-  /// Of `settled_turns` samples one at random: a host may have turns of its own, such as tiles.
+  /// All samples of the warm-up, then one of every `sample_stride`, at random. A fixed one could fall in step
+  /// with a period of the renderer's, such as that of its tiles.
   bool is_recorded(std::uint32_t sample) const {
-    const std::uint32_t turns = needs_.settled_turns, round = (sample - 1) / turns;
-    return sample <= settled_after_ || (sample - 1) % turns == hash(~options_.seed, round) % turns;
+    const std::uint32_t stride = needs_.sample_stride, round = (sample - 1) / stride;
+    return sample <= warm_up_end_ || (sample - 1) % stride == hash(~options_.seed, round) % stride;
   }
-  guide_sample<Exec> at(std::uint32_t sample) {
+  /// Context of a sample, for the guide's calls. It refers to members of this guider.
+  sample_context<Exec> at(std::uint32_t sample) {
     return {exec_, sample, seed_of(sample), is_guided(sample), recorded_, clock_};
   }
-  guide_sample<Exec> now() { return at(samples_); }
-  guide_sample<Exec> now(std::uint32_t depth) {
-    guide_sample<Exec> result = now();
+  /// Context of the current sample.
+  sample_context<Exec> now() { return at(samples_); }
+  /// Context of a wave of the current sample: it is not guided from guided_depths on.
+  sample_context<Exec> now(std::uint32_t depth) {
+    sample_context<Exec> result = now();
     result.guided = result.guided && depth < options_.guided_depths;
     return result;
   }
 
-  options_type options_;
-  stage_clock clock_;
-  std::unique_ptr<retaining_resource> working_memory_;  // of what follows, in part
-  Exec exec_;                                           // allocates there
-  Guide guide_;
-  recording_needs needs_;
-  path_recorder<Exec> recorder_;
-  std::uint32_t samples_ = 0;
-  std::uint32_t settled_after_ = recording_needs::settling_samples;
-  bool recorded_ = true;  // the sample that has begun
+  options_type options_;  // with max_rays set
+  stage_clock clock_;     // statistics() reports its times
+  // Retains freed memory, so that samples do not allocate. Declared before those whose buffers it holds,
+  // which it must outlive. On the heap, since they refer to it when the guider has moved.
+  std::unique_ptr<retaining_resource> working_memory_;
+  Exec exec_;                     // the caller's policy, but it allocates from working_memory_
+  Guide guide_;                   // keeps its learnt state in the caller's policy
+  recording_needs needs_;         // of the guide, asked once
+  path_recorder<Exec> recorder_;  // of no paths where the guide reads none
+  // A guide file holds the first two; begin_sample() sets the third.
+  std::uint32_t samples_ = 0;                                     // number of the current sample
+  std::uint32_t warm_up_end_ = recording_needs::warm_up_samples;  // the last sample of the warm-up
+  bool recorded_ = true;                                          // the current sample
 };
 
-/// What memory lies in is to outlive it: the old guider is gone as a whole, at the end.
+// Moves this guider's members to a local one first, which destroys them as a whole. The memory resource must
+// outlive its buffers. Assigning member by member would free the resource before them.
 template <class Exec, class Guide>
 path_guider<Exec, Guide>& path_guider<Exec, Guide>::operator=(path_guider&& other) {
   if (this == &other) return *this;
@@ -192,11 +229,14 @@ path_guider<Exec, Guide>& path_guider<Exec, Guide>::operator=(path_guider&& othe
   needs_ = other.needs_;
   recorder_ = std::move(other.recorder_);
   samples_ = other.samples_;
-  settled_after_ = other.settled_after_;
+  warm_up_end_ = other.warm_up_end_;
   recorded_ = other.recorded_;
   return *this;
 }
 
+// Three numbers decide which paths are recorded: the sample's number, the seed, and the end of the warm-up. A
+// guide file has them all but the seed. So a loaded guider with the saved one's seed records the paths that
+// the saved one would have recorded.
 template <class Exec, class Guide>
 void path_guider<Exec, Guide>::begin_sample() {
   const std::uint32_t sample = samples_ + 1;
@@ -206,9 +246,12 @@ void path_guider<Exec, Guide>::begin_sample() {
   samples_ = sample;  // last: a call that threw is made again for the same sample
 }
 
+// The guide reads and clears the recorder. A sample that is not recorded has nothing to learn from, but the
+// guide may still have values of earlier samples to publish.
 template <class Exec, class Guide>
 void path_guider<Exec, Guide>::end_sample() {
   if (recorded_) {
+    // The stage ends with this block, before the next one begins.
     const auto timed = clock_.time(stage::record);
     guide_.learn(now(), recorder_);
   }
@@ -216,6 +259,8 @@ void path_guider<Exec, Guide>::end_sample() {
   guide_.update(now());
 }
 
+// Checks what prepare() and sample_directions() have in common. The latter checks `Random` and its outputs,
+// too.
 template <class Exec, class Guide>
 template <class Surfaces, class Random, class Caster>
 void path_guider<Exec, Guide>::check(const wave<Surfaces, Random>& w, const Caster&) const {
@@ -223,9 +268,12 @@ void path_guider<Exec, Guide>::check(const wave<Surfaces, Random>& w, const Cast
                 "surfaces: needs wfpg::surface<Bsdf> operator()(std::uint32_t) const");
   static_assert(is_ray_caster_v<Caster, Exec>,
                 "caster: needs ray_hit operator()(const ray&) const, or cast(exec, rays, hits) const");
-  require(w.ray_count <= options_.max_rays, "ray_count", w.ray_count, "at most max_rays");
+  require(w.ray_count <= *options_.max_rays, "ray_count", w.ray_count, "at most max_rays");
 }
 
+// Checks sizes on the host before it launches anything. There are three ways to sample a wave: by the guide's
+// own kernels, from its view, or from BSDFs alone. The last is chosen on the host, so that unguided waves run
+// a kernel without the guide's code.
 template <class Exec, class Guide>
 template <class Surfaces, class Random, class Caster, class Queries>
 void path_guider<Exec, Guide>::sample_directions(const wave<Surfaces, Random>& w, const Caster& caster,
@@ -240,19 +288,21 @@ void path_guider<Exec, Guide>::sample_directions(const wave<Surfaces, Random>& w
     require(queries.densities.size() >= w.ray_count, "size of densities", queries.densities.size(),
             "ray_count or more");
 
-  const serve_ray<Surfaces, Random, Queries> serve{w.surfaces, w.random, queries, directions};
-  if constexpr (Guide::serves_waves)
-    guide_.serve(now(w.depth), w, caster, serve);
+  // The sampler samples one ray from any mixture. A guide with `samples_waves` calls it in its own kernels.
+  const sample_ray<Surfaces, Random, Queries> sampler{w.surfaces, w.random, queries, directions};
+  if constexpr (Guide::samples_waves)
+    guide_.sample_wave(now(w.depth), w, caster, sampler);
   else {
     const view_type view = prepare(w, caster);
-    const auto timed = clock_.time(stage::serve);
+    const auto timed = clock_.time(stage::sample);
     if (now(w.depth).guided)
-      exec_.for_each(w.ray_count, serve_guide_view<decltype(serve), view_type>{serve, view});
+      exec_.for_each(w.ray_count, sample_guide_view<decltype(sampler), view_type>{sampler, view});
     else
-      exec_.for_each(w.ray_count, serve_unbinned<decltype(serve)>{serve, {}});
+      exec_.for_each(w.ray_count, sample_bsdf<decltype(sampler)>{sampler, {}});
   }
 }
 
+// Counts as the stage "fields"; the guide may time stages of its own inside, such as "bin".
 template <class Exec, class Guide>
 template <class Surfaces, class Random, class Caster>
 typename path_guider<Exec, Guide>::view_type path_guider<Exec, Guide>::prepare(
@@ -262,10 +312,12 @@ typename path_guider<Exec, Guide>::view_type path_guider<Exec, Guide>::prepare(
   return guide_.prepare(now(w.depth), w, caster);
 }
 
+// Fills in the facade's own counts. The guide adds those of its fields and its cache in report().
 template <class Exec, class Guide>
 guider_statistics path_guider<Exec, Guide>::statistics() const {
   guider_statistics result;
   result.samples = samples_;
+  // Counted from unguided_samples on: the guide is empty in all samples or in none.
   result.guided_samples = guided() ? samples_ - options_.unguided_samples : 0;
   result.dropped_vertices = recorder_.dropped(exec_);
   result.seconds = clock_.report();
@@ -273,6 +325,8 @@ guider_statistics path_guider<Exec, Guide>::statistics() const {
   return result;
 }
 
+// Two parts beside the guide's. "paths" is the recorder; "scratch" is retained memory that no buffer uses
+// now.
 template <class Exec, class Guide>
 memory_report path_guider<Exec, Guide>::memory() const {
   memory_report report{guide_.memory()};

@@ -1,9 +1,11 @@
-// The library's version.
+// The library's version, as macros for the preprocessor: a host can ask for a version with #if.
+//
+// Source: semantic versioning. Cost and memory: none.
 #pragma once
 
-/// Changes with every incompatible version, once it is 1.
+/// Raised by every incompatible change, once it is 1.
 #define WFPG_VERSION_MAJOR 0
-/// Changes with what is new, and, while the major version is 0, with what is incompatible.
+/// Raised by new features. While the major version is 0, incompatible changes raise it too.
 #define WFPG_VERSION_MINOR 1
-/// Changes with corrections.
+/// Raised by corrections that change no interface.
 #define WFPG_VERSION_PATCH 0

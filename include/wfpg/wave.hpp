@@ -3,5 +3,5 @@
 
 #pragma message("wfpg/wave.hpp is deprecated: include wfpg/host/wave.hpp and wfpg/guide/statistics.hpp")
 
-#include <wfpg/host/wave.hpp>
 #include <wfpg/guide/statistics.hpp>
+#include <wfpg/host/wave.hpp>

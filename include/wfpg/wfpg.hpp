@@ -1,5 +1,5 @@
-// Everything of the library that needs no optional dependency. Policies beside the serial one, and
-// testing.hpp for a host's own tests, are included by name.
+// All headers that need no optional dependency. Policies beside the serial one, and wfpg/testing for a host's
+// own tests, are included by name.
 #pragma once
 
 #include <wfpg/base/config.hpp>
@@ -8,7 +8,10 @@
 #include <wfpg/base/morton.hpp>
 #include <wfpg/base/normal_lattice.hpp>
 #include <wfpg/base/octahedral_map.hpp>
+#include <wfpg/base/prefix_search.hpp>
 #include <wfpg/base/types.hpp>
+#include <wfpg/bins/binning_options.hpp>
+#include <wfpg/bins/marking.hpp>
 #include <wfpg/bins/partitioner.hpp>
 #include <wfpg/bins/spatial_binner.hpp>
 #include <wfpg/bins/wave_rays.hpp>
@@ -24,15 +27,21 @@
 #include <wfpg/guide/sampling_options.hpp>
 #include <wfpg/guide/statistics.hpp>
 #include <wfpg/guide_file.hpp>
+#include <wfpg/guides/octree/build_schedule.hpp>
 #include <wfpg/guides/octree/deposit_paths.hpp>
 #include <wfpg/guides/octree/field_cells.hpp>
 #include <wfpg/guides/octree/field_sinks.hpp>
+#include <wfpg/guides/octree/field_slots.hpp>
 #include <wfpg/guides/octree/field_store.hpp>
 #include <wfpg/guides/octree/guide_view.hpp>
+#include <wfpg/guides/octree/kept_field.hpp>
+#include <wfpg/guides/octree/kept_guide.hpp>
 #include <wfpg/guides/octree/learnt_radiance.hpp>
 #include <wfpg/guides/octree/light_guide.hpp>
-#include <wfpg/guides/octree/octree_guide.hpp>
+#include <wfpg/guides/octree/octree_scene.hpp>
+#include <wfpg/guides/octree/options.hpp>
 #include <wfpg/guides/octree/transient_fields.hpp>
+#include <wfpg/guides/octree/transient_guide.hpp>
 #include <wfpg/guides/records/emitters.hpp>
 #include <wfpg/guides/records/irradiance_record.hpp>
 #include <wfpg/guides/records/irradiance_records.hpp>

@@ -36,26 +36,26 @@ struct guided {
 };
 
 template <class Exec>
-guided guide(wfpg::field_lifetime lifetime, std::uint32_t product_resolution) {
+guided guide(field_lifetime lifetime, std::uint32_t product_resolution) {
   const Exec exec;
-  wfpg::guider_options options;
+  guider_options options;
   options.fields = lifetime;
-  options.product_resolution = product_resolution;
+  options.product_resolution = unless_zero(product_resolution);
   options.octree_resolution = 64;
   options.max_rays = rays;
   options.deposit_capacity = 2 * deposits;
   options.unguided_samples = 0;
   options.kept.budget_bytes = std::size_t(4) << 20;
-  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
+  octree_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
   const wfpg::buffer<wfpg::sampled_direction, Exec> directions(exec, rays);
   for (std::uint32_t sample = 0; sample < samples; ++sample) {
     guider.begin_sample();
-    exec.for_each(deposits, light_walls{guider.cache()});
+    exec.for_each(deposits, light_walls{guider.guide().cache()});
     guider.sample_directions(wfpg::wave{0u, rays, walls{}, hashed_numbers{sample}}, box_caster{},
                              directions.view());
     guider.end_sample();
   }
-  return {guider.statistics(), guider.octree().node_count(), guider.memory().persistent(),
+  return {guider.statistics(), guider.guide().octree().node_count(), guider.memory().persistent(),
           directions.to_host(exec)};
 }
 
@@ -64,9 +64,8 @@ bool close(const wfpg::sampled_direction& a, const wfpg::sampled_direction& b) {
          std::fabs(a.pdf - b.pdf) <= 1.0e-3f * a.pdf;
 }
 
-void compare(wfpg::field_lifetime lifetime, std::uint32_t product_resolution) {
-  INFO((lifetime == wfpg::field_lifetime::kept ? "kept" : "transient")
-       << ", products " << product_resolution);
+void compare(field_lifetime lifetime, std::uint32_t product_resolution) {
+  INFO((lifetime == field_lifetime::kept ? "kept" : "transient") << ", products " << product_resolution);
   const guided host = guide<serial_policy>(lifetime, product_resolution),
                device = guide<cuda_policy>(lifetime, product_resolution);
   CHECK(device.nodes == host.nodes);
@@ -92,7 +91,7 @@ void compare(wfpg::field_lifetime lifetime, std::uint32_t product_resolution) {
 }  // namespace
 
 TEST_CASE("the guider on the CUDA policy does what it does on the serial one", "[cuda]") {
-  for (const auto lifetime : {wfpg::field_lifetime::kept, wfpg::field_lifetime::transient})
+  for (const auto lifetime : {field_lifetime::kept, field_lifetime::transient})
     for (const std::uint32_t product_resolution : {0u, 8u}) compare(lifetime, product_resolution);
 }
 

@@ -34,11 +34,11 @@ class own_stream {
   cudaStream_t stream_ = nullptr;
 };
 
-wfpg::guider_options options_of(wfpg::field_lifetime lifetime, std::uint32_t product_resolution,
-                                std::uint64_t seed = 1) {
-  wfpg::guider_options options = box_options(wfpg::guiding_mode::oriented, lifetime);
-  options.product_resolution = product_resolution;
-  options.max_paths = options.max_rays = rays;
+guider_options options_of(field_lifetime lifetime, std::uint32_t product_resolution, std::uint64_t seed = 1) {
+  guider_options options = box_options(wfpg::guiding_mode::oriented, lifetime);
+  options.product_resolution = unless_zero(product_resolution);
+  options.max_paths = rays;
+  options.max_rays = rays;
   options.max_depth = depths;
   options.deposit_capacity = deposits + rays * depths;
   options.unguided_samples = 1;
@@ -60,7 +60,7 @@ struct record_walls {
 /// Samples of two depths, as a renderer makes them.
 class renderer {
  public:
-  renderer(const cuda_policy& exec, const wfpg::guider_options& options)
+  renderer(const cuda_policy& exec, const guider_options& options)
       : exec_(exec), guider_(exec, box_mesh<cuda_policy>(exec).view(), options) {
     for (auto& directions : directions_)
       directions = wfpg::buffer<wfpg::sampled_direction, cuda_policy>(exec_, rays);
@@ -69,7 +69,7 @@ class renderer {
   void sample() {
     ++samples_;
     guider_.begin_sample();
-    exec_.for_each(deposits, light_walls{guider_.cache()});
+    exec_.for_each(deposits, light_walls{guider_.guide().cache()});
     for (std::uint32_t depth = 0; depth < depths; ++depth) {
       const walls surfaces{samples_ % 3 + depth};
       exec_.for_each(rays, record_walls{guider_.recorder(), surfaces, depth});
@@ -95,7 +95,7 @@ class renderer {
 
  private:
   cuda_policy exec_;
-  wfpg::path_guider<cuda_policy> guider_;
+  octree_guider<cuda_policy> guider_;
   wfpg::buffer<wfpg::sampled_direction, cuda_policy> directions_[depths];
   std::uint32_t samples_ = 0;
 };
@@ -160,7 +160,7 @@ TEST_CASE("a sample in a CUDA graph is the sample", "[cuda]") {
 TEST_CASE("guiders on two streams do not disturb each other", "[cuda]") {
   for (const auto lifetime : lifetimes) {
     INFO(name_of(lifetime));
-    const wfpg::guider_options one = options_of(lifetime, 0, 1), other = options_of(lifetime, 8, 2);
+    const guider_options one = options_of(lifetime, 0, 1), other = options_of(lifetime, 8, 2);
     const own_stream first, second;
     renderer a(cuda_policy(first), one), b(cuda_policy(second), other);
     renderer a_alone(cuda_policy(), one), b_alone(cuda_policy(), other);
@@ -291,7 +291,7 @@ TEST_CASE("work on a stream waits for no other stream", "[cuda][overlap]") {
   for (const auto lifetime : lifetimes) {
     INFO(name_of(lifetime));
     const own_stream stream;
-    const wfpg::guider_options options = options_of(lifetime, 0);
+    const guider_options options = options_of(lifetime, 0);
     renderer ours(cuda_policy(stream), options), expected(cuda_policy(), options);
     for (int sample = 0; sample < 4; ++sample) expected.sample();
     for (int sample = 0; sample < 3; ++sample) ours.sample();
@@ -332,7 +332,7 @@ TEST_CASE("a launch that failed before is reported by the next call", "[cuda]") 
 TEST_CASE("a kernel that failed before is reported by every call", "[.][cuda][sticky]") {
   const cuda_policy exec;
   const wfpg::buffer<std::uint32_t, cuda_policy> word(exec, 1);
-  renderer guided(exec, options_of(wfpg::field_lifetime::kept, 0));
+  renderer guided(exec, options_of(field_lifetime::kept, 0));
   fail<<<1, 1>>>();
   try {
     wfpg::read_element(exec, word.data());

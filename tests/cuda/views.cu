@@ -1,6 +1,9 @@
 // Compiled, never run: each view of the library goes to a kernel by value and is called there, so that
 // whatever a device will run is annotated for it.
 #include <wfpg/octree/svo_ray_caster.hpp>
+#include <wfpg/testing/check_bsdf.hpp>
+#include <wfpg/testing/check_ray_caster.hpp>
+#include <wfpg/testing/check_surfaces.hpp>
 #include <wfpg/wfpg.hpp>
 
 namespace cuda_compile {
@@ -130,28 +133,28 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(wfpg::deposit_path{recorder, cache, {}});
   launch(d::starts_key_group{});
   launch(d::write_group_offsets{});
-  launch(d::count_at_leaves<d::wave_rays<surfaces>>{});
-  launch(d::sum_children{});
+  launch(d::count_at_leaves<wfpg::wave_rays<surfaces>>{});
+  launch(d::sum_wave_counts{});
   launch(d::ascend_to_marked{});
-  launch(d::serve_unbinned<d::serve_ray<surfaces, random_numbers, wfpg::no_queries>>{});
+  launch(wfpg::sample_bsdf<wfpg::sample_ray<surfaces, random_numbers, wfpg::no_queries>>{});
   launch(d::add_counts{});
 
   // Kept fields.
-  const d::field_slots_view slots;
-  d::field_store_state* const state = nullptr;
-  d::field_wave_counts* const counts = nullptr;
-  launch(d::count_rays<d::wave_rays<surfaces>>{{}, tree, {}, {}});
-  launch(d::forget_wave{{}, counts});
+  const wfpg::field_slots_view slots;
+  wfpg::field_store_state* const state = nullptr;
+  wfpg::field_wave_counts* const counts = nullptr;
+  launch(d::count_rays<wfpg::wave_rays<surfaces>>{{}, tree, {}, {}});
+  launch(d::forget_wave_builds{{}, counts});
   launch(d::list_builds{{}, nullptr, {}, {}, 0});
   launch(d::begin_slots{slots, nullptr, state, counts, 1, 16});
   launch(d::index_slots{slots, nullptr, nullptr, state});
-  launch(d::invalidate_fields{slots, nullptr, tree, {}});
+  launch(wfpg::invalidate_fields{slots, nullptr, tree, {}});
   launch(d::mark_leaves{tree, {}, 3, {}});
-  launch(d::sum_counts{tree, {}});
+  launch(d::sum_running_counts{tree, {}});
   launch(d::fill_top{});
   launch(d::fill_steps{});
   launch(d::count_used{{}, 0, state});
-  launch(d::adapt_pressure{state, 0, 0});
+  launch(d::update_pressure{state, 0, 0});
 
   // Choices of lights.
   launch(d::fold_light_values{});

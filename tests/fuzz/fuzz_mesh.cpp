@@ -39,7 +39,7 @@ class byte_reader {
 /// A mesh, its resolution, and how it is guided in.
 struct input {
   std::uint32_t resolution = 1;
-  wfpg::guider_options options;
+  wfpg_test::guider_options options;
   std::vector<vec3> positions;
   std::vector<wfpg::uvec3> triangles;
 };
@@ -51,16 +51,16 @@ std::uint32_t resolution_of(std::uint8_t byte) {
   return refused[byte % 6];
 }
 
-wfpg::guider_options options_of(std::uint8_t bits) {
-  wfpg::guider_options options;
+wfpg_test::guider_options options_of(std::uint8_t bits) {
+  wfpg_test::guider_options options;
   options.mode = static_cast<wfpg::guiding_mode>(bits % 2);
-  options.fields = static_cast<wfpg::field_lifetime>(bits / 2 % 2);
-  options.product_resolution = bits / 4 % 2 * 4;
+  options.fields = static_cast<wfpg_test::field_lifetime>(bits / 2 % 2);
+  options.product_resolution = wfpg_test::unless_zero(std::uint32_t(bits / 4 % 2 * 4));
   options.unguided_samples = bits / 8 % 2;
   options.kept.resolution = options.field_resolution = options.min_field_resolution = 4;
   options.kept.budget_bytes = 16384;
-  options.min_bin_level = bits / 16 % 4;
-  options.rays_per_bin = 2;
+  options.binning.min_level = bits / 16 % 4;
+  options.binning.rays_per_bin = 2;
   options.max_paths = rays;
   options.max_depth = 2;
   return options;
@@ -109,8 +109,8 @@ void check_octree(const wfpg::sparse_voxel_octree_view& tree) {
 void build_and_guide(const input& in) {
   const wfpg::triangle_mesh_view mesh{{in.positions.data(), in.positions.size()},
                                       {in.triangles.data(), in.triangles.size()}};
-  wfpg::path_guider<policy> guider(policy(), mesh, in.options);
-  const wfpg::sparse_voxel_octree_view tree = guider.octree().view();
+  wfpg_test::octree_guider<policy> guider(policy(), mesh, in.options);
+  const wfpg::sparse_voxel_octree_view tree = guider.guide().octree().view();
   check_octree(tree);
   require(guider.statistics().build.skipped() <= in.triangles.size(), "no more is skipped than there is");
   require(tree.empty() == (guider.statistics().build.skipped() == in.triangles.size()),

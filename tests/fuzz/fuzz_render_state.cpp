@@ -56,8 +56,8 @@ render_options options_of(const std::string& bytes) {
   options.octree_resolution = 4;
   options.field_resolution = options.slot_resolution = options.product_resolution = 4;
   options.field_budget = 2048;
-  options.min_bin_level = 1;
-  options.rays_per_bin = 2;
+  options.binning.min_level = 1;
+  options.binning.rays_per_bin = 2;
   options.light_groups = 2;
   options.keep_state = true;
   return options;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "require.hpp"
+#include "support/either_guide.hpp"
 
 #include <wfpg/exec/seq.hpp>
 #include <wfpg/host/ray_caster.hpp>
@@ -65,9 +66,9 @@ inline void ask_lights(const wfpg::light_guide_view& lights, const wfpg::surface
 }
 
 /// Two samples of one vertex at each of `rays` surfaces, and what it finds.
-template <class Surfaces>
-void guide(wfpg::path_guider<policy>& guider, const Surfaces& surfaces) {
-  const wfpg::sparse_voxel_octree_view tree = guider.octree().view();
+template <class Guider, class Surfaces>
+void guide(Guider& guider, const Surfaces& surfaces) {
+  const wfpg::sparse_voxel_octree_view tree = guider.guide().octree().view();
   std::vector<wfpg::sampled_direction> drawn(rays);
   for (int sample = 0; sample < 2; ++sample) {
     guider.begin_sample();

@@ -9,7 +9,7 @@ namespace {
 constexpr std::uint32_t width = 24;
 
 std::vector<vec3> picture(std::uint32_t samples, bool guided) {
-  guider_options options;
+  kept_guide_options options;
   options.max_depth = 4;
   if (!guided) options.unguided_samples = samples;
   return render(exec::tbb(), room(), options, width, samples);

@@ -32,7 +32,7 @@ template <class Exec>
 bool consistent(const kept_box<Exec>& box) {
   const auto counts = box.counts();
   const auto state = box.state();
-  return counts.live <= counts.capacity && counts.born - counts.freed == counts.live &&
+  return counts.live <= counts.capacity && counts.allocated - counts.freed == counts.live &&
          counts.live + state.free - state.taken == counts.capacity;
 }
 

@@ -1,6 +1,7 @@
 // A guider in the unit box with a bright patch in its ceiling, and a path tracer of two bounces around it.
 #pragma once
 
+#include "support/either_guide.hpp"
 #include "support/evaluate.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
@@ -50,22 +51,22 @@ inline double floor_irradiance(vec3 p) {
   return double(patch_radiance) * sum * step * step;
 }
 
-constexpr wfpg::field_lifetime lifetimes[] = {wfpg::field_lifetime::kept, wfpg::field_lifetime::transient};
+constexpr field_lifetime lifetimes[] = {field_lifetime::kept, field_lifetime::transient};
 
-inline const char* name_of(wfpg::field_lifetime lifetime) {
-  return lifetime == wfpg::field_lifetime::kept ? "kept fields" : "transient fields";
+inline const char* name_of(field_lifetime lifetime) {
+  return lifetime == field_lifetime::kept ? "kept fields" : "transient fields";
 }
 
-inline wfpg::guider_options box_options(wfpg::guiding_mode mode = wfpg::guiding_mode::oriented,
-                                        wfpg::field_lifetime lifetime = wfpg::field_lifetime::kept) {
-  wfpg::guider_options options;
+inline guider_options box_options(wfpg::guiding_mode mode = wfpg::guiding_mode::oriented,
+                                  field_lifetime lifetime = field_lifetime::kept) {
+  guider_options options;
   options.mode = mode;
   options.fields = lifetime;
   options.kept.resolution = 16;
   options.kept.budget_bytes = std::size_t(4) << 20;
   options.octree_resolution = 32;
-  options.min_bin_level = 2;
-  options.rays_per_bin = 32;
+  options.binning.min_level = 2;
+  options.binning.rays_per_bin = 32;
   options.field_resolution = 16;
   options.min_field_resolution = 8;
   options.unguided_samples = 0;
@@ -124,17 +125,17 @@ std::vector<float> bsdf_densities(const Exec& exec, const std::vector<test_surfa
 template <class Exec>
 struct guided_box {
   Exec exec;
-  wfpg::path_guider<Exec> guider;
+  octree_guider<Exec> guider;
 
-  explicit guided_box(const wfpg::guider_options& options = box_options(),
+  explicit guided_box(const guider_options& options = box_options(),
                       wfpg::memory_resource* resource = nullptr)
       : exec(Exec().with_resource(resource)), guider(exec, box_mesh<Exec>(exec).view(), options) {}
-  explicit guided_box(wfpg::field_lifetime lifetime)
+  explicit guided_box(field_lifetime lifetime)
       : guided_box(box_options(wfpg::guiding_mode::oriented, lifetime)) {}
 
   /// Deposits the patch on 40² points a wall, and begins the sample after it.
   void learn() {
-    deposit_on_walls(exec, guider.cache(), 40,
+    deposit_on_walls(exec, guider.guide().cache(), 40,
                      [](std::uint32_t face, float u, float v) { return emitted(face_point(face, u, v)); });
     guider.end_sample();
     guider.begin_sample();
@@ -301,14 +302,14 @@ std::vector<float> trace_paths(const Exec& exec, wfpg::path_guider<Exec, Guide>&
 }
 
 /// Options for trace_paths.
-inline wfpg::guider_options tracing_options(std::size_t paths,
-                                            wfpg::guiding_mode mode = wfpg::guiding_mode::oriented,
-                                            wfpg::field_lifetime lifetime = wfpg::field_lifetime::kept) {
-  wfpg::guider_options options = box_options(mode, lifetime);
+inline guider_options tracing_options(std::size_t paths,
+                                      wfpg::guiding_mode mode = wfpg::guiding_mode::oriented,
+                                      field_lifetime lifetime = field_lifetime::kept) {
+  guider_options options = box_options(mode, lifetime);
   options.max_paths = paths;
   options.max_depth = 3;
-  options.max_rays = 0;
-  options.deposit_capacity = 0;
+  options.max_rays.reset();
+  options.deposit_capacity.reset();
   options.unguided_samples = 1;
   return options;
 }

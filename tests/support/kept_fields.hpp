@@ -107,7 +107,7 @@ struct kept_box {
   /// A wave that makes no fields: each ray's number.
   std::vector<std::uint32_t> find(const std::vector<test_surface>& wave) {
     const wfpg::buffer<std::uint32_t, Exec> numbers(exec(), wave.size());
-    store.find_and_serve(exec(), kept(wave), note_number{numbers.view()});
+    store.find_and_sample(exec(), kept(wave), note_number{numbers.view()});
     return numbers.to_host(exec());
   }
   /// Cones that a wave casts.
@@ -118,11 +118,11 @@ struct kept_box {
   }
   /// Waves until every ray that can have a field of its own has it: of keys in one bucket a wave bears one.
   wfpg::guide_view settle(const std::vector<test_surface>& wave) {
-    std::uint64_t born = 0;
+    std::uint64_t allocated = 0;
     do {
-      born = counts().born;
+      allocated = counts().allocated;
       prepare(wave);
-    } while (counts().born != born);
+    } while (counts().allocated != allocated);
     return prepare(wave);
   }
   /// A sample of settled waves.
@@ -134,8 +134,8 @@ struct kept_box {
   }
 
   wfpg::kept_field_statistics counts() const { return store.statistics(exec()); }
-  wfpg::detail::field_store_state state() const { return wfpg::read_element(exec(), store.state()); }
-  wfpg::detail::field_wave_counts last_wave() const { return wfpg::read_element(exec(), store.last_wave()); }
+  wfpg::field_store_state state() const { return wfpg::read_element(exec(), store.state()); }
+  wfpg::field_wave_counts last_wave() const { return wfpg::read_element(exec(), store.last_wave()); }
   /// A ray's field; its cells lie in the policy's memory.
   wfpg::directional_field field_of(const wfpg::guide_view& view, std::uint32_t ray) const {
     return evaluate(exec(), [=] WFPG_HD() { return view.mixture(ray).field; });

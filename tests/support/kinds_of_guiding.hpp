@@ -12,14 +12,14 @@ namespace wfpg_test {
 
 constexpr wfpg::guiding_mode modes[] = {wfpg::guiding_mode::oriented, wfpg::guiding_mode::plain};
 
-inline std::vector<wfpg::guider_options> kinds_of_guiding() {
-  std::vector<wfpg::guider_options> kinds;
+inline std::vector<guider_options> kinds_of_guiding() {
+  std::vector<guider_options> kinds;
   for (const wfpg::guiding_mode mode : modes)
-    for (const wfpg::field_lifetime lifetime : lifetimes) kinds.push_back(box_options(mode, lifetime));
+    for (const field_lifetime lifetime : lifetimes) kinds.push_back(box_options(mode, lifetime));
   return kinds;
 }
 
-inline std::string describe(const wfpg::guider_options& options) {
+inline std::string describe(const guider_options& options) {
   return std::string(options.mode == wfpg::guiding_mode::plain ? "plain, " : "oriented, ") +
          name_of(options.fields);
 }

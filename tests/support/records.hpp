@@ -5,6 +5,7 @@
 #include "support/guiding.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
+#include "support/unset.hpp"
 
 #include <wfpg/guides/records/irradiance_records.hpp>
 #include <wfpg/path_guider.hpp>
@@ -30,7 +31,7 @@ inline std::vector<wfpg::emitting_triangle> patch_lamp() {
 
 inline wfpg::irradiance_records_options records_options(std::size_t rays = 1024) {
   wfpg::irradiance_records_options options;
-  options.max_rays = rays;
+  options.max_rays = unless_zero(rays);
   options.octree_resolution = 16;
   options.record_level = 3;
   options.emitter_rays = 1u << 14;

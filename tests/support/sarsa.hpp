@@ -5,6 +5,7 @@
 #include "support/guiding.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
+#include "support/unset.hpp"
 
 #include <wfpg/guides/sarsa/sarsa_grid.hpp>
 #include <wfpg/path_guider.hpp>
@@ -42,7 +43,7 @@ inline wfpg::sarsa_grid_options sarsa_options(std::size_t paths) {
   options.normal_resolution = 8;
   options.step = 1;
   options.unguided_samples = 0;
-  options.values_per_direction = 0;
+  options.values_per_direction.reset();
   return options;
 }
 

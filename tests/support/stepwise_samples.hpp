@@ -18,13 +18,13 @@ namespace wfpg_test {
 constexpr std::size_t most_paths = 1500;
 
 /// Little, since it is sampled anew for each thing that fails.
-inline wfpg::guider_options stepwise_options(wfpg::field_lifetime lifetime, std::uint32_t products) {
-  wfpg::guider_options options = tracing_options(most_paths, wfpg::guiding_mode::oriented, lifetime);
+inline guider_options stepwise_options(field_lifetime lifetime, std::uint32_t products) {
+  guider_options options = tracing_options(most_paths, wfpg::guiding_mode::oriented, lifetime);
   options.octree_resolution = 8;
   options.kept.resolution = options.field_resolution = options.min_field_resolution = 4;
   options.kept.budget_bytes = 400 * wfpg::field_store<one_policy>::bytes_a_slot(4);
-  options.rays_per_bin = 8;
-  options.product_resolution = products;
+  options.binning.rays_per_bin = 8;
+  if (products > 0) options.product_resolution = products;
   options.lights.weights = {1.0f, 0.0f, 3.0f};
   options.lights.resolution = 4;
   options.caster_buffer_bytes = 16 << 10;
@@ -34,7 +34,7 @@ inline wfpg::guider_options stepwise_options(wfpg::field_lifetime lifetime, std:
 /// f(options) of both lifetimes, with and without products.
 template <class F>
 void for_each_stepwise_options(const F& f) {
-  for (const wfpg::field_lifetime lifetime : lifetimes)
+  for (const field_lifetime lifetime : lifetimes)
     for (const std::uint32_t products : {0u, 4u}) {
       INFO(name_of(lifetime) << ", products " << products);
       f(stepwise_options(lifetime, products));
@@ -65,12 +65,12 @@ struct choose_lights {
 
 /// Samples in all forms of calls, step by step, each with more paths than the one before it, so that it
 /// allocates; what hosts allocate themselves is not of the guider's resource.
-template <class Exec>
+template <class Exec, class Guide = either_guide<Exec>>
 class stepwise_samples {
  public:
   static constexpr int steps = 7, begin = 0, end = steps - 1;
 
-  explicit stepwise_samples(wfpg::path_guider<Exec>& guider) : guider_(guider) {}
+  explicit stepwise_samples(wfpg::path_guider<Exec, Guide>& guider) : guider_(guider) {}
 
   /// Directions that were drawn.
   const std::vector<wfpg::sampled_direction>& drawn() const { return drawn_; }
@@ -117,7 +117,7 @@ class stepwise_samples {
                                           guider_.recorder(), depth, 100 * std::uint64_t(sample_) + depth});
   }
 
-  wfpg::path_guider<Exec>& guider_;
+  wfpg::path_guider<Exec, Guide>& guider_;
   Exec host_;
   std::uint32_t sample_ = 0;
   std::size_t paths_ = 0;
@@ -140,8 +140,8 @@ struct density_of_view {
 };
 
 /// A whole sample: some rays are guided, and each direction has the density that the fields give it.
-template <class Exec>
-void check_guides(wfpg::path_guider<Exec>& guider) {
+template <class Exec, class Guide>
+void check_guides(wfpg::path_guider<Exec, Guide>& guider) {
   const Exec exec;
   const auto surfaces = wall_surfaces(400, 77);
   const wave_of_surfaces<Exec> wave(exec, surfaces);

@@ -42,19 +42,19 @@ inline void subtract(wfpg::guider_statistics& counted, const wfpg::guider_statis
     counted.depths[depth].rays -= before.depths[depth].rays;
     counted.depths[depth].cones -= before.depths[depth].cones;
   }
-  counted.kept.born -= before.kept.born;
+  counted.kept.allocated -= before.kept.allocated;
   counted.kept.freed -= before.kept.freed;
   counted.kept.refreshed -= before.kept.refreshed;
 }
 
 /// The octree's. `segments`: rays that paths were extended by in all samples, since the guider said `before`.
-template <class Exec>
-void report_guider(const wfpg::path_guider<Exec>& guider, std::uint64_t segments, render_report& report,
-                   const wfpg::guider_statistics& before = {}) {
+template <class Exec, class Guide>
+void report_guider(const wfpg::path_guider<Exec, Guide>& guider, std::uint64_t segments,
+                   render_report& report, const wfpg::guider_statistics& before = {}) {
   report_any_guider(guider, report);
   const wfpg::memory_report memory = guider.memory();
 
-  const wfpg::sparse_voxel_octree<Exec>& octree = guider.octree();
+  const wfpg::sparse_voxel_octree<Exec>& octree = guider.guide().octree();
   report.octree.resolution = octree.resolution();
   report.octree.nodes = octree.node_count();
   report.octree.leaves = octree.leaf_count();
@@ -79,7 +79,7 @@ void report_guider(const wfpg::path_guider<Exec>& guider, std::uint64_t segments
   report.slots.live = kept.live;
   report.slots.live_bytes = kept.live * kept.bytes_a_slot;
   report.used_bytes = report.persistent_bytes - (kept.capacity - kept.live) * kept.bytes_a_slot;
-  report.slots.born = static_cast<double>(kept.born) / samples;
+  report.slots.allocated = static_cast<double>(kept.allocated) / samples;
   report.slots.freed = static_cast<double>(kept.freed) / samples;
   report.slots.refreshed = static_cast<double>(kept.refreshed) / samples;
   if (segments > 0) report.cones_per_segment = cones / static_cast<double>(segments);

@@ -5,6 +5,7 @@
 #include "app/methods.hpp"
 #include "tracer/stage_clock.hpp"
 
+#include <wfpg/guides/octree/options.hpp>
 #include <wfpg/guides/records/options.hpp>
 #include <wfpg/guides/sarsa/options.hpp>
 #include <wfpg/sampling/sample_combiner.hpp>
@@ -48,20 +49,25 @@ struct render_options {
   int roulette_depth = 3;  ///< Russian roulette ends no path before this vertex, from 0; 1 to 2^30
   bool nee = true;         ///< next-event estimation toward area lights, with MIS
   std::uint64_t seed = 0;
-  std::uint32_t octree_resolution = 128;             ///< voxels a side, a power of two
-  std::uint32_t field_resolution = 32;               ///< cells a side of transient fields at the first vertex
-  std::uint32_t slot_resolution = 24;                ///< cells a side of kept fields
-  std::uint32_t recast = 32;                         ///< a refresh casts one cone in so many again
-  bool learn = true;                                 ///< kept fields learn from paths
-  std::size_t field_budget = std::size_t(24) << 20;  ///< bytes of kept fields
-  std::size_t caster_buffer = std::size_t(16) << 20;  ///< bytes of cones in flight to OptiX
-  std::uint32_t product_resolution = 8;               ///< blocks a side of products, 4, 8 or 16
-  std::uint32_t rays_per_bin = 64;                    ///< c_ray
-  std::uint32_t min_bin_level = 3;                    ///< l_min, from the root
-  std::uint32_t deposits_per_leaf = 16;               ///< of a sample that is recorded; 0: all
+  std::uint32_t octree_resolution =
+      wfpg::kept_guide_options().octree_resolution;  ///< voxels a side, a power of two
+  std::uint32_t field_resolution =
+      wfpg::transient_guide_options()
+          .field_resolution;  ///< cells a side of transient fields at the first vertex
+  std::uint32_t slot_resolution = wfpg::kept_field_options().resolution;  ///< cells a side of kept fields
+  std::uint32_t recast = wfpg::kept_field_options().recast;  ///< a refresh casts one cone in so many again
+  bool learn = wfpg::kept_field_options().learn;             ///< kept fields learn from paths
+  std::size_t field_budget = wfpg::kept_field_options().budget_bytes;  ///< bytes of kept fields
+  std::size_t caster_buffer =
+      wfpg::kept_guide_options().caster_buffer_bytes;  ///< bytes of cones in flight to OptiX
+  std::uint32_t product_resolution = 8;                ///< blocks a side of products, 4, 8 or 16
+  std::uint32_t rays_per_bin = wfpg::binning_options().rays_per_bin;  ///< c_ray
+  std::uint32_t min_bin_level = wfpg::binning_options().min_level;    ///< l_min, from the root
+  std::uint32_t deposits_per_leaf =
+      *wfpg::kept_guide_options().deposits_per_leaf;  ///< of a sample that is recorded; 0: all
   float guide_fraction = 0.0f;                        ///< in [0, 1]; 0: the mode's own, 0.5 of Open PGL's
   /// Of a path, from its first vertex on, at least 1; with next-event estimation never the last of several.
-  std::uint32_t guided_depths = 0xffffffffu;
+  std::uint32_t guided_depths = wfpg::sampling_options().guided_depths;
   std::uint32_t light_groups = 32;           ///< that guided paths learn to choose lights from, in [1, 255]
   std::uint32_t samples_per_leaf = 32000;    ///< after which Open PGL's field splits a leaf, 8 to 2^30
   wfpg::sarsa_grid_options sarsa;            ///< its own; what every guide is told follows from the others
@@ -87,7 +93,7 @@ struct slot_report {
   std::uint32_t capacity = 0;  ///< that the budget holds; 0: fields are transient
   std::uint32_t live = 0;      ///< at the end
   std::size_t live_bytes = 0;
-  double born = 0.0;       ///< a guided sample
+  double allocated = 0.0;  ///< a guided sample
   double freed = 0.0;      ///< a guided sample
   double refreshed = 0.0;  ///< a guided sample
 };

@@ -12,7 +12,10 @@
 #include <cstdint>
 #include <cstdio>
 #include <limits>
+#include <sstream>
 #include <stdexcept>
+#include <string>
+#include <type_traits>
 #include <vector>
 
 namespace render {
@@ -36,6 +39,20 @@ CLI::Option* add_choice(CLI::App& app, const std::string& name, Value& value,
       ->type_name("NAME");
 }
 
+/// A help text with the option's default: the value that it has before the command line is read. Bytes in
+/// whole MiB as such.
+template <class T>
+std::string with_default(const std::string& what, const T& value) {
+  std::ostringstream text;
+  text << what << " (default: ";
+  constexpr std::size_t mebibyte = std::size_t(1) << 20;
+  if constexpr (std::is_same_v<T, std::size_t>) {
+    if (value % mebibyte == 0 && value > 0) return text << value / mebibyte << "MiB)", text.str();
+  }
+  text << value << ')';
+  return text.str();
+}
+
 void parse_size(const std::string& text, render_options& options) {
   char end = 0;
   const bool is_size = std::sscanf(text.c_str(), "%9dx%9d%c", &options.width, &options.height, &end) == 2 &&
@@ -55,30 +72,35 @@ void add_sarsa_options(CLI::App& app, wfpg::sarsa_grid_options& options) {
   add_choice<wfpg::sarsa_sampler>(app, "--sarsa-sampler", options.sampler, sarsa_sampler_names(),
                                   "inversion over the sphere or hemisphere, rejection, or that mixed with "
                                   "uniform directions (default)");
-  app.add_option("--sarsa-resolution", options.resolution, "cells along each side of the scene (default: 8)")
+  app.add_option("--sarsa-resolution", options.resolution,
+                 with_default("cells along each side of the scene", options.resolution))
       ->transform(whole_number(1, 64));
-  app.add_option("--sarsa-directions", options.direction_resolution,
-                 "directions along the side of a cell's square, even (default: 16)")
+  app.add_option(
+         "--sarsa-directions", options.direction_resolution,
+         with_default("directions along the side of a cell's square, even", options.direction_resolution))
       ->transform(whole_number(2, 64));
-  app.add_option("--sarsa-step", options.step, "samples after which what was learnt is used (default: 8)")
+  app.add_option("--sarsa-step", options.step,
+                 with_default("samples after which what was learnt is used", options.step))
       ->transform(whole_number(1, largest_count));
   app.add_option("--sarsa-learning-rate", options.learning_rate,
-                 "what a new value counts for; 0: as each before (default: 0.05)")
+                 with_default("what a new value counts for; 0: as each before", options.learning_rate))
       ->transform(number(0.0, 1.0));
 }
 
 void add_records_options(CLI::App& app, wfpg::irradiance_records_options& options) {
   app.add_option("--records-octree", options.octree_resolution,
-                 "voxels a side that records look at (default: 64)")
+                 with_default("voxels a side that records look at", options.octree_resolution))
       ->transform(power_of_two(1, largest_octree));
-  app.add_option("--records-level", options.record_level, "octree level of records (default: 4, 16 a side)")
+  app.add_option("--records-level", options.record_level,
+                 with_default("octree level of records", options.record_level))
       ->transform(whole_number(0, largest_level));
   app.add_option("--records-rays", options.emitter_rays,
-                 "rays from emitters, which find what is lit directly (default: 262144)")
+                 with_default("rays from emitters, which find what is lit directly", options.emitter_rays))
       ->transform(whole_number(1, std::uint64_t(1) << 31));
-  app.add_option("--records-cones", options.cones_per_direction, "of each direction (default: 4)")
+  app.add_option("--records-cones", options.cones_per_direction,
+                 with_default("of each direction", options.cones_per_direction))
       ->transform(whole_number(1, 256));
-  app.add_option("--records-albedo", options.albedo, "of what emitters light (default: 0.5)")
+  app.add_option("--records-albedo", options.albedo, with_default("of what emitters light", options.albedo))
       ->transform(number(0.0, 1.0));
 }
 
@@ -177,12 +199,12 @@ void add_nee_option(CLI::App& app, render_options& options) {
 }
 
 void add_budget_options(CLI::App& app, render_options& options) {
-  CLI::Option* const spp = app.add_option("--spp", options.spp, "samples a pixel (default: 64)")
+  CLI::Option* const spp = app.add_option("--spp", options.spp, with_default("samples a pixel", options.spp))
                                ->transform(whole_number(1, 1 << 30));
   app.add_option("--seconds", options.seconds, "render for so long instead")
       ->transform(positive_number(longest_seconds))
       ->excludes(spp);
-  app.add_option("--seed", options.seed, "of the random numbers (default: 0)")
+  app.add_option("--seed", options.seed, with_default("of the random numbers", options.seed))
       ->transform(whole_number(0, std::numeric_limits<std::uint64_t>::max()));
 }
 
@@ -193,40 +215,51 @@ void add_picture_options(CLI::App& app, render_options& options) {
   app.add_option("--max-depth", options.max_depth, "segments of a path (default: the scene's)")
       ->transform(whole_number(1, largest_depth));
   app.add_option("--roulette-depth", options.roulette_depth,
-                 "vertex before which Russian roulette ends no path; the first hit is 0 (default: 3)")
+                 with_default("vertex before which Russian roulette ends no path; the first hit is 0",
+                              options.roulette_depth))
       ->transform(whole_number(1, 1 << 30));
 }
 
 void add_guider_options(CLI::App& app, render_options& options) {
-  app.add_option("--octree-resolution", options.octree_resolution, "voxels a side (default: 128)")
+  app.add_option("--octree-resolution", options.octree_resolution,
+                 with_default("voxels a side", options.octree_resolution))
       ->transform(power_of_two(1, largest_octree));
-  app.add_option("--field-resolution", options.field_resolution,
-                 "cells a side of transient fields at the first vertex (default: 32)")
+  app.add_option(
+         "--field-resolution", options.field_resolution,
+         with_default("cells a side of transient fields at the first vertex", options.field_resolution))
       ->transform(whole_number(2, 128));
-  app.add_option("--slot-resolution", options.slot_resolution, "cells a side of kept fields (default: 24)")
+  app.add_option("--slot-resolution", options.slot_resolution,
+                 with_default("cells a side of kept fields", options.slot_resolution))
       ->transform(whole_number(2, 128));
-  app.add_option("--recast", options.recast, "a refresh casts one cone in so many again (default: 32)")
+  app.add_option("--recast", options.recast,
+                 with_default("a refresh casts one cone in so many again", options.recast))
       ->transform(whole_number(1, 1 << 20));
   add_choice<bool>(app, "--learn", options.learn, {{"on", true}, {"off", false}},
                    "kept fields learn from paths, beside their cones (default: on)");
   app.add_option("--light-groups", options.light_groups,
-                 "lights are chosen from so many groups as is learnt; 1: by power (default: 32)")
+                 with_default("lights are chosen from so many groups as is learnt; 1: by power",
+                              options.light_groups))
       ->transform(whole_number(1, 255));
-  app.add_option("--field-budget", options.field_budget, "memory of kept fields, such as 24MiB (the default)")
+  app.add_option("--field-budget", options.field_budget,
+                 with_default("memory of kept fields", options.field_budget))
       ->transform(byte_count());
   app.add_option("--caster-buffer", options.caster_buffer,
-                 "memory of cones in flight to OptiX (default: 16MiB)")
+                 with_default("memory of cones in flight to OptiX", options.caster_buffer))
       ->transform(byte_count());
-  app.add_option("--product-resolution", options.product_resolution,
-                 "blocks a side of wfpg-product's products: 4, 8 or 16 (default: 8)")
+  app.add_option(
+         "--product-resolution", options.product_resolution,
+         with_default("blocks a side of wfpg-product's products: 4, 8 or 16", options.product_resolution))
       ->transform(whole_number(4, 16))
       ->check(CLI::IsMember({4, 8, 16}));
-  app.add_option("--rays-per-bin", options.rays_per_bin, "rays that a bin should have (default: 64)")
+  app.add_option("--rays-per-bin", options.rays_per_bin,
+                 with_default("rays that a bin should have", options.rays_per_bin))
       ->transform(whole_number(1, largest_count));
-  app.add_option("--min-bin-level", options.min_bin_level, "octree level of the largest bins (default: 3)")
+  app.add_option("--min-bin-level", options.min_bin_level,
+                 with_default("octree level of the largest bins", options.min_bin_level))
       ->transform(whole_number(0, largest_level));
   app.add_option("--deposits-per-leaf", options.deposits_per_leaf,
-                 "deposits a leaf of the octree in a sample that is recorded; 0: all, in each (default: 16)")
+                 with_default("deposits a leaf of the octree in a sample that is recorded; 0: all, in each",
+                              options.deposits_per_leaf))
       ->transform(whole_number(0, largest_count));
   app.add_option("--guide-fraction", options.guide_fraction,
                  "samples drawn from the guide (default: the mode's, as 0)")
@@ -237,7 +270,7 @@ void add_guider_options(CLI::App& app, render_options& options) {
          "last of several, whose direction finds emitters alone)")
       ->transform(whole_number(1, largest_count));
   app.add_option("--samples-per-leaf", options.samples_per_leaf,
-                 "after which Open PGL splits a leaf of its field (default: 32000)")
+                 with_default("after which Open PGL splits a leaf of its field", options.samples_per_leaf))
       ->transform(whole_number(8, 1 << 30));
   add_sarsa_options(app, options.sarsa);
   add_records_options(app, options.records);

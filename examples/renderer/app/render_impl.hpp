@@ -10,6 +10,7 @@
 #include "tracer/unguided.hpp"
 #include "tracer/wavefront.hpp"
 
+#include <wfpg/guides/octree/transient_guide.hpp>
 #include <wfpg/guides/records/irradiance_records.hpp>
 #include <wfpg/guides/sarsa/sarsa_grid.hpp>
 #include <wfpg/path_guider.hpp>
@@ -106,7 +107,7 @@ inline std::uint32_t guided_depths(const render_options& options) {
 /// What every guide is told.
 inline wfpg::sampling_options sampling_options_of(const render_options& options) {
   wfpg::sampling_options guided;
-  guided.guide_fraction = options.guide_fraction;
+  if (options.guide_fraction > 0.0f) guided.guide_fraction = options.guide_fraction;
   guided.guided_depths = guided_depths(options);
   guided.unguided_samples = wfpg::unguided_samples(combination_of(options));
   guided.seed = options.seed;
@@ -129,28 +130,45 @@ inline wfpg::irradiance_records_options records_options_of(const scene& host, co
   return guided;
 }
 
-/// `shares`: of the groups of lights that there are to choose from.
-inline wfpg::guider_options guider_options_of(const render_options& options,
-                                              const std::vector<float>& shares) {
-  wfpg::guider_options guided;
+/// What both of the octree's guides are told. `shares`: of the groups of lights that there are to choose
+/// from.
+inline wfpg::octree_guide_options octree_options_of(const render_options& options,
+                                                    const std::vector<float>& shares) {
+  wfpg::octree_guide_options guided;
   static_cast<wfpg::sampling_options&>(guided) = sampling_options_of(options);
   guided.octree_resolution = options.octree_resolution;
-  guided.fields =
-      options.lifetime == fields::kept ? wfpg::field_lifetime::kept : wfpg::field_lifetime::transient;
-  guided.field_resolution = options.field_resolution;
-  guided.kept.resolution = options.slot_resolution;
-  guided.kept.recast = options.recast;
-  guided.kept.budget_bytes = options.field_budget;
   guided.caster_buffer_bytes = options.caster_buffer;
   if (options.nee && shares.size() > 1) guided.lights.weights = shares;
   if (options.method == sampling_method::wfpg_product) guided.product_resolution = options.product_resolution;
-  guided.rays_per_bin = options.rays_per_bin;
-  guided.min_bin_level = options.min_bin_level;
+  guided.binning.rays_per_bin = options.rays_per_bin;
+  guided.binning.min_level = options.min_bin_level;
   guided.deposits_per_leaf = options.deposits_per_leaf;
+  if (options.deposits_per_leaf == 0) guided.deposits_per_leaf.reset();
   guided.mode = options.mode == guiding::plain ? wfpg::guiding_mode::plain : wfpg::guiding_mode::oriented;
+  return guided;
+}
+
+/// What kept_guide is told.
+inline wfpg::kept_guide_options kept_options_of(const render_options& options,
+                                                const std::vector<float>& shares) {
+  wfpg::kept_guide_options guided;
+  static_cast<wfpg::octree_guide_options&>(guided) = octree_options_of(options, shares);
+  guided.kept.resolution = options.slot_resolution;
+  guided.kept.recast = options.recast;
+  guided.kept.budget_bytes = options.field_budget;
   guided.kept.learn = options.learn;
   // With next-event estimation emission is worth its MIS weight, which fields that learn find out.
-  guided.include_emission = !options.nee || (options.lifetime == fields::kept && options.learn);
+  guided.include_emission = !options.nee || options.learn;
+  return guided;
+}
+
+/// What transient_guide is told.
+inline wfpg::transient_guide_options transient_options_of(const render_options& options,
+                                                          const std::vector<float>& shares) {
+  wfpg::transient_guide_options guided;
+  static_cast<wfpg::octree_guide_options&>(guided) = octree_options_of(options, shares);
+  guided.field_resolution = options.field_resolution;
+  guided.include_emission = !options.nee;
   return guided;
 }
 
@@ -236,14 +254,13 @@ void trace_unguided(const sampling_job<Exec, Caster>& job) {
   take_samples(job, guider);
 }
 
-template <class Exec, class Caster>
-void guide_by_octree(const sampling_job<Exec, Caster>& job) {
+/// Guides by the octree, with kept or transient fields as the type of `guided` says.
+template <class Exec, class Caster, class Options>
+void guide_by_fields(const sampling_job<Exec, Caster>& job, const Options& guided) {
   const render_options& options = job.options;
   render_report& report = job.result.report;
   const stopwatch build;
-  wfpg::path_guider<Exec> guider =
-      begin_guider(job.exec, job.host, job.mesh(), guider_options_of(options, job.lights.shares()), options,
-                   job.result.guide);
+  auto guider = begin_guider(job.exec, job.host, job.mesh(), guided, options, job.result.guide);
   report.octree.build_seconds = build.seconds();
   job.building.add("octree", report.octree.build_seconds);
   // A guide that is loaded has counted another rendering's, one of a state this one's.
@@ -252,11 +269,20 @@ void guide_by_octree(const sampling_job<Exec, Caster>& job) {
   if (options.through == cones::scene) {
     take_samples(job, guider);
   } else {
-    octree_cone_guider<Exec> with_cones(job.exec, guider, job.geometry.environment, options.through);
+    octree_cone_guider<Exec, decltype(guider)> with_cones(job.exec, guider, job.geometry.environment,
+                                                          options.through);
     take_samples(job, with_cones);
   }
   report_guider(guider, job.tracer.segments(), report, before);
-  job.result.guide = kept_guide(guider, options);
+  job.result.guide = saved_guide(guider, options);
+}
+
+template <class Exec, class Caster>
+void guide_by_octree(const sampling_job<Exec, Caster>& job) {
+  if (job.options.lifetime == fields::kept)
+    guide_by_fields(job, kept_options_of(job.options, job.lights.shares()));
+  else
+    guide_by_fields(job, transient_options_of(job.options, job.lights.shares()));
 }
 
 template <class Exec, class Caster>

@@ -35,7 +35,7 @@ json octree_of(const octree_report& octree) {
 
 json slots_of(const slot_report& slots) {
   return {{"capacity", slots.capacity},      {"live", slots.live},
-          {"live_bytes", slots.live_bytes},  {"born_per_sample", slots.born},
+          {"live_bytes", slots.live_bytes},  {"born_per_sample", slots.allocated},
           {"freed_per_sample", slots.freed}, {"refreshed_per_sample", slots.refreshed}};
 }
 

@@ -260,13 +260,13 @@ struct make_nodes {
 /// Gives the children of a level's nodes their numbers, and the next level its ranges.
 struct number_children {
   const bvh_range* child_ranges;
-  const std::uint32_t* through;  ///< child nodes of the nodes up to this one
-  std::uint32_t next_level;      ///< number of its first node
+  const std::uint32_t* prefix;  ///< child nodes of the nodes up to this one
+  std::uint32_t next_level;     ///< number of its first node
   bvh_node* nodes;
   bvh_range* next_ranges;
 
   WFPG_HD void operator()(std::size_t i) const {
-    std::uint32_t next = i > 0 ? through[i - 1] : 0;
+    std::uint32_t next = i > 0 ? prefix[i - 1] : 0;
     for (int child = 0; child < bvh_node::width; ++child) {
       const bvh_range range = child_ranges[i * bvh_node::width + child];
       if (range.size() == 0) continue;
@@ -358,13 +358,13 @@ class bvh_scene {
     for (; count > 0; ++levels) {
       if (levels == bvh_caster::most_levels) return false;
       const wfpg::buffer<detail::bvh_range, Exec> child_ranges(exec, std::size_t(count) * bvh_node::width);
-      const wfpg::buffer<std::uint32_t, Exec> through(exec, count);
+      const wfpg::buffer<std::uint32_t, Exec> prefix(exec, count);
       exec.for_each(count, detail::make_nodes{splitter, options.leaf_triangles, ranges.data(),
-                                              nodes.data() + begin, child_ranges.data(), through.data()});
-      ::thrust::inclusive_scan(exec.thrust(), through.data(), through.data() + count, through.data());
-      const std::uint32_t next = wfpg::read_element(exec, through.data() + count - 1);
+                                              nodes.data() + begin, child_ranges.data(), prefix.data()});
+      ::thrust::inclusive_scan(exec.thrust(), prefix.data(), prefix.data() + count, prefix.data());
+      const std::uint32_t next = wfpg::read_element(exec, prefix.data() + count - 1);
       ranges = wfpg::buffer<detail::bvh_range, Exec>(exec, next);
-      exec.for_each(count, detail::number_children{child_ranges.data(), through.data(), begin + count,
+      exec.for_each(count, detail::number_children{child_ranges.data(), prefix.data(), begin + count,
                                                    nodes.data() + begin, ranges.data()});
       begin += count;
       count = next;

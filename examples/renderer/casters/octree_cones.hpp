@@ -33,19 +33,18 @@ class octree_caster {
 };
 
 /// A guider, which outlives this, but for its caster.
-template <class Exec>
+template <class Exec, class Guider>
 class octree_cone_guider {
  public:
-  octree_cone_guider(const Exec& exec, wfpg::path_guider<Exec>& guider, const environment_view& environment,
-                     cones how)
+  octree_cone_guider(const Exec& exec, Guider& guider, const environment_view& environment, cones how)
       : guider_(guider),
-        opacity_(exec, guider.octree()),
-        caster_(guider.cache(), opacity_.view(), environment, how) {}
+        opacity_(exec, guider.guide().octree()),
+        caster_(guider.guide().cache(), opacity_.view(), environment, how) {}
 
   void begin_sample() { guider_.begin_sample(); }
   void end_sample() { guider_.end_sample(); }
   auto recorder() const { return guider_.recorder(); }
-  wfpg::light_guide_view lights() const { return guider_.lights(); }
+  auto lights() const { return guider_.lights(); }
 
   template <class Wave, class Caster, class... Queries>
   void sample_directions(const Wave& wave, const Caster&,
@@ -54,7 +53,7 @@ class octree_cone_guider {
   }
 
  private:
-  wfpg::path_guider<Exec>& guider_;
+  Guider& guider_;
   wfpg::voxel_opacity<Exec> opacity_;
   octree_caster caster_;
 };

@@ -26,9 +26,9 @@ class unguided {
   void sample_directions(const Wave& wave, const Caster&,
                          wfpg::array_view<wfpg::sampled_direction> directions,
                          const Queries& queries = {}) const {
-    using serve = wfpg::serve_ray<decltype(wave.surfaces), decltype(wave.random), Queries>;
+    using sampler = wfpg::sample_ray<decltype(wave.surfaces), decltype(wave.random), Queries>;
     exec_.for_each(wave.ray_count,
-                   wfpg::serve_unbinned<serve>{{wave.surfaces, wave.random, queries, directions}, {}});
+                   wfpg::sample_bsdf<sampler>{{wave.surfaces, wave.random, queries, directions}, {}});
   }
 
  private:

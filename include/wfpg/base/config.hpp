@@ -1,5 +1,8 @@
-// What the compiler is, asked once for the whole library: annotations of functions that run on a device, and
-// instructions that only some processors have. Includes nothing of the library.
+// Macros for the compiler: host and device annotations, vectorisation hints, and two processor instructions.
+// Includes no other header of the library.
+// Supported are GCC, Clang and nvcc with one of them as its host compiler, with exceptions enabled.
+// Other compilers stop here with an #error that says so.
+// Cost and memory: none of its own. All functions are inline.
 #pragma once
 
 #if !defined(__GNUC__)
@@ -11,13 +14,18 @@
 #include <cstdint>
 
 #if defined(__CUDACC__)
-/// Marks a function that runs on the host and, where the compiler has one, on the device.
+/// Marks a function that runs on the host and, under nvcc, on the device.
+/// Expands to nothing without nvcc.
+/// Functors that go to kernels carry it on operator(): the host runs the same code with a CPU policy.
 #define WFPG_HD __host__ __device__
 #else
 #define WFPG_HD
 #endif
 
-/// A loop over the lanes of an emulated warp: its iterations are independent.
+/// Stands before a loop over the lanes of an emulated warp.
+/// Promises the compiler that iterations are independent, so that it vectorises them.
+/// Expands to nothing in device code.
+/// An iteration must not read what another one writes, since nothing else checks it.
 #if defined(__CUDA_ARCH__)
 #define WFPG_VECTORIZE
 #elif defined(__clang__)
@@ -26,10 +34,12 @@
 #define WFPG_VECTORIZE _Pragma("GCC ivdep")
 #endif
 
+/// Parts of the implementation. They change without notice.
 namespace wfpg::detail {
 
-/// Bits that are set. On a CPU without the processor's own instruction, for which portable builds call a
-/// function.
+/// Returns the number of bits that are set, in [0, 64].
+/// One instruction on a device.
+/// On a CPU it adds bits in parallel: portable builds call a function for the builtin, which takes longer.
 WFPG_HD inline std::uint32_t popcount(std::uint64_t bits) {
 #if defined(__CUDA_ARCH__)
   return static_cast<std::uint32_t>(__popcll(bits));
@@ -41,8 +51,10 @@ WFPG_HD inline std::uint32_t popcount(std::uint64_t bits) {
 #endif
 }
 
-/// Asks for a line of memory that the thread will write soon. A device has other threads to go on with: there
-/// it does nothing.
+/// Asks the CPU for the cache line of `address`, which the thread writes soon.
+/// Any address is allowed, since a prefetch never faults.
+/// Does nothing on a device, where other threads hide the latency.
+/// Asks for it exclusively, as a later atomic needs it.
 WFPG_HD inline void prefetch([[maybe_unused]] const void* address) {
 #if !defined(__CUDA_ARCH__)
   __builtin_prefetch(address, 1);

@@ -1,8 +1,8 @@
-// Sort-based N-way partition (thesis, section 3.4.3): indices grouped by a 32-bit key, the groups' offsets
-// and their number, all left on the device. The spatial binner and a renderer's material sort use it.
+// Sort-based N-way partition (thesis, section 3.4.3): groups indices by a 32-bit key. The groups, their
+// offsets and their number stay on the device. The spatial binner and a renderer's material sort use it.
 //
-// Cost: one stable sort of (key, index) pairs and one scan; 16 bytes an index of capacity, and about 8
-// more while it sorts.
+// Cost: one stable sort of (key, index) pairs and one scan. Memory: 16 bytes an index of capacity, and about
+// 8 more while it sorts.
 #pragma once
 
 #include <wfpg/base/error.hpp>
@@ -19,104 +19,120 @@
 namespace wfpg {
 
 /// A partition as kernels see it. Group g < *count holds permutation[offsets[g]] to permutation[offsets[g +
-/// 1] - 1], in ascending order of key, and inside a group of index.
+/// 1] - 1]. Groups are in ascending order of key; inside a group, indices ascend.
 struct partition_view {
-  array_view<const std::uint32_t> permutation;  ///< indices, group by group
-  array_view<const std::uint32_t> offsets;      ///< one more than groups
-  array_view<const std::uint32_t> sorted_keys;  ///< of the permutation's elements
-  array_view<const std::uint32_t>
-      group_through;                     ///< of the permutation's elements: the group, counted from 1
+  array_view<const std::uint32_t> permutation;  ///< the indices, group by group
+  /// Where groups begin in the permutation. Entry *count is the end of the last group; later entries are not
+  /// set.
+  array_view<const std::uint32_t> offsets;
+  /// Key of each of the permutation's elements, ascending; excluded ones come last.
+  array_view<const std::uint32_t> sorted_keys;
+  /// Group of each of the permutation's elements, counted from 1. Excluded elements have the last group's
+  /// number.
+  array_view<const std::uint32_t> group_prefix;
   const std::uint32_t* count = nullptr;  ///< number of groups, in the policy's memory
 
-  /// Where a group begins in the permutation.
+  /// Position in the permutation of a group's first index. Precondition: group < *count.
   WFPG_HD std::uint32_t begin(std::size_t group) const { return offsets[group]; }
-  /// Indices in a group, at least 1.
+  /// Number of indices in a group, at least 1.
   WFPG_HD std::uint32_t size(std::size_t group) const { return offsets[group + 1] - offsets[group]; }
-  /// What its indices have in common.
+  /// The key that all indices of a group have in common.
   WFPG_HD std::uint32_t key(std::size_t group) const { return sorted_keys[offsets[group]]; }
 };
 
 namespace detail {
 
-/// 1 for the first element of a group, 0 for the others.
+/// Returns 1 for the first element of a group, and 0 for all others and for excluded ones.
 struct starts_key_group {
-  array_view<const std::uint32_t> keys;
-  std::uint32_t excluded;
+  array_view<const std::uint32_t> keys;  ///< sorted
+  std::uint32_t excluded;                ///< key of the elements in no group
   WFPG_HD std::uint32_t operator()(std::size_t i) const {
     return keys[i] != excluded && (i == 0 || keys[i] != keys[i - 1]) ? 1u : 0u;
   }
 };
 
+/// Writes the offsets of each group, and the number of groups. The thread of a group's first element writes
+/// where it begins. The thread of the very last one writes its end and the number of groups.
 struct write_group_offsets {
   array_view<const std::uint32_t> keys;
-  array_view<const std::uint32_t> group_through;
-  std::uint32_t excluded;
+  array_view<const std::uint32_t> group_prefix;
+  std::uint32_t excluded;  ///< key of the elements in no group, which come last
   std::uint32_t* offsets;
   std::uint32_t* count;
   WFPG_HD void operator()(std::size_t i) const {
     if (keys[i] == excluded) return;
     const auto at = static_cast<std::uint32_t>(i);
-    if (i == 0 || keys[i] != keys[i - 1]) offsets[group_through[i] - 1] = at;
+    // Groups are numbered from 1 in `group_prefix`, and from 0 in `offsets`.
+    if (i == 0 || keys[i] != keys[i - 1]) offsets[group_prefix[i] - 1] = at;
+    // Only the last element that is not excluded goes on.
     if (i + 1 < keys.size() && keys[i + 1] != excluded) return;
-    offsets[group_through[i]] = at + 1;
-    *count = group_through[i];
+    offsets[group_prefix[i]] = at + 1;
+    *count = group_prefix[i];
   }
 };
 
 }  // namespace detail
 
-/// Partitions up to `capacity` indices by key, as often as asked, in memory taken once.
+/// Partitions up to `capacity` indices by key. It allocates once, so it can be used for each wave. A
+/// default-constructed one has capacity 0.
 template <class Exec>
 class partitioner {
  public:
-  /// Indices with this key are in no group.
+  /// Key of indices that belong to no group. They come last in the permutation.
   static constexpr std::uint32_t excluded = 0xffffffffu;
 
+  /// Owns no memory; partition() is not to be called.
   partitioner() = default;
-  /// Throws out_of_memory, std::invalid_argument where capacity is 2³² - 1 or more.
+  /// Allocates for `capacity` indices. Throws out_of_memory, and std::invalid_argument where the capacity is
+  /// 2³² - 1 or more.
   partitioner(const Exec& exec, std::size_t capacity)
       : keys_(exec, checked(capacity)),
         permutation_(exec, capacity),
-        group_through_(exec, capacity),
+        group_prefix_(exec, capacity),
         offsets_(exec, capacity + 1),
         count_(exec, 1) {}
 
-  /// Groups the indices [0, keys.size()) by their keys: below 2^key_bits - 1, or `excluded`; fewer bits are
-  /// sorted sooner. Throws std::invalid_argument beyond the capacity. The view holds until the next call.
+  /// Groups the indices [0, keys.size()) by their keys. Keys are below 2^key_bits - 1, or `excluded`. Fewer
+  /// bits are sorted sooner. `keys` is not changed. The view is valid until the next call. Throws
+  /// std::invalid_argument where there are more keys than the capacity. O(keys).
   partition_view partition(const Exec& exec, array_view<const std::uint32_t> keys, int key_bits = 32) {
     const std::size_t n = keys.size();
     require(n <= permutation_.size(), "number of keys", n, "at most the partitioner's capacity");
-    const array_view<std::uint32_t> through(group_through_.data(), n);
-    ::thrust::sequence(exec.thrust(), through.begin(), through.end());
-    exec.sort_pairs(n, key_bits, keys.data(), through.data(), keys_.data(), permutation_.data());
+    // One array holds the unsorted indices first and the groups' numbers later.
+    const array_view<std::uint32_t> prefix(group_prefix_.data(), n);
+    ::thrust::sequence(exec.thrust(), prefix.begin(), prefix.end());
+    // Stable, so that indices ascend inside a group.
+    exec.sort_pairs(n, key_bits, keys.data(), prefix.data(), keys_.data(), permutation_.data());
     const array_view<const std::uint32_t> sorted(keys_.data(), n);
     const ::thrust::counting_iterator<std::size_t> first(0);
+    // Running sums of the groups' beginnings number the groups from 1.
     ::thrust::transform_inclusive_scan(exec.thrust(), first, first + static_cast<std::ptrdiff_t>(n),
-                                       through.begin(), detail::starts_key_group{sorted, excluded},
+                                       prefix.begin(), detail::starts_key_group{sorted, excluded},
                                        ::thrust::plus<std::uint32_t>());
+    // Without keys, or with excluded ones alone, no thread writes these.
     ::thrust::fill_n(exec.thrust(), count_.data(), 1, 0u);
     ::thrust::fill_n(exec.thrust(), offsets_.data(), 1, 0u);
-    exec.for_each(n, detail::write_group_offsets{sorted, through, excluded, offsets_.data(), count_.data()});
-    return {{permutation_.data(), n}, {offsets_.data(), n + 1}, sorted, through, count_.data()};
+    exec.for_each(n, detail::write_group_offsets{sorted, prefix, excluded, offsets_.data(), count_.data()});
+    return {{permutation_.data(), n}, {offsets_.data(), n + 1}, sorted, prefix, count_.data()};
   }
 
-  /// Of all that it allocated.
+  /// Bytes of all that it has allocated, without the sort's temporaries.
   std::size_t bytes() const {
-    return keys_.bytes() + permutation_.bytes() + group_through_.bytes() + offsets_.bytes() + count_.bytes();
+    return keys_.bytes() + permutation_.bytes() + group_prefix_.bytes() + offsets_.bytes() + count_.bytes();
   }
 
  private:
-  // Before memory is asked for.
+  // Checks the capacity before memory is asked for.
   static std::size_t checked(std::size_t capacity) {
     require(capacity < 0xffffffffull, "partitioner capacity", capacity, "less than 2^32 - 1");
     return capacity;
   }
 
-  buffer<std::uint32_t, Exec> keys_;
-  buffer<std::uint32_t, Exec> permutation_;
-  buffer<std::uint32_t, Exec> group_through_;
-  buffer<std::uint32_t, Exec> offsets_;
-  buffer<std::uint32_t, Exec> count_;
+  buffer<std::uint32_t, Exec> keys_;          ///< sorted keys
+  buffer<std::uint32_t, Exec> permutation_;   ///< indices in the order of their keys
+  buffer<std::uint32_t, Exec> group_prefix_;  ///< indices, then the groups' numbers
+  buffer<std::uint32_t, Exec> offsets_;       ///< capacity + 1 beginnings of groups
+  buffer<std::uint32_t, Exec> count_;         ///< one number of groups
 };
 
 }  // namespace wfpg

@@ -1,4 +1,6 @@
-// The rays of a host's wave as the binner takes them.
+// The rays of a host's wave as the spatial binner reads them: position, orientation, and whether they need a
+// bin. They are the input of Algorithm 2 (paper, section 3.4). Cost: one surface a ray, read in the kernel
+// that bins it; no memory.
 #pragma once
 
 #include <wfpg/base/math.hpp>
@@ -7,17 +9,22 @@
 
 namespace wfpg {
 
-/// A wave's rays as the binner wants them. Delta surfaces are sampled alone and need no bin; those whose
-/// normal is none have none, as if they lay outside every voxel.
+/// Functor from a ray's index to a ray_to_bin, for spatial_binner::bin(). `Surfaces` maps an index of the
+/// wave to a surface. Inactive rays and those on delta surfaces get no bin: a delta BSDF is sampled without a
+/// guide. A ray whose normal is not finite or not about unit length has no bin either. It counts as outside
+/// every voxel.
 template <class Surfaces>
 struct wave_rays {
-  Surfaces surfaces;
-  guiding_mode mode;
+  Surfaces surfaces;  ///< the host's: (std::uint32_t) -> surface
+  guiding_mode mode;  ///< whether bins are split by orientation
+  /// Describes ray i. In oriented mode, surfaces that reflect are split by the shading normal on the outgoing
+  /// side, and surfaces that transmit share one orientation.
   WFPG_HD ray_to_bin operator()(std::size_t i) const {
     const auto s = surfaces(static_cast<std::uint32_t>(i));
     ray_to_bin result;
     result.active = s.active && !s.bsdf.is_delta();
     if (!result.active) return result;
+    // A position that is NaN lies in no voxel.
     result.position = is_normal(s.normal) ? s.position : vec3(bits_float(0x7fc00000u));
     if (mode == guiding_mode::oriented)
       result.orientation = s.bsdf.transmits() ? static_cast<std::uint32_t>(orientation_transmits)

@@ -1,4 +1,12 @@
-// The CUDA policy: every call is ordered on one stream, none waits but copies to the host. Needs nvcc.
+// The CUDA policy: every call is ordered on one stream.
+// Include it in files that nvcc compiles.
+// No call waits for the device, but copies to the host and trim().
+// The host therefore runs ahead of the device.
+// Sorts are CUB's radix sorts; scans and reductions are Thrust's.
+//
+// Cost: one kernel launch a loop, and two or more for a sort.
+// Loops over blocks launch at most 16 blocks a multiprocessor, which stride over the indices.
+// Memory: a pool of device memory that keeps what is freed, and a sort's temporary storage.
 #pragma once
 
 #if !defined(__CUDACC__)
@@ -24,75 +32,99 @@
 
 namespace wfpg {
 
-/// A call of the CUDA runtime failed; an error that an earlier kernel of the host left behind is reported by
-/// the first call after it. Where that is one of Thrust's, it comes as a thrust::system_error: both are
-/// std::runtime_error.
+/// Thrown where a call of the CUDA runtime failed.
+/// An error that an earlier kernel left behind is reported by the next call, which need not be its cause.
+/// Where Thrust makes that call, a thrust::system_error comes instead.
+/// Both are std::runtime_error.
+/// The message holds the call's name, the error's text and its code.
 class cuda_error : public device_error {
  public:
-  /// The name of the call, and what it returned.
+  /// `call`: the name of the failed function.
+  /// `code`: what it returned.
   cuda_error(const char* call, cudaError_t code)
       : device_error(static_cast<int>(code), cudaGetErrorString(code), call) {}
-  /// What the call returned.
+  /// Returns the runtime's error code.
   cudaError_t code() const noexcept { return static_cast<cudaError_t>(device_error::code()); }
 };
 
-/// Throws cuda_error where `code` is one, which the next call is then not to find.
+/// Throws cuda_error unless `code` is cudaSuccess.
+/// Clears the runtime's last error first, so that the next call does not report it again.
+/// Sticky errors, such as an illegal address, stay with the device all the same.
+/// `call` becomes part of the message; it is kept nowhere.
 inline void check_cuda(cudaError_t code, const char* call) {
   if (code == cudaSuccess) return;
+  // Reading the last error clears it.
   cudaGetLastError();
   throw cuda_error(call, code);
 }
 
 namespace detail {
 
-/// Device memory from a pool of its own on the current device, ordered on a stream. The pool keeps what is
-/// given back, since the driver takes milliseconds for new memory. Blocks that are in use keep the resource
-/// alive. Safe for concurrent calls.
+/// Device memory from a pool of its own on the current device, ordered on a stream.
+/// The pool keeps what is freed, since the driver takes milliseconds for new memory.
+/// Blocks in use keep the resource alive.
+/// Safe for concurrent calls.
+/// Allocation and release follow the stream's order, and do not wait for the device.
 class stream_resource : public memory_resource, public std::enable_shared_from_this<stream_resource> {
  public:
-  /// Shared from the start: see std::make_shared.
+  /// Creates the pool on the current device.
+  /// Throws cuda_error.
+  /// Objects must be owned by a std::shared_ptr, as std::make_shared makes one.
   explicit stream_resource(cudaStream_t stream) : stream_(stream) {
+    // A pool of its own, so that the settings of the device's default pool stay the host's.
     cudaMemPoolProps properties{};
     properties.allocType = cudaMemAllocationTypePinned;
     properties.location.type = cudaMemLocationTypeDevice;
     check_cuda(cudaGetDevice(&properties.location.id), "cudaGetDevice");
     check_cuda(cudaMemPoolCreate(&pool_, &properties), "cudaMemPoolCreate");
+    // The threshold above which the pool would give memory back at each synchronisation: never.
     std::uint64_t kept = ~std::uint64_t(0);
     const cudaError_t code = cudaMemPoolSetAttribute(pool_, cudaMemPoolAttrReleaseThreshold, &kept);
+    // No destructor runs where a constructor throws.
     if (code != cudaSuccess) cudaMemPoolDestroy(pool_);
     check_cuda(code, "cudaMemPoolSetAttribute");
   }
+  /// Not copyable: the pool has one owner.
   stream_resource(const stream_resource&) = delete;
   stream_resource& operator=(const stream_resource&) = delete;
-  /// Waits for the stream: drivers have crashed where a pool ended before the memory that the stream was
-  /// still to give back to it.
+  /// Waits for the stream, and destroys the pool.
+  /// Some drivers crash where a pool ends before the stream has given its memory back.
   ~stream_resource() override {
+    // Errors are ignored, as destructors must not throw.
     cudaStreamSynchronize(stream_);
     cudaMemPoolDestroy(pool_);
   }
 
-  /// Waits for the stream, and gives what is not in use back to the device.
+  /// Waits for the stream, and gives unused memory back to the device.
+  /// Throws cuda_error.
+  /// Blocks in use stay where they are.
   void trim() {
     check_cuda(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
     check_cuda(cudaMemPoolTrimTo(pool_, 0), "cudaMemPoolTrimTo");
   }
 
  private:
+  /// CUDA aligns blocks to 256 bytes or more, whatever was asked for.
   void* do_allocate(std::size_t bytes, std::size_t) override {
     void* block = nullptr;
     const cudaError_t code = cudaMallocFromPoolAsync(&block, bytes, pool_, stream_);
     if (code == cudaErrorMemoryAllocation) {
+      // Running out of memory is no error of the device: later calls must not see it.
       cudaGetLastError();
       throw std::bad_alloc();
     }
     check_cuda(code, "cudaMallocFromPoolAsync");
     const std::lock_guard<std::mutex> lock(guard_);
+    // The first block ties the resource to itself, until the last one is freed.
     if (blocks_++ == 0) self_ = shared_from_this();
     return block;
   }
+  /// Enqueues the release. Kernels before it may still use the block.
+  /// The pool keeps the block for later requests.
   void do_deallocate(void* block, std::size_t, std::size_t) override {
     cudaFreeAsync(block, stream_);
-    std::shared_ptr<stream_resource> last;  // which ends after the lock
+    // Declared before the lock, so that it ends after the lock: it may destroy this object and its mutex.
+    std::shared_ptr<stream_resource> last;
     const std::lock_guard<std::mutex> lock(guard_);
     if (--blocks_ == 0) last.swap(self_);
   }
@@ -100,31 +132,39 @@ class stream_resource : public memory_resource, public std::enable_shared_from_t
 
   cudaStream_t stream_;
   cudaMemPool_t pool_ = nullptr;
+  /// Protects the two members below.
   std::mutex guard_;
   std::size_t blocks_ = 0;                 // in use
   std::shared_ptr<stream_resource> self_;  // while there are any
 };
 
+/// Returns the number of iterations of a loop whose length the host knows.
 inline __device__ std::size_t count_of(std::size_t n) {
   return n;
 }
+/// Returns the number of iterations that an earlier kernel wrote to device memory.
 inline __device__ std::size_t count_of(exec::device_count n) {
   return n.get();
 }
 
+/// Calls f(i) for each index below n.
+/// Strides by the grid's size, so that any grid does all of the work.
 template <class Count, class F>
 __global__ void for_each_kernel(Count n, F f) {
   const std::size_t count = count_of(n), stride = std::size_t(gridDim.x) * blockDim.x;
   for (std::size_t i = std::size_t(blockIdx.x) * blockDim.x + threadIdx.x; i < count; i += stride) f(i);
 }
 
+/// Gives each warp the run of its 32 threads' indices.
+/// The grid covers [0, n).
 template <class F>
 __global__ void for_each_run_kernel(std::size_t n, F f) {
   f(cuda_run(std::size_t(blockIdx.x) * blockDim.x + threadIdx.x, n));
 }
 
-/// Of 512 threads, the least that registers are to allow a multiprocessor, of the smallest there are. Two, so
-/// that shared memory may be large; all where F says that it `waits_for_memory`.
+/// Blocks of 512 threads that a multiprocessor holds at least: bounds a kernel's registers.
+/// Two, which leaves a block up to half of the shared memory.
+/// A functor with `waits_for_memory` set gets as many as the smallest multiprocessor holds: 3 from sm_80 on.
 template <class F, class = void>
 struct resident_blocks {
   static constexpr int value = 2;
@@ -138,12 +178,17 @@ struct resident_blocks<F, std::enable_if_t<F::waits_for_memory>> {
 #endif
 };
 
+/// Calls f(block, i) for each i below n.
+/// The grid's blocks stride, and reuse their scratch memory.
+/// `scratch_bytes`: the dynamic shared memory of the launch.
 template <class Block, class Count, class F>
 __global__ void __launch_bounds__(Block::threads, resident_blocks<F>::value)
     for_each_block_kernel(Count n, std::size_t scratch_bytes, F f) {
+  // All kernels share this array; a block's scratch() gives parts of it out.
   extern __shared__ __align__(16) unsigned char block_scratch[];
   const std::size_t count = count_of(n);
   for (std::size_t i = blockIdx.x; i < count; i += gridDim.x) {
+    // A new team for each i: its scratch memory is empty again.
     Block team(reinterpret_cast<std::byte*>(block_scratch), scratch_bytes);
     f(team, i);
     __syncthreads();  // before the next block writes to scratch memory
@@ -154,83 +199,106 @@ __global__ void __launch_bounds__(Block::threads, resident_blocks<F>::value)
 
 namespace exec {
 
-/// The CUDA policy on a stream. Copies of one share the stream and the memory.
+/// The CUDA policy on a stream.
+/// Copies share the stream and the memory.
+/// The stream's device must be current in all calls.
+/// Policies on several streams may work at once.
 class cuda {
  public:
-  /// What reports call it.
+  /// Name in reports.
   static constexpr const char* name = "cuda";
-  /// Lanes of a warp.
+  /// Lanes of a warp, on all of CUDA's devices.
   static constexpr int warp_width = 32;
-  /// Warps of a block.
+  /// Warps of a block: 512 threads.
+  /// A fixed number, so that kernels are compiled for one size of block.
   static constexpr int warps_per_block = 16;
-  /// What for_each_block() calls with.
+  /// The thread block that for_each_block() passes to f.
   using block = wfpg::detail::cuda_block<warps_per_block>;
 
-  /// `resource` hands out device memory, ordered on the stream, and outlives what is allocated. Null: the
-  /// policy makes a pool on the current device, which its copies share and which lives as long as they and
-  /// their buffers do, as the stream must; the last of them waits for it. Throws cuda_error, where there is
-  /// no device to begin with.
+  /// `resource` hands out device memory, ordered on the stream, and outlives what is allocated.
+  /// Null: the policy makes a pool on the current device.
+  /// Copies of the policy share that pool; it lives as long as they and their buffers do.
+  /// The stream must live as long, since the last of them waits for it.
+  /// Throws cuda_error, also where there is no device.
+  /// A null `stream` is the default stream of the compilation.
   explicit cuda(cudaStream_t stream = nullptr, memory_resource* resource = nullptr)
       : stream_(stream),
         pool_(resource ? nullptr : std::make_shared<wfpg::detail::stream_resource>(stream)),
         resource_(resource ? resource : pool_.get()) {}
 
-  /// Where device memory comes from.
+  /// Returns the source of device memory. Never null.
   memory_resource* resource() const { return resource_; }
-  /// A policy on this stream with memory from elsewhere. Null: a new pool.
+  /// Returns a policy on this stream that allocates from `resource`.
+  /// Null: it makes a new pool.
+  /// Buffers made by this policy keep their own resource.
   cuda with_resource(memory_resource* resource) const { return cuda(stream_, resource); }
-  /// Waits for the work before it, and gives memory that the policy's pool keeps for later back to the
-  /// device. Does nothing where the memory is a caller's. Throws cuda_error.
+  /// Waits for the work before it, and gives the pool's unused memory back to the device.
+  /// Does nothing where the memory comes from a caller's resource.
+  /// Throws cuda_error.
   void trim() const {
     if (pool_) pool_->trim();
   }
-  /// What all calls are ordered on.
+  /// Returns the stream that all calls are ordered on.
   cudaStream_t stream() const { return stream_; }
 
-  /// Thrust's CUDA policy on the stream, which does not wait, with temporaries from resource().
+  /// Returns Thrust's CUDA policy on the stream, whose temporaries come from resource().
+  /// Its algorithms do not wait, except those that return a value to the host.
   auto thrust() const {
     return ::thrust::cuda::par_nosync(wfpg::resource_allocator<char>(resource_)).on(stream_);
   }
 
-  /// Waits for the work before it.
+  /// Copies `bytes` bytes of device memory to the host, and waits for them and all work before.
+  /// Nothing is copied where `bytes` is 0, but the call still waits.
   void copy_to_host(void* to, const void* from, std::size_t bytes) const {
+    // Copies from device to pageable memory end before they return; others are waited for.
     copy(to, from, bytes, cudaMemcpyDeviceToHost);
     wfpg::check_cuda(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
   }
-  /// Pinned memory on the host has to outlive the copy.
+  /// Copies `bytes` bytes to the device, in the stream's order.
+  /// Pinned host memory must stay unchanged until the copy is done.
+  /// Pageable memory is staged by the driver.
   void copy_from_host(void* to, const void* from, std::size_t bytes) const {
     copy(to, from, bytes, cudaMemcpyHostToDevice);
   }
 
-  /// Sets each byte of device memory.
+  /// Sets each of `bytes` bytes of device memory to `value`, in the stream's order.
+  /// It returns at once. Throws cuda_error where the runtime refuses the call.
   void fill_bytes(void* to, unsigned char value, std::size_t bytes) const {
     if (bytes) wfpg::check_cuda(cudaMemsetAsync(to, value, bytes, stream_), "cudaMemsetAsync");
   }
 
-  /// Sorts n pairs stably by the low bits of their keys.
+  /// Sorts n pairs stably by the low `bits` bits of their unsigned keys.
+  /// Inputs stay as they are.
+  /// Temporary storage comes from resource().
+  /// Throws cuda_error or out_of_memory.
   template <class Key, class Value>
   void sort_pairs(std::size_t n, int bits, const Key* keys, const Value* values, Key* sorted_keys,
                   Value* sorted_values) const {
+    // CUB's protocol: the first call, without storage, only says how much it needs.
     std::size_t bytes = 0;
     const auto sort = [&](void* storage) {
       wfpg::check_cuda(cub::DeviceRadixSort::SortPairs(storage, bytes, keys, sorted_keys, values,
                                                        sorted_values, n, 0, bits, stream_),
                        "cub::DeviceRadixSort::SortPairs");
     };
+    // Neither a launch nor a request of memory for an empty sort.
     if (n == 0) return;
     sort(nullptr);
     const buffer<std::byte, cuda> storage(*this, bytes);
     sort(storage.data());
   }
 
-  /// f(i) for each i in [0, n), in no order. Throws cuda_error where the launch fails, as the others do.
+  /// Calls f(i) for each i in [0, n), one thread each, in no order.
+  /// Throws cuda_error where the launch fails, as all loops do.
   template <class F>
   void for_each(std::size_t n, const F& f) const {
     if (n == 0) return;
     const std::size_t blocks = (n + threads - 1) / threads;
     launch(wfpg::detail::for_each_kernel<std::size_t, F>, blocks, threads, 0, n, f);
   }
-  /// The same of a number that only the device knows.
+  /// Calls f(i) for a number of indices that only the device knows.
+  /// The host does not wait for it.
+  /// Launches threads for `n.capacity`, but at most 16 blocks a multiprocessor.
   template <class F>
   void for_each(device_count n, const F& f) const {
     if (n.capacity == 0) return;
@@ -238,20 +306,22 @@ class cuda {
     launch(wfpg::detail::for_each_kernel<device_count, F>, at_most_resident(blocks), threads, 0, n, f);
   }
 
-  /// f(run) for runs of indices that make up [0, n), in no order; also where n is 0.
+  /// Calls f(run) for runs that make up [0, n), a warp each, in no order; also where n is 0.
   template <class F>
   void for_each_run(std::size_t n, const F& f) const {
+    // One block at least, so that once() is called where n is 0.
     const std::size_t blocks = n > 0 ? (n + threads - 1) / threads : 1;
+    // Each thread has one index here: a run does not stride.
     launch(wfpg::detail::for_each_run_kernel<F>, blocks, threads, 0, n, f);
   }
 
-  /// f(block, i) for each i in [0, n), by blocks with `scratch_bytes` of shared memory each. Throws
-  /// std::invalid_argument where the device has less.
+  /// Calls f(block, i) for each i in [0, n), by blocks with `scratch_bytes` of shared memory each.
+  /// Throws std::invalid_argument where the device has less shared memory.
   template <class F>
   void for_each_block(std::size_t n, std::size_t scratch_bytes, const F& f) const {
     if (n > 0) launch_blocks(n, n, scratch_bytes, f);
   }
-  /// The same of a number that only the device knows.
+  /// Calls f(block, i) for a number of blocks that only the device knows.
   template <class F>
   void for_each_block(device_count n, std::size_t scratch_bytes, const F& f) const {
     if (n.capacity > 0) launch_blocks(n, n.capacity, scratch_bytes, f);
@@ -261,11 +331,13 @@ class cuda {
   // Of a loop over indices: few, so that a block whose last ray takes long holds few others up.
   static constexpr unsigned threads = 128;
 
+  /// Enqueues a copy; nothing where `bytes` is 0.
   void copy(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind) const {
     if (bytes) wfpg::check_cuda(cudaMemcpyAsync(to, from, bytes, kind, stream_), "cudaMemcpyAsync");
   }
 
-  /// Of the current device.
+  /// Returns an attribute of the current device.
+  /// Not cached: a launch asks for it at most twice.
   static std::size_t device_attribute(cudaDeviceAttr attribute) {
     int device = 0, value = 0;
     wfpg::check_cuda(cudaGetDevice(&device), "cudaGetDevice");
@@ -273,25 +345,29 @@ class cuda {
     return static_cast<std::size_t>(value);
   }
 
-  /// So many blocks, or more than the device runs at once.
+  /// Returns `blocks`, or 16 blocks a multiprocessor where that is less: more than run at once.
   static std::size_t at_most_resident(std::size_t blocks) {
+    // A multiprocessor holds at most 16 blocks of 128 threads, or 4 of 512.
     const std::size_t most = 16 * device_attribute(cudaDevAttrMultiProcessorCount);
     return blocks < most ? blocks : most;
   }
 
+  /// Launches a loop over blocks, after asking for shared memory where it needs more than 32 KiB.
   template <class Count, class F>
   void launch_blocks(Count n, std::size_t most, std::size_t scratch_bytes, const F& f) const {
     void (*const kernel)(Count, std::size_t, F) = wfpg::detail::for_each_block_kernel<block, Count, F>;
     constexpr std::size_t without_asking = 32 * 1024;  // of 48 KiB, in which static arrays lie too
+    // Asking costs two calls of the runtime a launch, which small blocks need not pay.
     if (scratch_bytes > without_asking)
       allow_shared_memory(reinterpret_cast<const void*>(kernel), scratch_bytes);
     launch(kernel, at_most_resident(most), block::threads, scratch_bytes, n, scratch_bytes, f);
   }
 
-  /// Asks for more shared memory than a kernel has without. Throws std::invalid_argument where the device has
-  /// less.
+  /// Raises the limit of a kernel's dynamic shared memory to `bytes`.
+  /// Throws std::invalid_argument where the device has less, static arrays subtracted.
   static void allow_shared_memory(const void* kernel, std::size_t bytes) {
     using wfpg::check_cuda;
+    // The device's limit counts static arrays too, such as those of a block's sum.
     cudaFuncAttributes attributes{};
     check_cuda(cudaFuncGetAttributes(&attributes, kernel), "cudaFuncGetAttributes");
     const std::size_t left =
@@ -304,16 +380,23 @@ class cuda {
         "cudaFuncSetAttribute for shared memory");
   }
 
+  /// Launches a kernel on the stream.
+  /// Throws cuda_error.
   template <class... Parameters, class... Arguments>
   void launch(void (*kernel)(Parameters...), std::size_t blocks, unsigned threads_of_block,
               std::size_t shared_bytes, const Arguments&... arguments) const {
+    // Arguments are converted to the kernel's parameter types before the launch copies them.
     kernel<<<static_cast<unsigned>(blocks), threads_of_block, shared_bytes, stream_>>>(
         Parameters(arguments)...);
+    // Finds faults of the launch. Faults inside the kernel come with a later call.
     wfpg::check_cuda(cudaGetLastError(), "kernel launch");
   }
 
+  /// Not owned.
   cudaStream_t stream_;
-  std::shared_ptr<wfpg::detail::stream_resource> pool_;  // null where the memory is a caller's
+  // Null where the memory is a caller's.
+  std::shared_ptr<wfpg::detail::stream_resource> pool_;
+  /// The pool, or the caller's resource.
   memory_resource* resource_;
 };
 

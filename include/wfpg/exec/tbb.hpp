@@ -1,4 +1,8 @@
-// The TBB policy. Link with TBB (target wfpg::tbb).
+// The TBB policy: loops as tasks of oneTBB.
+// Link with TBB (target wfpg::tbb).
+// Source: oneTBB's parallel_for, and Thrust's "tbb" backend for sorts and scans.
+// Cost: work is stolen between threads, so that loops nest in a host's own tasks.
+// Memory: a block's scratch for each thread of the arena.
 #pragma once
 
 #include <wfpg/exec/cpu_policy.hpp>
@@ -11,37 +15,51 @@
 
 namespace wfpg::exec {
 
-/// The TBB policy with warps of W lanes. Runs in the calling thread's task arena, so that a host bounds the
-/// threads with tbb::task_arena or tbb::global_control.
+namespace detail {
+
+/// Calls body(first, last, worker) for ranges of about `grain` indices that cover [0, n).
+/// Each range is isolated: a thread that waits inside it, for a host's own TBB work, takes up no other range.
+/// That one would share its worker index and scratch.
+inline void tbb_for(std::size_t n, std::size_t grain, const range_body& body) {
+  ::tbb::parallel_for(::tbb::blocked_range<std::size_t>(0, n, grain),
+                      [&body](const ::tbb::blocked_range<std::size_t>& range) {
+                        ::tbb::this_task_arena::isolate([&] {
+                          body(range.begin(), range.end(), ::tbb::this_task_arena::current_thread_index());
+                        });
+                      });
+}
+
+}  // namespace detail
+
+/// The TBB policy with warps of W lanes: 8, 16 or 32.
+/// It runs in the calling thread's task arena.
+/// A host bounds the threads with tbb::task_arena or tbb::global_control.
 template <int W>
 class basic_tbb : public cpu_policy<basic_tbb<W>, W> {
  public:
-  /// What reports call it.
+  /// Name in reports.
   static constexpr const char* name = "tbb";
 
-  /// Memory from `resource`, which must outlive what is allocated; null stands for the default resource.
+  /// Allocates from `resource`, which must outlive what is allocated.
+  /// Null stands for the default resource.
   explicit basic_tbb(memory_resource* resource = nullptr) : cpu_policy<basic_tbb<W>, W>(resource) {}
 
-  /// Thrust's TBB policy, with temporaries from resource().
+  /// Returns Thrust's TBB policy, whose temporaries come from resource().
   auto thrust() const { return ::thrust::tbb::par(wfpg::resource_allocator<char>(this->resource())); }
 
-  /// Threads of a loop, at most.
+  /// Returns the largest number of threads of a loop: those of the calling thread's arena.
   int concurrency() const { return ::tbb::this_task_arena::max_concurrency(); }
 
-  /// Calls f(first, last, worker) for ranges of about `grain` that cover [0, n), in no order.
+  /// Calls f(first, last, worker) for ranges of about `grain` indices that cover [0, n), in no order.
+  /// `worker` is the thread's index in its arena.
+  /// What f throws cancels the rest, and passes through.
   template <class F>
   void parallel(std::size_t n, std::size_t grain, const F& f) const {
-    // Isolated, since a thread that waits inside f, for a host's own TBB work, must not take up another
-    // range: it would share this one's worker index and scratch.
-    ::tbb::parallel_for(
-        ::tbb::blocked_range<std::size_t>(0, n, grain), [&f](const ::tbb::blocked_range<std::size_t>& range) {
-          ::tbb::this_task_arena::isolate(
-              [&] { f(range.begin(), range.end(), ::tbb::this_task_arena::current_thread_index()); });
-        });
+    detail::tbb_for(n, grain, range_body(f));
   }
 };
 
-/// The TBB policy, with warps of 32 lanes.
+/// The TBB policy with warps of 32 lanes.
 using tbb = basic_tbb<32>;
 
 }  // namespace wfpg::exec

@@ -1,26 +1,28 @@
-// What path_guider needs of a guide: where directions come from, and what learns from the paths that they
-// make. octree_guide.hpp is the paper's; docs/guides.md walks through one of one's own.
+// The interface between path_guider and a guide. A guide samples directions, and learns from the paths that
+// follow them. kept_guide and transient_guide in guides/octree/ are two; docs/guides.md builds one step by
+// step.
 //
-// A guide is a class `Guide` for a policy `Exec` that derives from guide_base and has
+// A guide is a class `Guide` for an execution policy `Exec`. It derives from guide_base and has
 //
 //   1. options:     using options_type;  sampling_options, or what derives from it
 //   2. a scene:     Guide(const Exec& exec, const Exec& working, triangle_mesh_view mesh,
 //                         const options_type& options);
-//                   `exec` is for what a guide keeps; `working` keeps memory that is given back to it, for
-//                   what every sample needs again. Other scenes than a mesh are constructors beside this one.
-//   3. a view:      view_type prepare(const guide_sample<Exec>& at, const wave<Surfaces, Random>& w,
+//                   `exec` allocates what the guide keeps. `working` allocates what every sample needs again:
+//                   it retains freed memory. Scenes other than a mesh take further constructors.
+//   3. a view:      view_type prepare(const sample_context<Exec>& at, const wave<Surfaces, Random>& w,
 //                                     const Caster& caster);
-//                   what a wave's rays draw from, with `sample` and `pdf`: is_guide_view_v says how. It holds
-//                   until the next call.
-//   4. what learns: void learn(const guide_sample<Exec>& at, path_recorder<Exec>& paths);
-//                   the paths of a sample that is recorded (recorded_path), which it clears
-//                   void update(const guide_sample<Exec>& at);
-//                   after that, and also where nothing is recorded
+//                   what a wave's rays sample from, as is_guide_view_v requires. Valid until the next call.
+//   4. learning:    void learn(const sample_context<Exec>& at, path_recorder<Exec>& paths);
+//                   reads the paths of a recorded sample (recorded_path), then clears them
+//                   void update(const sample_context<Exec>& at);
+//                   runs after learn(), and also after samples that are not recorded
 //   5. memory:      std::vector<memory_part> memory() const;
 //
-// The last two have what they need of a guide that learns nothing from guide_base, and so have the members
-// that are there for the octree's sake. Samples, the recorder and its memory, clocks and checks are the
-// facade's, mixtures with the BSDF mis.hpp's. No call is virtual.
+// guide_base has defaults for parts 4 and 5, for guides that learn nothing, and for some further members.
+// path_guider owns the samples, the recorder, the clocks and the checks. sampling/mixture.hpp mixes a guide
+// with the BSDF.
+//
+// Source: the interface is wfpg's own. Cost: no call is virtual. Memory: none.
 #pragma once
 
 #include <wfpg/base/types.hpp>
@@ -40,86 +42,93 @@
 
 namespace wfpg {
 
+// In guide/path_recorder.hpp, which guides that read paths include.
 template <class Exec>
-class path_recorder;  // guide/path_recorder.hpp
+class path_recorder;
 
 /// The sample that a guide is called in. Valid during the call.
 template <class Exec>
-struct guide_sample {
-  const Exec& exec;      ///< runs its loops; its memory keeps what is given back
-  std::uint32_t number;  ///< of the sample, from 1; 0 before the first
-  std::uint64_t seed;    ///< of the sample
-  bool guided;  ///< false: directions are to be their BSDFs'; in the first samples, and beyond guided_depths
-  bool recorded;       ///< whether its paths are: only then is learn() called
-  stage_clock& clock;  ///< for stages of the guide's own; prepare, learn and update are timed
+struct sample_context {
+  /// Policy that runs the guide's loops. Its memory resource retains freed blocks for later samples.
+  const Exec& exec;
+  std::uint32_t number;  ///< number of the sample, counted from 1; 0 before the first
+  std::uint64_t seed;    ///< random seed that differs between samples
+  /// False: rays must sample their BSDFs alone. So in the first unguided_samples, and from guided_depths on.
+  bool guided;
+  bool recorded;       ///< whether paths of this sample are recorded: only then path_guider calls learn()
+  stage_clock& clock;  ///< times stages of the guide's own; prepare, learn and update are timed already
 };
 
-/// What a guide wants recorded of paths.
+/// What a guide wants recorded of paths. path_guider reads it once, after it has made the guide.
 struct recording_needs {
-  std::uint32_t share_shift = 0;  ///< of 2^share_shift paths one, in samples that are recorded
-  bool directions = false;        ///< what scatter() and escape() tell, too
-  /// Once means have settled, of so many samples one is recorded, drawn at random; at least 1. The others
-  /// cost next to nothing to end: most of what that costs a GPU does not depend on how many paths there are.
-  std::uint32_t settled_turns = 1;
+  /// A recorded sample records one path in 2^fraction_shift. 0: all.
+  std::uint32_t fraction_shift = 0;
+  bool directions = false;  ///< record the arguments of scatter() and escape() too: 8 bytes a vertex more
+  /// After warm-up, record one of every `sample_stride` samples, at random; at least 1. Ending an unrecorded
+  /// sample costs next to nothing. On a GPU, most of the cost of recording does not depend on the number of
+  /// paths.
+  std::uint32_t sample_stride = 1;
 
-  /// Samples after the beginning, or after forget_light(), that means take to settle.
-  static constexpr std::uint32_t settling_samples = 32;
+  /// Samples of the warm-up, counted from the first one or from forget_light(). All of them are recorded.
+  static constexpr std::uint32_t warm_up_samples = 32;
 };
 
-/// Returned by lights() of guides that do not choose lights. Converts to an empty view of a guide that does,
-/// for kernels that are written for both.
+/// Returned by lights() of guides that do not choose lights. Converts to an empty view of any guide that
+/// does, so that a kernel can be written for both.
 struct no_light_choices {
-  /// An empty view.
+  /// Returns a default View, which chooses nothing.
   template <class View>
   operator View() const {
     return {};
   }
 };
 
-/// What guides have that do not say otherwise: a guide derives from it, and hides what it does by itself.
+/// Default members of a guide. A guide derives from it and hides those that it implements.
 struct guide_base {
-  using options_type = sampling_options;  ///< no options of its own
+  using options_type = sampling_options;  ///< a guide with options of its own hides this
 
-  /// Whether it never guides.
+  /// Whether the guide has nothing to guide with, as over a scene without surface. No sample is guided then.
   bool empty() const { return false; }
-  /// All vertices of all paths.
+  /// What path_guider is to record: every path of every sample, without directions.
   recording_needs recording() const { return {}; }
-  /// Whether there is anything to record: where not, path_guider::recorder() gives one that costs nothing.
+  /// Whether the guide reads paths. If false, path_guider::recorder() returns a no_path_recorder, at no cost.
   static constexpr bool records_paths = true;
-  /// Which lights next-event estimation is to ask: no choice is learnt.
+  /// View that chooses lights for next-event estimation. This one leaves the choice to the renderer.
   no_light_choices lights() const { return {}; }
-  /// Before the waves of a sample.
+  /// Runs before the waves of each sample.
   template <class Exec>
-  void begin_sample(const guide_sample<Exec>&) {}
-  /// After the waves of a sample that is recorded: learns nothing.
+  void begin_sample(const sample_context<Exec>&) {}
+  /// Runs after the waves of a recorded sample. A guide that learns reads the paths here and clears them.
   template <class Exec>
-  void learn(const guide_sample<Exec>&, path_recorder<Exec>&) {}
-  /// After the waves of each sample, and what was learnt from it.
+  void learn(const sample_context<Exec>&, path_recorder<Exec>&) {}
+  /// Runs at the end of each sample, after learn() where that is called.
   template <class Exec>
-  void update(const guide_sample<Exec>&) {}
-  /// Geometry moved inside the bounds: nothing is kept that could be out of date.
+  void update(const sample_context<Exec>&) {}
+  /// Geometry moved inside the bounds, world space. A guide that keeps what rays saw drops the part in there.
   template <class Exec>
   void invalidate(const Exec&, const bounds3&) {}
-  /// Geometry moved anywhere.
+  /// Geometry moved anywhere. A guide that keeps what rays saw drops all of it.
   template <class Exec>
   void invalidate_all(const Exec&) {}
-  /// Lights moved: nothing is kept that could be out of date.
+  /// Lights moved. A guide that keeps radiance forgets it.
   template <class Exec>
   void forget_light(const Exec&) {}
-  /// Adds nothing to what a guider tells.
+  /// Adds the guide's numbers to path_guider::statistics(). May wait for the device.
   template <class Exec>
   void report(const Exec&, guider_statistics&) const {}
-  /// Nothing.
+  /// Parts of the guide's memory, for path_guider::memory(). This base holds none.
   std::vector<memory_part> memory() const { return {}; }
 
-  /// Whether it draws the directions of a whole wave by itself:
-  ///   void serve(const guide_sample<Exec>&, const wave<Surfaces, Random>&, const Caster&, const Serve&);
-  /// as the octree's does, whose transient fields are gone when their rays are served.
-  static constexpr bool serves_waves = false;
+  /// Whether the guide samples a whole wave in one call:
+  ///   void sample_wave(const sample_context<Exec>&, const wave<Surfaces, Random>&, const Caster&, const
+  ///   Sampler&);
+  /// The octree's guide needs it for transient fields: these are gone once their rays are sampled.
+  static constexpr bool samples_waves = false;
 };
 
 namespace detail {
 
+// Stand-ins for the renderer's types, which the traits below ask a guide with. They are never called.
 struct trait_bsdf {
   WFPG_HD float eval(vec3, vec3) const { return 0.0f; }
   WFPG_HD float pdf(vec3, vec3) const { return 0.0f; }
@@ -138,6 +147,9 @@ struct trait_caster {
 };
 using trait_wave = wave<trait_surfaces, trait_random>;
 
+// Each trait is false where an expression does not compile, so that require_guide() can name the part.
+
+// Whether View is trivially copyable and has `sample` and `pdf`: is_guide_view_v.
 template <class View, class = void>
 struct is_guide_view : std::false_type {};
 template <class View>
@@ -148,12 +160,14 @@ struct is_guide_view<
                           std::uint32_t(0), std::declval<const surface<trait_bsdf>&>(), vec3())))>>
     : std::is_trivially_copyable<View> {};
 
+// Part 1 of a guide: options_type derives from sampling_options.
 template <class Guide, class Exec, class = void>
 struct has_guide_options : std::false_type {};
 template <class Guide, class Exec>
 struct has_guide_options<Guide, Exec, std::void_t<typename Guide::options_type>>
     : std::is_base_of<sampling_options, typename Guide::options_type> {};
 
+// Part 2: it can be made from a mesh.
 template <class Guide, class Exec, class = void>
 struct knows_mesh : std::false_type {};
 template <class Guide, class Exec>
@@ -161,28 +175,30 @@ struct knows_mesh<Guide, Exec, std::void_t<typename Guide::options_type>>
     : std::is_constructible<Guide, const Exec&, const Exec&, triangle_mesh_view,
                             const typename Guide::options_type&> {};
 
+// Part 3: prepare() returns a view for a wave.
 template <class Guide, class Exec, class = void>
 struct prepares_view : std::false_type {};
 template <class Guide, class Exec>
 struct prepares_view<
     Guide, Exec,
     std::void_t<typename Guide::view_type, decltype(typename Guide::view_type(std::declval<Guide&>().prepare(
-                                               std::declval<const guide_sample<Exec>&>(),
+                                               std::declval<const sample_context<Exec>&>(),
                                                std::declval<const trait_wave&>(), trait_caster())))>>
     : is_guide_view<typename Guide::view_type> {};
 
+// Parts 4 and 5: learn(), update() and memory(), with guide_base as a base class.
 template <class Guide, class Exec, class = void>
 struct learns_paths : std::false_type {};
 template <class Guide, class Exec>
 struct learns_paths<
     Guide, Exec,
-    std::void_t<decltype(std::declval<Guide&>().learn(std::declval<const guide_sample<Exec>&>(),
+    std::void_t<decltype(std::declval<Guide&>().learn(std::declval<const sample_context<Exec>&>(),
                                                       std::declval<path_recorder<Exec>&>())),
-                decltype(std::declval<Guide&>().update(std::declval<const guide_sample<Exec>&>())),
+                decltype(std::declval<Guide&>().update(std::declval<const sample_context<Exec>&>())),
                 decltype(std::vector<memory_part>(std::declval<const Guide&>().memory()))>>
     : std::is_base_of<guide_base, Guide> {};
 
-/// A guide as path_guider asks for it; what is missing is the error.
+/// Fails to compile where Guide lacks a part. The message says which, and with which signature.
 template <class Guide, class Exec>
 constexpr bool require_guide() {
   static_assert(has_guide_options<Guide, Exec>::value,
@@ -192,26 +208,28 @@ constexpr bool require_guide() {
                 "options_type&)");
   static_assert(prepares_view<Guide, Exec>::value,
                 "Guide: needs `using view_type`, which is_guide_view_v asks for, and view_type "
-                "prepare(const guide_sample<Exec>&, const wave<Surfaces, Random>&, const Caster&)");
+                "prepare(const sample_context<Exec>&, const wave<Surfaces, Random>&, const Caster&)");
   static_assert(learns_paths<Guide, Exec>::value,
-                "Guide: needs learn(const guide_sample<Exec>&, path_recorder<Exec>&), "
-                "update(const guide_sample<Exec>&) and memory(), which wfpg::guide_base has");
+                "Guide: needs learn(const sample_context<Exec>&, path_recorder<Exec>&), "
+                "update(const sample_context<Exec>&) and memory(), which wfpg::guide_base has");
   return true;
 }
 
 }  // namespace detail
 
 // clang-format off
-/// True where View, trivially copyable, draws directions for the rays of a wave; kernels take it by value:
+/// True if View samples directions for the rays of a wave. It is trivially copyable: kernels take it by value.
 ///   sampled_direction sample(std::uint32_t ray, const surface<Bsdf>& s, float u_technique, vec2 u) const;
 ///   float pdf(std::uint32_t ray, const surface<Bsdf>& s, vec3 direction) const;
-/// `pdf` is the density of `sample`, per steradian, all that it mixes included: basic_guide_mixture
-/// (mis.hpp) mixes a distribution of directions and the surface's BSDF so, and mixture_view asks for that alone.
+/// `u_technique` is in [0,1) and `u` in [0,1)². `pdf` is the density of `sample`, per steradian, of the whole
+/// mixture. basic_guide_mixture mixes a distribution of directions with the surface's BSDF. A view that
+/// derives from mixture_view implements only `mixture`, which returns such a mixture.
 template <class View>
 inline constexpr bool is_guide_view_v = detail::is_guide_view<View>::value;
 // clang-format on
 
-/// True where path_guider<Exec, Guide> can be.
+/// True if path_guider<Exec, Guide> compiles: Guide has all five parts. For tests and SFINAE; path_guider
+/// itself names the part that is missing.
 template <class Guide, class Exec>
 inline constexpr bool is_guide_v =
     detail::has_guide_options<Guide, Exec>::value&& detail::knows_mesh<Guide, Exec>::value&&

@@ -1,4 +1,7 @@
-// Of how many paths a guide has the vertices recorded, and in which samples.
+// Chooses how many paths of a sample are recorded, and in how many samples, from the number of values that a
+// guide wants.
+//
+// Source: wfpg's own. Cost: O(log(vertices / wanted)) on the host, once a guider. Memory: 24 bytes.
 #pragma once
 
 #include <wfpg/exec/support/value_queue.hpp>
@@ -10,22 +13,29 @@
 
 namespace wfpg::detail {
 
-/// As few paths as have so many vertices wanted in a sample, or up to twice as many: of 2^shift one. All are
-/// recorded where none are wanted in particular.
+// Example: 2^20 paths of 8 vertices and 100,000 wanted give a shift of 6 and 131,072 vertices a sample.
+
+/// Records one path in 2^shift: the largest shift that still yields `wanted` vertices a sample. So a sample
+/// has `wanted` vertices, or up to twice as many. Counts max_depth vertices a path.
 class recorded_fraction {
  public:
+  /// `wanted` is in vertices a sample; 0 records all paths of all samples.
   recorded_fraction(const sampling_options& o, std::uint64_t wanted)
       : paths_(o.max_paths), depth_(o.max_depth), wanted_(wanted) {}
 
-  /// A quarter of the vertices is enough once means have settled: as many, but not of all samples.
+  /// What a guide's recording() returns. After warm-up a quarter of the vertices is enough, on average over
+  /// samples. Then a recorded sample has as many as before, and the stride is 4. The stride is 2 or 1 where
+  /// there are too few paths for that.
   recording_needs needs(bool directions) const {
+    // The stride is 2 to the difference of the shifts, before and after warm-up.
     const std::uint32_t share = shift(wanted_), settled = shift((wanted_ + 3) / 4);
     return {share, directions, 1u << (settled - share)};
   }
 
-  /// Of a sample, at most. Throws std::invalid_argument, which says to set `options`, where a queue holds
-  /// fewer.
+  /// Most vertices that a recorded sample can have: the capacity of a value queue. Throws
+  /// std::invalid_argument above 2^31, the most that a queue holds; the message advises to set `options`.
   std::size_t vertices(const char* options) const {
+    // Whole groups of runs are stored, so that this may exceed the fraction by a run.
     const std::size_t count = recorded_runs{shift(wanted_)}.size(paths_) * depth_;
     const std::string remedy = std::string("at most 2^31: set ") + options;
     require(count <= most_queued, "max_paths times max_depth, the vertices that are recorded,", count,
@@ -34,6 +44,9 @@ class recorded_fraction {
   }
 
  private:
+  // A shift is log2 of a divisor: recorded_runs records so many paths fewer.
+
+  /// Largest shift by which at least `wanted` of all vertices remain; 0 where `wanted` is 0.
   std::uint32_t shift(std::uint64_t wanted) const {
     const std::uint64_t all = std::uint64_t(paths_) * depth_;
     std::uint32_t result = 0;
@@ -41,9 +54,9 @@ class recorded_fraction {
     return result;
   }
 
-  std::size_t paths_;
-  std::uint32_t depth_;
-  std::uint64_t wanted_;
+  std::size_t paths_;     ///< max_paths
+  std::uint32_t depth_;   ///< max_depth
+  std::uint64_t wanted_;  ///< vertices a sample
 };
 
 }  // namespace wfpg::detail

@@ -1,45 +1,53 @@
-// What every guide can be told.
+// Options that every guide has. A guide's own options derive from sampling_options.
+//
+// Source: Yalçıner & Akyüz, "Path Guiding for Wavefront Path Tracing", 2024, section 3.7, where a member says
+// so. Cost: ranges are checked once, on the host. Memory: a struct on the host.
 #pragma once
 
 #include <wfpg/base/error.hpp>
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 namespace wfpg {
 
-/// What guiding can be told, whatever the guide. Every field has a default; ranges are checked when a guider
-/// is made.
+/// Options of guiding. path_guider's constructor checks the ranges and throws std::invalid_argument.
 struct sampling_options {
-  /// Share of guided samples, in [0, 1]; 0: the guide's own.
-  float guide_fraction = 0.0f;
-  /// Depths that are guided, from 0 on, at least 1; deeper rays are their BSDFs'. By default all. Beside
-  /// next-event estimation leave out the depth of a path's last direction, which finds emitters alone and is
-  /// as well drawn from the BSDF, for less: n - 2 of paths of n segments, if that is one or more.
+  /// Probability that the guide, not the BSDF, samples a direction; in (0, 1]. Unset: the guide's default.
+  std::optional<float> guide_fraction;
+  /// Number of depths that are guided, from 0 on; at least 1. Deeper rays sample their BSDFs. Default: all.
+  /// With next-event estimation, leave out the depth of a path's last direction. That direction finds
+  /// emitters alone, and the BSDF samples it as well for less. So set n - 2 for paths of n segments, if that
+  /// is one or more.
   std::uint32_t guided_depths = 0xffffffffu;
-  /// Guide toward emitters themselves. Beside next-event estimation they count with their MIS weight, and
-  /// false leaves them to it: better where fields do not learn.
+  /// Guide toward emitters themselves, too. With next-event estimation, emitters count with their MIS weight.
+  /// False leaves them to next-event estimation: better where fields do not learn.
   bool include_emission = true;
-  std::uint32_t unguided_samples =
-      1;  ///< samples at the beginning that only record ("PT first", section 3.7)
-  /// Of all that the guider draws by itself.
-  std::uint64_t seed = 0;
-  std::size_t max_paths = 0;  ///< paths of a sample; 0: the renderer deposits by itself
-  std::uint32_t max_depth =
-      8;                     ///< vertices of a path that the recorder holds, and depths that statistics tell
-  std::size_t max_rays = 0;  ///< of a wave; 0: max_paths
+  /// Samples at the beginning that only record: "PT first" in section 3.7.
+  std::uint32_t unguided_samples = 1;
+  std::uint64_t seed = 0;  ///< seed of the guider's own random numbers; the renderer's come with each wave
+  /// Most paths of a sample that the recorder has room for, less than 2^32 - 1. 0 records nothing. Times
+  /// max_depth it must be less than 2^32 - 1, too.
+  std::size_t max_paths = 0;
+  /// Most vertices of a path that the recorder holds, in [1, 1024]. Statistics count as many depths, and
+  /// deeper ones with the last.
+  std::uint32_t max_depth = 8;
+  /// Most rays of a wave, less than 2^32 - 1. Larger waves throw std::invalid_argument. Unset: max_paths.
+  std::optional<std::size_t> max_rays;
 };
 
 namespace detail {
 
-/// Refuses options that are out of range.
+/// Throws std::invalid_argument, which names the option and its range, where one is out of range.
 inline void require_valid(const sampling_options& o) {
-  require(o.guide_fraction >= 0.0f && o.guide_fraction <= 1.0f, "guide_fraction", o.guide_fraction,
-          "in [0, 1]");
+  const float fraction = o.guide_fraction.value_or(1.0f);
+  require(fraction > 0.0f && fraction <= 1.0f, "guide_fraction", fraction, "in (0, 1]");
   require(o.guided_depths >= 1, "guided_depths", o.guided_depths, "at least 1");
   require(o.max_depth >= 1 && o.max_depth <= 1024, "max_depth", o.max_depth, "in [1, 1024]");
   require(o.max_paths < 0xffffffffull, "max_paths", o.max_paths, "less than 2^32 - 1");
-  require(o.max_rays < 0xffffffffull, "max_rays", o.max_rays, "less than 2^32 - 1");
+  const std::size_t rays = o.max_rays.value_or(o.max_paths);
+  require(rays < 0xffffffffull, "max_rays", rays, "less than 2^32 - 1");
   require(o.max_paths * o.max_depth < 0xffffffffull, "max_paths times max_depth, the vertices of a sample,",
           o.max_paths * o.max_depth, "less than 2^32 - 1");
 }

@@ -1,69 +1,76 @@
-// What a guider tells of itself: bins, cones, dropped deposits, time by stage, memory by part.
+// What path_guider::statistics() and path_guider::memory() return, and the clock behind the former: bins,
+// cones, dropped deposits, time by stage, bytes by part.
+//
+// Source: wfpg's own. Cost: the clock is read twice a stage and call, on the host. Memory: host structs; a
+// guider holds one depth_statistics a depth on the device.
 #pragma once
 
 #include <wfpg/octree/statistics.hpp>
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace wfpg {
 
-/// Time of one stage, in all.
+/// Total time of one stage since the guider was made.
 struct stage_time {
-  const char* name;  ///< bin, fields, serve (where a wave makes no fields, finding them too), record or cache
-  double seconds;    ///< of the host: on a device that of launching, unless a call waits
+  const char* name;  ///< one of namespace `stage`, or a name of the guide
+  double seconds;    ///< host time. On a device it covers launches, and kernels only where a call waits
 };
 
-/// What guiding did for the waves of one depth: sums over the guided samples so far; 0 beyond guided_depths.
+/// Counts of one depth of the paths, summed over the guided samples so far. All 0 beyond guided_depths.
 struct depth_statistics {
-  std::uint64_t bins = 0;  ///< whose fields were made; of kept fields, made or refreshed
-  std::uint64_t rays = 0;  ///< in bins
-  /// Active rays outside every voxel, with a normal that is not of about unit length, or without room for a
-  /// field: their BSDF alone.
+  std::uint64_t bins = 0;  ///< bins whose field was made; kept fields count when made or refreshed
+  std::uint64_t rays = 0;  ///< rays that had a bin
+  /// Active rays without a bin, which sample their BSDF alone. They lie outside every voxel, their normal is
+  /// not of about unit length, or there was no room for a field.
   std::uint64_t unbinned = 0;
-  std::uint64_t cones = 0;  ///< cast for them
+  std::uint64_t cones = 0;  ///< cones cast for the bins' fields
 };
 
-/// What a field store tells of itself, since it was made.
+/// Counts of the kept fields' store since it was made.
 struct kept_field_statistics {
-  std::uint32_t capacity = 0;    ///< slots that the budget holds
-  std::uint32_t live = 0;        ///< slots in use
-  std::size_t bytes_a_slot = 0;  ///< of the budget
-  std::uint64_t born = 0;        ///< slots taken
-  std::uint64_t freed = 0;       ///< slots given back
+  std::uint32_t capacity = 0;    ///< slots that fit kept.budget_bytes
+  std::uint32_t live = 0;        ///< slots that hold a field now
+  std::size_t bytes_a_slot = 0;  ///< bytes of the budget that one slot takes
+  std::uint64_t allocated = 0;   ///< slots allocated
+  std::uint64_t freed = 0;       ///< slots freed, to be allocated again
   std::uint64_t refreshed = 0;   ///< builds that cast a part of a field's cones
-  std::uint32_t refused = 0;  ///< births refused in the last sample, for want of a slot or by max_wave_cones
+  /// Fields of the last sample that got no slot: none was free, or max_wave_cones was reached.
+  std::uint32_t refused = 0;
 };
 
-/// What path_guider::statistics() tells.
+/// Returned by path_guider::statistics(). A guide that makes no fields leaves theirs at 0.
 struct guider_statistics {
-  std::uint32_t samples = 0;             ///< begun
-  std::uint32_t guided_samples = 0;      ///< of them, with fields
-  std::vector<depth_statistics> depths;  ///< a depth: what guiding did
-  kept_field_statistics kept;            ///< zero where fields are transient
-  dropped_deposits deposits;             ///< that the cache dropped
-  std::uint32_t dropped_vertices = 0;    ///< recorder calls with a path, depth or order out of range
-  build_report build;                    ///< what of the geometry was left out
-  std::vector<stage_time> seconds;       ///< stages, in order
+  std::uint32_t samples = 0;             ///< samples begun
+  std::uint32_t guided_samples = 0;      ///< samples begun after unguided_samples, where the guide can guide
+  std::vector<depth_statistics> depths;  ///< one element a depth, max_depth of them; empty without fields
+  kept_field_statistics kept;            ///< all 0 where fields are transient
+  dropped_deposits deposits;             ///< deposits that the exitance cache dropped, by reason
+  std::uint32_t dropped_vertices = 0;    ///< recorder calls that were dropped; see path_recorder_view
+  build_report build;                    ///< triangles that were left out of the octree, by reason
+  std::vector<stage_time> seconds;       ///< times by stage, as stage_clock::report() orders them
 };
 
 /// Bytes of one part of a guider.
 struct memory_part {
-  const char* name;   ///< what it holds
-  std::size_t bytes;  ///< of the policy's memory
-  bool persistent;    ///< kept across samples for guiding; else needed while a sample is in flight
+  const char* name;   ///< what the part holds, a string literal
+  std::size_t bytes;  ///< allocated in the policy's memory
+  bool persistent;    ///< true: kept across samples for guiding. False: needed only while a sample runs
 };
 
-/// What path_guider::memory() tells.
+/// Returned by path_guider::memory().
 struct memory_report {
-  std::vector<memory_part> parts;  ///< all that a guider holds
+  std::vector<memory_part> parts;  ///< together, all that a guider holds in the policy's memory
 
-  /// Bytes kept across samples.
+  /// Bytes that guiding keeps across samples.
   std::size_t persistent() const { return sum(true); }
-  /// Bytes needed while a sample is in flight.
+  /// Bytes that only a running sample needs. They stay allocated between samples.
   std::size_t transient() const { return sum(false); }
 
  private:
@@ -75,49 +82,67 @@ struct memory_report {
   }
 };
 
-/// The stages that a guider times.
-enum class stage : std::uint32_t { bin, fields, serve, record, cache, count };
+/// Names of the stages that path_guider and wfpg's guides time. A guide may time stages of other names.
+namespace stage {
+inline constexpr const char* bin = "bin";        ///< assigning rays to bins
+inline constexpr const char* fields = "fields";  ///< making and refreshing fields
+/// Sampling directions. In waves that make no fields, also looking up fields.
+inline constexpr const char* sample = "sample";
+inline constexpr const char* record = "record";  ///< Guide::learn(): depositing recorded paths
+inline constexpr const char* cache = "cache";    ///< Guide::update(): updating what was learnt
+}  // namespace stage
 
-/// Accumulates the host's time by stage.
+/// Accumulates host time by stage. One thread uses it at a time.
 class stage_clock {
  public:
-  /// Adds the time until it goes out of scope to a stage, and what a scope inside it takes to that one's
-  /// alone.
+  /// Times a stage during its lifetime. Time inside a nested scope counts for the nested stage alone.
   class scope {
    public:
-    scope(stage_clock& clock, stage s) : clock_(clock), outer_(clock.go_on_with(s)) {}
+    /// Starts timing `name` and pauses the stage around it. The string and the clock must outlive the scope,
+    /// and the string the clock.
+    scope(stage_clock& clock, const char* name) : clock_(clock), outer_(clock.begin(clock.find(name))) {}
     scope(const scope&) = delete;
-    ~scope() { clock_.go_on_with(outer_); }
+    /// Stops timing and resumes the stage around it.
+    ~scope() { clock_.begin(outer_); }
 
    private:
     stage_clock& clock_;
-    stage outer_;
+    std::size_t outer_;
   };
 
-  scope time(stage s) { return scope(*this, s); }
+  /// Times a stage while the result lives: `const auto timed = clock.time(stage::bin);`. O(stages).
+  scope time(const char* name) { return scope(*this, name); }
 
-  std::vector<stage_time> report() const {
-    static constexpr const char* names[] = {"bin", "fields", "serve", "record", "cache"};
-    std::vector<stage_time> result;
-    for (int i = 0; i < static_cast<int>(stage::count); ++i) result.push_back({names[i], seconds_[i]});
-    return result;
-  }
+  /// Returns the time of each stage: those of namespace `stage` first, then others by first use. A stage that
+  /// still runs lacks its time since the last change of stage.
+  std::vector<stage_time> report() const { return {stages_.begin() + 1, stages_.end()}; }
 
  private:
+  /// Seconds of a clock that never goes back.
   static double now() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
   }
 
-  /// Ends the stage that is timed, and begins another; which one that was.
-  stage go_on_with(stage next) {
+  /// Index of a stage, which is added if there is none of that name.
+  std::size_t find(const char* name) {
+    for (std::size_t i = 1; i < stages_.size(); ++i)
+      if (std::strcmp(stages_[i].name, name) == 0) return i;
+    stages_.push_back({name, 0.0});
+    return stages_.size() - 1;
+  }
+
+  /// Adds the time since the last call to the current stage and makes `next` current. Returns the former.
+  std::size_t begin(std::size_t next) {
     const double time = now();
-    seconds_[static_cast<int>(current_)] += time - since_;
+    stages_[current_].seconds += time - since_;
     since_ = time;
     return std::exchange(current_, next);
   }
 
-  double seconds_[static_cast<int>(stage::count) + 1] = {};  // the last: between stages
-  stage current_ = stage::count;
+  std::vector<stage_time> stages_{
+      {"", 0.0},          {stage::bin, 0.0}, {stage::fields, 0.0}, {stage::sample, 0.0}, {stage::record, 0.0},
+      {stage::cache, 0.0}};  // the first: between stages
+  std::size_t current_ = 0;
   double since_ = now();
 };
 

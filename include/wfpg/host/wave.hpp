@@ -1,4 +1,7 @@
 // One depth of a wavefront, as the renderer describes it to the guider.
+// Source: wavefront path tracing (Laine et al. 2013, "Megakernels Considered Harmful").
+// Cost: surfaces and random numbers are asked inside kernels, when they are needed.
+// Memory: that of the two functors, which go to kernels by value.
 #pragma once
 
 #include <wfpg/base/types.hpp>
@@ -10,7 +13,8 @@
 
 namespace wfpg {
 
-/// Rays [0, ray_count) that have hit something and want a next direction. Inactive ones may lie among them.
+/// Rays [0, ray_count) that have hit something and need a next direction.
+/// Inactive rays may lie among them.
 ///   Surfaces  surface<Bsdf> operator()(std::uint32_t ray) const;
 ///   Random    vec2 operator()(std::uint32_t ray, std::uint32_t dimension) const;   in [0,1)², dimensions 0
 ///   and 1
@@ -19,34 +23,36 @@ struct wave {
   std::uint32_t depth = 0;    ///< 0: the camera's first hits
   std::size_t ray_count = 0;  ///< rays, or a capacity of them
   Surfaces surfaces;          ///< where they have hit
-  Random random;              ///< what directions are drawn from
+  Random random;              ///< the numbers that directions are drawn from
 };
-/// The types follow from the arguments.
+/// Deduces both functor types from the arguments.
 template <class Surfaces, class Random>
 wave(std::uint32_t, std::size_t, Surfaces, Random) -> wave<Surfaces, Random>;
 
-/// Directions whose densities the renderer wants from the same fields: those that next-event estimation
-/// chose.
+/// Directions whose densities the renderer needs from the fields of a wave.
+/// Next-event estimation chose them, and weighs them against the mixture by multiple importance sampling.
 ///   Query  vec3 operator()(std::uint32_t ray) const;   unit length, or zero for none
 template <class Query>
 struct density_queries {
-  Query query;                  ///< a ray's direction
-  array_view<float> densities;  ///< a ray: the whole mixture's density, per steradian; 0 for none
+  Query query;                  ///< direction for each ray index
+  array_view<float> densities;  ///< output, one a ray: the whole mixture's density, per steradian; 0 for none
 };
-/// The type follows from the argument.
+/// Deduces the functor's type from the argument.
 template <class Query>
 density_queries(Query, array_view<float>) -> density_queries<Query>;
 
-/// No query.
+/// Stands for a wave without density queries.
 struct no_queries {};
 
 namespace detail {
 
+/// Detects a functor that gives a surface for a ray.
 template <class S, class = void>
 struct is_surfaces : std::false_type {};
 template <class S>
 struct is_surfaces<S, std::void_t<bsdf_of_t<S>>> : std::true_type {};
 
+/// Detects a functor that gives two random numbers for a ray and a dimension.
 template <class R, class = void>
 struct is_random : std::false_type {};
 template <class R>
@@ -55,10 +61,10 @@ struct is_random<R, std::void_t<decltype(vec2(std::declval<const R&>()(std::uint
 
 }  // namespace detail
 
-/// True where S gives a wfpg::surface for a ray index.
+/// True where S(ray) returns a wfpg::surface.
 template <class S>
 inline constexpr bool is_surfaces_v = detail::is_surfaces<S>::value;
-/// True where R gives a vec2 for a ray index and a dimension.
+/// True where R(ray, dimension) converts to a vec2.
 template <class R>
 inline constexpr bool is_random_v = detail::is_random<R>::value;
 

@@ -1,5 +1,8 @@
-// One triangle against voxels, in grid units: which voxels it touches, and how much of it lies in one.
-// Coordinates are relative to a voxel's centre where a function says so; a voxel is the unit cube around it.
+// One triangle against voxels, in grid units: which voxels it touches, and how much of its area lies in one.
+// The voxelizer uses it for conservative voxelization (paper, section 3.2; Crassin & Green 2012).
+//
+// A voxel is the unit cube around its centre. Coordinates are relative to that centre where a function says
+// so. Cost: O(columns of the triangle's box + voxels touched) a triangle. No memory.
 #pragma once
 
 #include <wfpg/base/math.hpp>
@@ -9,19 +12,20 @@
 
 namespace wfpg::detail {
 
-/// A voxel counts as touched within this distance of its faces, in voxels: above the rounding error of grid
-/// coordinates up to 2¹², so that no touched voxel is missed.
+/// Distance from its faces, in voxels, within which a voxel counts as touched. It is above the rounding error
+/// of grid coordinates up to 2¹², so no touched voxel is missed.
 inline constexpr float touch_tolerance = 0x1p-10f;
 
-/// Three vertices in grid units.
+/// A triangle whose vertices are in grid units: voxels from the grid's origin, or relative to a point.
 struct grid_triangle {
-  vec3 a, b, c;
+  vec3 a, b, c;  ///< counter-clockwise seen from the outside
 
+  /// The triangle moved so that `p` is the origin.
   WFPG_HD grid_triangle relative_to(vec3 p) const { return {a - p, b - p, c - p}; }
 };
 
-/// The cross product with exact products: floats cancel in it, and would tilt the normal of a long sliver by
-/// more than the tolerance is worth at its ends.
+/// Cross product with products in double precision. In floats the products cancel. The normal of a long
+/// sliver would be tilted by more than the tolerance at the sliver's ends.
 WFPG_HD inline vec3 accurate_cross(vec3 a, vec3 b) {
   const auto difference = [](float p, float q, float r, float s) {
     return static_cast<float>(static_cast<double>(p) * q - static_cast<double>(r) * s);
@@ -29,55 +33,70 @@ WFPG_HD inline vec3 accurate_cross(vec3 a, vec3 b) {
   return {difference(a.y, b.z, a.z, b.y), difference(a.z, b.x, a.x, b.z), difference(a.x, b.y, a.y, b.x)};
 }
 
-/// Whether the triangle's projections on `axis` stay apart from those of the cube of half side `half`.
+/// Whether `axis` separates a triangle from the cube of half side `half` about the origin: their projections
+/// on it do not overlap. The axis has any length.
 WFPG_HD inline bool separates(vec3 axis, const grid_triangle& t, float half) {
   const float a = glm::dot(axis, t.a);
   const float b = glm::dot(axis, t.b);
   const float c = glm::dot(axis, t.c);
+  // Half the length of the cube's projection, times the axis's own length.
   const float radius = half * (fabsf(axis.x) + fabsf(axis.y) + fabsf(axis.z));
   return min(a, min(b, c)) > radius || max(a, max(b, c)) < -radius;
 }
 
-/// The same of an axis that is normal to an edge: one end of it, and the third corner.
+/// Whether an axis normal to an edge separates the triangle from the cube. The edge's ends project to one
+/// point, so one `end` and the third `corner` are enough.
 WFPG_HD inline bool separates(vec3 axis, vec3 end, vec3 corner, float half) {
   const float a = glm::dot(axis, end), b = glm::dot(axis, corner);
   const float radius = half * (fabsf(axis.x) + fabsf(axis.y) + fabsf(axis.z));
   return min(a, b) > radius || max(a, b) < -radius;
 }
 
-/// Whether an edge from `end`, crossed with one of the cube's, keeps the triangle apart from the cube.
+/// Whether the cross product of an edge with one of the cube's three axes separates triangle and cube. `end`:
+/// one end of the edge. `corner`: the vertex that is not on it.
 WFPG_HD inline bool edge_separates(vec3 edge, vec3 end, vec3 corner, float half) {
+  // The edge crossed with x, y and z. Each product is normal to the edge.
   return separates({0.0f, -edge.z, edge.y}, end, corner, half) ||
          separates({edge.z, 0.0f, -edge.x}, end, corner, half) ||
          separates({-edge.y, edge.x, 0.0f}, end, corner, half);
 }
 
-/// Whether a triangle, relative to the centre, overlaps the cube of half side `half`, where their boxes do:
-/// separating axes (Akenine-Möller 2001, "Fast 3D Triangle-Box Overlap Testing"). `normal`: of any length.
+/// Whether a triangle overlaps the cube of half side `half` about the origin. Source: separating axes,
+/// Akenine-Möller 2001, "Fast 3D Triangle-Box Overlap Testing". `normal`: the triangle's, of any length.
+/// Precondition: their boxes overlap, since the cube's own three axes are not tested.
 WFPG_HD inline bool overlaps_cube(const grid_triangle& t, vec3 normal, float half) {
   return !separates(normal, t, half) && !edge_separates(t.b - t.a, t.a, t.c, half) &&
          !edge_separates(t.c - t.b, t.b, t.a, half) && !edge_separates(t.a - t.c, t.c, t.b, half);
 }
 
-/// The mean of clamp(v, -1/2, 1/2) where v goes evenly from a to b.
+/// Mean of clamp(v, -1/2, 1/2) while v goes evenly from a to b. In [-1/2, 1/2].
 WFPG_HD inline float mean_clamped(float a, float b) {
   const float low = min(a, b), high = max(a, b);
+  // The three cases in which one part alone is left.
   if (low >= -0.5f && high <= 0.5f) return 0.5f * (low + high);
   if (high <= -0.5f) return -0.5f;
   if (low >= 0.5f) return 0.5f;
+  // Three parts: below the range, inside it, and above it.
   const float below = max(-0.5f - low, 0.0f), above = max(high - 0.5f, 0.0f);
+  // The part inside has the mean of its ends; the others are constant.
   const float from = max(low, -0.5f), to = min(high, 0.5f);
   return (0.5f * (above - below) + 0.5f * (from + to) * (to - from)) / (high - low);
 }
 
-/// The area of a closed polygon inside the unit square about the origin, edge by edge: what lies between an
-/// edge and a base line, inside the square, counts with the edge's direction. No polygon is kept.
+/// Area of a closed polygon inside the unit square about the origin, summed edge by edge. What lies between
+/// an edge and a base line, inside the square, counts with the sign of the edge's direction. The polygon is
+/// not stored.
 struct area_in_square {
-  float base;  // the nearer to the polygon, the less of small ones is lost to rounding
-  float sum = 0.0f;
+  /// Height of the base line. The nearer it is to the polygon, the less of small ones is lost to rounding.
+  float base;
+  float sum = 0.0f;  ///< signed area so far
 
+  /// Adds the edge from p to q. Edges may come in any order.
   WFPG_HD void edge(vec2 p, vec2 q) {
+    // Only the part between the square's left and right sides counts. An end that is not moved keeps its
+    // exact height.
     const float from = clamp(p.x, -0.5f, 0.5f), to = clamp(q.x, -0.5f, 0.5f);
+    // Outside the square, or along its height, an edge encloses no area.
     if (from == to) return;
     const float slope = (q.y - p.y) / (q.x - p.x);
     const float y_from = from == p.x ? p.y : p.y + slope * (from - p.x);
@@ -86,20 +105,24 @@ struct area_in_square {
   }
 };
 
-/// One of the two planes that bound the third coordinate of a polygon: where its edges come in and go out.
+/// One of the two planes that bound a polygon's third coordinate. It remembers where the polygon's edges
+/// leave the slab and come back, since the cut makes an edge between those points.
 struct bounding_plane {
-  float side;  // +1 or -1: the plane is at side/2
-  vec2 enter{0.0f}, leave{0.0f};
-  bool crossed = false;
+  float side;                     ///< +1 or -1: the plane is at side / 2
+  vec2 enter{0.0f}, leave{0.0f};  ///< where edges come in and go out
+  bool crossed = false;           ///< whether any edge crosses the plane
 
-  /// Cuts what lies beyond the plane off the edge from p to q, of which [begin, end] is left.
+  /// Cuts off the part of the edge from p to q that lies beyond the plane. [begin, end] is the part that is
+  /// left, as fractions of the edge; begin < end fails where nothing is left.
   WFPG_HD void cut(vec3 p, vec3 q, float& begin, float& end) {
     const float from = 0.5f - side * p.z, to = 0.5f - side * q.z;  // inside: at least 0
+    // Both ends are on one side, so the edge stays whole or is dropped.
     if ((from >= 0.0f) == (to >= 0.0f)) {
       if (from < 0.0f) end = -1.0f;
       return;
     }
     crossed = true;
+    // The distance from the plane changes linearly along the edge.
     const float t = from / (from - to);
     const vec2 at = vec2(p.x, p.y) + (vec2(q.x, q.y) - vec2(p.x, p.y)) * t;
     if (from >= 0.0f) {
@@ -112,40 +135,48 @@ struct bounding_plane {
   }
 };
 
-/// The axis along which a vector is longest.
+/// Axis along which a vector is longest: 0, 1 or 2.
 WFPG_HD inline int largest_axis(vec3 v) {
   const float x = fabsf(v.x), y = fabsf(v.y), z = fabsf(v.z);
   return x > y ? (x > z ? 0 : 2) : (y > z ? 1 : 2);
 }
 
-/// The area of a triangle, relative to a voxel's centre, inside the voxel; in square voxels. Of its
-/// projection along the dominant axis: the triangle is cut to the voxel's height, and what is left to its
-/// square.
+/// Area of a triangle inside the voxel, in square voxels. The triangle is relative to the voxel's centre. It
+/// is cut to the voxel's height along its dominant axis. What is left is projected along that axis and cut to
+/// the voxel's square.
 WFPG_HD inline float area_inside(const grid_triangle& t) {
   const vec3 n = glm::cross(t.b - t.a, t.c - t.a);
   const vec3 farthest = glm::max(glm::abs(t.a), glm::max(glm::abs(t.b), glm::abs(t.c)));
+  // A triangle that lies wholly inside needs no cuts.
   if (max(farthest.x, max(farthest.y, farthest.z)) <= 0.5f) return 0.5f * glm::length(n);
+  // The projection along the largest component is the largest of three, so dividing by it is safe.
   const int w = largest_axis(n);
   if (!(fabsf(n[w]) > 0.0f)) return 0.0f;
+  // Turned so that the dominant axis is the third one.
   const auto turned = [w](vec3 v) { return w == 0 ? vec3(v.y, v.z, v.x) : w == 1 ? vec3(v.z, v.x, v.y) : v; };
   const vec3 corners[3] = {turned(t.a), turned(t.b), turned(t.c)};
+  // The base line passes through the first corner, moved into the square.
   area_in_square area{clamp(corners[0].y, -0.5f, 0.5f)};
   bounding_plane upper{1.0f}, lower{-1.0f};
   for (int i = 0; i < 3; ++i) {
     const vec3 p = corners[i], q = corners[i < 2 ? i + 1 : 0];
     float begin = 0.0f, end = 1.0f;
+    // Each plane may shorten the edge at either end.
     upper.cut(p, q, begin, end);
     lower.cut(p, q, begin, end);
     if (!(begin < end)) continue;
     const vec2 from(p.x, p.y), to(q.x, q.y);
     area.edge(begin > 0.0f ? from + (to - from) * begin : from, end < 1.0f ? from + (to - from) * end : to);
   }
+  // Each plane that cuts the triangle adds one edge to the polygon.
   if (upper.crossed) area.edge(upper.leave, upper.enter);
   if (lower.crossed) area.edge(lower.leave, lower.enter);
+  // The projection is smaller than the triangle by the cosine n[w] / |n|.
   return fabsf(area.sum) * glm::length(n) / fabsf(n[w]);
 }
 
-/// A normal of the counter-clockwise side, at most 2 long: zero where an edge has no length.
+/// Normal of the counter-clockwise side; zero where an edge has no length. Its coordinates are at most 2.
+/// Edges are scaled by their largest coordinate first, so no product overflows or vanishes.
 WFPG_HD inline vec3 scaled_normal(vec3 a, vec3 b, vec3 c) {
   const vec3 e = b - a;
   const vec3 f = c - a;
@@ -155,53 +186,63 @@ WFPG_HD inline vec3 scaled_normal(vec3 a, vec3 b, vec3 c) {
   return glm::cross(e / size_e, f / size_f);
 }
 
-/// The unit normal of the counter-clockwise side, or zero where the triangle has no area.
+/// Unit normal of the counter-clockwise side; zero where the triangle has no area, which is relative to its
+/// edges.
 WFPG_HD inline vec3 unit_normal(vec3 a, vec3 b, vec3 c) {
   const vec3 n = scaled_normal(a, b, c);
   const float length = glm::length(n);
+  // The length is relative to the edges', so small triangles are kept and slivers of no width are not.
   return length > 1.0e-12f ? n / length : vec3(0.0f);
 }
 
-/// Voxels in a row along an axis.
+/// Voxels in a row along an axis; none by default.
 struct voxel_run {
-  std::uint32_t first = 0;  ///< coordinate of the first one
-  std::uint32_t count = 0;
+  std::uint32_t first = 0;  ///< coordinate of the first one along the axis
+  std::uint32_t count = 0;  ///< number of voxels, at most 4096
 };
 
-/// The columns of voxels that a triangle's box covers, in row order, in 8 bytes. Columns run along `axis()`.
+/// The columns of voxels that a triangle's box covers, in row order. It is packed into 8 bytes, since there
+/// is one for each triangle. Columns run along axis().
 class column_box {
  public:
+  /// One column along x, at the origin.
   column_box() = default;
-  /// Inclusive bounds in [0, 4095] along the two axes after `axis`.
+  /// Columns between two corners, both included. Coordinates are along the two axes after `axis`, in cyclic
+  /// order, and in [0, 4095].
   WFPG_HD column_box(int axis, glm::uvec2 lower, glm::uvec2 upper)
       : bits_(std::uint64_t(lower.x) | std::uint64_t(lower.y) << 12 | std::uint64_t(upper.x - lower.x) << 24 |
               std::uint64_t(upper.y - lower.y) << 36 |
               std::uint64_t(static_cast<std::uint32_t>(axis)) << 48) {}
 
-  /// 0, 1 or 2.
+  /// Axis of the columns: 0, 1 or 2.
   WFPG_HD int axis() const { return static_cast<int>(bits_ >> 48); }
-  /// Number of columns, at least 1.
+  /// Number of columns, 1 to 2²⁴.
   WFPG_HD std::uint64_t count() const { return std::uint64_t(width()) * (part(36) + 1); }
-  /// Coordinates of column i along the two axes after `axis()`.
+  /// Coordinates of column i along the two axes after axis(). Precondition: i < count().
   WFPG_HD glm::uvec2 column(std::uint64_t i) const {
     const auto at = static_cast<std::uint32_t>(i);
+    // Row by row, the first of the two axes fastest.
     return {part(0) + at % width(), part(12) + at / width()};
   }
-  /// The voxel at `along` in a column.
+  /// Coordinates of the voxel at `along` in a column, in the order x, y, z.
   WFPG_HD uvec3 voxel(glm::uvec2 column, std::uint32_t along) const {
     const int w = axis();
+    // A column is (y, z) along x, (z, x) along y, and (x, y) along z.
     if (w == 0) return {along, column.x, column.y};
     return w == 1 ? uvec3(column.y, along, column.x) : uvec3(column.x, column.y, along);
   }
 
  private:
+  /// 12 of the bits, from `shift` on.
   WFPG_HD std::uint32_t part(int shift) const { return static_cast<std::uint32_t>(bits_ >> shift) & 0xfffu; }
+  /// Number of columns in a row.
   WFPG_HD std::uint32_t width() const { return part(24) + 1; }
 
+  /// From the lowest: two least coordinates and two extents of 12 bits each, and the axis.
   std::uint64_t bits_ = 0;
 };
 
-/// The axis along which a triangle's normal is longest.
+/// Axis along which a triangle's normal is longest. Columns along it hold the shortest runs of voxels.
 WFPG_HD inline int column_axis(const grid_triangle& t) {
   return largest_axis(glm::cross(t.b - t.a, t.c - t.a));
 }
@@ -209,7 +250,7 @@ WFPG_HD inline int column_axis(const grid_triangle& t) {
 /// Finds the voxels that a triangle touches, in columns along an axis.
 class triangle_columns {
  public:
-  /// `t` in grid units; `resolution` at most 4096; `axis`: the dominant one.
+  /// Prepares a triangle in grid units. `resolution`: at most 4096. `axis`: column_axis() of the triangle.
   WFPG_HD triangle_columns(const grid_triangle& t, std::uint32_t resolution, int axis)
       : triangle_(t),
         normal_(accurate_cross(t.b - t.a, t.c - t.b)),
@@ -217,6 +258,7 @@ class triangle_columns {
         v_((axis + 2) % 3),
         w_(axis) {
     const vec3 n = glm::cross(t.b - t.a, t.c - t.a);
+    // The box of voxels within the tolerance of the triangle's own box, inside the grid.
     for (int i = 0; i < 3; ++i) {
       const float low = min(t.a[i], min(t.b[i], t.c[i])) - touch_tolerance;
       const float high = max(t.a[i], max(t.b[i], t.c[i])) + touch_tolerance;
@@ -224,27 +266,34 @@ class triangle_columns {
       lower_[i] = static_cast<int>(clamp(floorf(low), 0.0f, last));
       upper_[i] = static_cast<int>(clamp(floorf(high), 0.0f, last));
     }
+    // A triangle without area has no plane: its box alone bounds the runs.
     if (fabsf(n[w_]) > 0.0f) slope_ = {-n[u_] / n[w_], -n[v_] / n[w_]};
     // The normal of a sliver is rounded; how far its plane misses the vertices says by how much.
     const float miss = max(fabsf(plane(t.b) - t.b[w_]), fabsf(plane(t.c) - t.c[w_]));
+    // The plane's rise over half a voxel, the error of the plane, and the tolerance with room for rounding.
     reach_ = 0.5f * (fabsf(slope_.x) + fabsf(slope_.y)) + miss + 4.0f * touch_tolerance;
   }
 
-  /// The columns of the triangle's box.
+  /// The columns that the triangle's box covers.
   WFPG_HD column_box box() const {
     return {w_, glm::uvec2(lower_[u_], lower_[v_]), glm::uvec2(upper_[u_], upper_[v_])};
   }
 
-  /// The voxels of a column that the triangle touches: one run, since triangle and column are convex. `box`
-  /// runs along the same axis; who calls twice may get two answers where a compiler fuses operations.
+  /// Finds the voxels of a column that the triangle touches. They are one run, since triangle and column are
+  /// convex. `box` runs along the axis of this object. Evaluate a column once and keep the answer: two calls
+  /// may differ where a compiler fuses operations.
   WFPG_HD voxel_run run(const column_box& box, glm::uvec2 column) const {
     int first, last;
+    // The plane bounds the run before any voxel is tested.
     plane_range(column, first, last);
     voxel_run found;
+    // The plane's range is a few voxels; each is tested on its own.
     for (int along = first; along <= last; ++along) {
       const auto at = static_cast<std::uint32_t>(along);
       const grid_triangle local = triangle_.relative_to(vec3(box.voxel(column, at)) + 0.5f);
+      // The cube is larger than the voxel by the tolerance on each side.
       if (!overlaps_cube(local, normal_, 0.5f + touch_tolerance)) continue;
+      // A gap inside the run can only come from rounding, and is closed.
       if (found.count == 0) found.first = at;
       found.count = at - found.first + 1;
     }
@@ -252,25 +301,31 @@ class triangle_columns {
   }
 
  private:
+  /// Coordinate along the axis at which the triangle's plane passes a point's column.
   WFPG_HD float plane(vec3 p) const {
+    // Linear from the first vertex, with the plane's slopes along the two other axes.
     return triangle_.a[w_] + slope_.x * (p[u_] - triangle_.a[u_]) + slope_.y * (p[v_] - triangle_.a[v_]);
   }
 
+  /// Range of voxels in a column that the plane comes near, inside the triangle's box; `last` < `first` for
+  /// none.
   WFPG_HD void plane_range(glm::uvec2 column, int& first, int& last) const {
+    // The plane is evaluated at the column's middle; reach_ covers the rest of the column.
     vec3 centre(0.0f);
     centre[u_] = static_cast<float>(column.x) + 0.5f;
     centre[v_] = static_cast<float>(column.y) + 0.5f;
+    // Keeps the conversion to integers defined for steep planes.
     const float limit = 1.0e6f;
     first = max(lower_[w_], static_cast<int>(floorf(clamp(plane(centre) - reach_, -limit, limit))));
     last = min(upper_[w_], static_cast<int>(floorf(clamp(plane(centre) + reach_, -limit, limit))));
   }
 
-  grid_triangle triangle_;
-  vec3 normal_;
-  int u_, v_, w_;
-  int lower_[3], upper_[3];
-  vec2 slope_{0.0f};
-  float reach_;
+  grid_triangle triangle_;   ///< grid units
+  vec3 normal_;              ///< of any length
+  int u_, v_, w_;            ///< the two axes after the columns' axis, and that axis
+  int lower_[3], upper_[3];  ///< voxels of the box, both included
+  vec2 slope_{0.0f};         ///< of the plane, along u and v
+  float reach_;              ///< how far the plane may be from a touched voxel's centre
 };
 
 }  // namespace wfpg::detail

@@ -1,5 +1,6 @@
-// Weights of whole-picture samples while the guide learns (paper, section 3.7, Eq. 7): the picture is
-// sum(S_i h(i)) / sum(h(i)). Includes only annotations.
+// Weights of whole-picture samples while the guide learns (paper, section 3.7, Eq. 7): the picture is the
+// mean of the samples S_i with weights h(i). Cost: O(1), no memory. Hosts may include it alone: it includes
+// annotations and standard headers only.
 #pragma once
 
 #include <wfpg/base/config.hpp>
@@ -8,18 +9,20 @@
 
 namespace wfpg {
 
-/// The paper's six ways to combine samples of growing quality, and one of wfpg's own.
+/// How samples of growing quality are combined: the paper's six heuristics, and pt_linear, which the paper
+/// does not have. The paper uses "PT First" for its results.
 enum class sample_combination : std::uint8_t {
-  constant,       ///< all alike
-  linear,         ///< 1, 2, 3, 4, 5, 5, ...
-  quadratic,      ///< 1, 4, 9, 16, 25, 25, ...
-  one_two,        ///< 1, 2, 2, ...
-  discard_first,  ///< 0, 1, 1, ...
-  pt_first,       ///< all alike, and the first sample is not guided
-  pt_linear,      ///< linear, and the first sample is not guided: the best of both
+  constant,       ///< 1 for all samples
+  linear,         ///< i up to 5: 1, 2, 3, 4, 5, 5, ...
+  quadratic,      ///< i² up to 25: 1, 4, 9, 16, 25, 25, ...
+  one_two,        ///< 1 for the first sample, 2 for all others
+  discard_first,  ///< 0 for the first sample, 1 for all others
+  pt_first,       ///< 1 for all; the first sample is path traced without a guide
+  pt_linear,      ///< weights of linear; the first sample is path traced without a guide
 };
 
-/// h(i) of sample i, counted from 1.
+/// Weight h(i) of sample i, counted from 1: 0 to 25. Only ratios matter, since the picture is divided by the
+/// sum of the weights. With discard_first that sum is 0 after one sample.
 WFPG_HD inline float sample_weight(sample_combination combination, std::uint32_t i) {
   const float rank = i < 5 ? static_cast<float>(i) : 5.0f;
   switch (combination) {
@@ -39,7 +42,8 @@ WFPG_HD inline float sample_weight(sample_combination combination, std::uint32_t
   return 1.0f;
 }
 
-/// Samples at the beginning that a combination wants unguided.
+/// Number of samples at the beginning that the combination wants without a guide, 0 or 1. The host draws
+/// their directions from the BSDF alone.
 WFPG_HD inline std::uint32_t unguided_samples(sample_combination combination) {
   return combination == sample_combination::pt_first || combination == sample_combination::pt_linear ? 1 : 0;
 }

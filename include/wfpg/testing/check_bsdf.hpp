@@ -1,11 +1,13 @@
-// Checks a host's BSDF: value, density and samples have to agree. For a host's own tests, of any framework:
+// Checks a host's BSDF: value, density and samples must agree. For a host's own tests, in any framework:
 //
 //   const auto report = wfpg::testing::check_bsdf(exec, my_bsdf, {normal});
 //   if (!report) std::puts(report.message.c_str());
 //
-// Checks run through an execution policy, so that what a device will call is what is checked. They allocate,
-// copy to the host and take up to seconds: not for a frame's time. They throw out_of_memory, and
-// std::invalid_argument for options out of range.
+// Checks run through an execution policy, so that they test what a device will call.
+// They throw out_of_memory, and std::invalid_argument for options out of range.
+// Source: chi² tests of samples as in pbrt-v4's and Mitsuba's tests; reciprocity as in Veach 1997.
+// Cost: up to seconds, allocations and copies to the host. Not for a frame's time.
+// Memory: up to 56 bytes a sample in the policy's memory and on the host.
 #pragma once
 
 #include <wfpg/base/types.hpp>
@@ -17,16 +19,24 @@
 
 namespace wfpg::testing {
 
-/// What check_bsdf asks, and how strictly.
+/// Options of check_bsdf(): its inputs and how strict it is.
 struct bsdf_check_options {
-  vec3 normal{0.0f, 0.0f, 1.0f};               ///< the BSDF's shading normal, unit length
-  bool reciprocal = true;                      ///< false: reciprocity is not asked
-  float ior = 1.0f;                            ///< index of refraction below the normal over above, positive
-  float albedo_limit = 1.0f;                   ///< of the light that goes on, at least 0
-  std::size_t samples = std::size_t(1) << 16;  ///< drawn for each outgoing direction, at least 1024
-  std::uint64_t seed = 1;                      ///< of all random numbers
-  float tolerance = 1.0e-3f;                   ///< relative, between two ways to compute one value, in (0, 1)
-  double significance = 1.0e-3;                ///< the probability that a correct BSDF is rejected, in (0, 1)
+  /// The BSDF's shading normal, unit length to 0.1%.
+  vec3 normal{0.0f, 0.0f, 1.0f};
+  /// False: reciprocity is not checked.
+  bool reciprocal = true;
+  /// Index of refraction below the normal over that above; positive.
+  float ior = 1.0f;
+  /// Largest fraction of the light that may go on, at least 0. 1: energy is conserved.
+  float albedo_limit = 1.0f;
+  /// Samples drawn for each outgoing direction, at least 1024.
+  std::size_t samples = std::size_t(1) << 16;
+  /// Seed of all random numbers: one seed gives one verdict.
+  std::uint64_t seed = 1;
+  /// Relative difference allowed between two ways to compute one value, in (0, 1).
+  float tolerance = 1.0e-3f;
+  /// Probability that a correct BSDF is rejected, in (0, 1).
+  double significance = 1.0e-3;
 };
 
 /// Checks that a BSDF is one as <wfpg/host/bsdf.hpp> says, in this order:
@@ -36,26 +46,31 @@ struct bsdf_check_options {
 ///                is too; nothing comes from below the normal unless transmits(). Where is_delta(): eval()
 ///                and pdf() are 0, a sample's pdf is at most 1, and nothing else is asked.
 ///   frequencies  of sample()'s directions are integrals of pdf() (chi² on adaptive bins)
-///   integral     of pdf() is the share of samples that succeed
+///   integral     of pdf() is the fraction of samples that succeed
 ///   energy       the integral of eval() over incident directions is at most `albedo_limit`, and the mean of
 ///                eval() / pdf over the samples
 ///   reciprocity  eval(a, b) / |cos b| / n_a² is eval(b, a) / |cos a| / n_b²
 ///   parts        glossy() gives a share in [0, 1] and an alpha in (0, 1]; the parts' densities, in their
 ///                shares, add up to pdf(); each part's samples, frequencies and integral, as of the whole
 ///
-/// n is the index of refraction on a direction's side of the normal, 1 above and `ior` below. A BSDF carries
-/// radiance: from incident to outgoing, f / n_outgoing² is what is symmetric (Veach 1997, section 5.2), so
-/// light that enters the denser side gains n², and energy counts light from the other side times
-/// (n_incident / n_outgoing)². Reciprocity is not asked within 0.06 degrees of the surface.
+/// n is the index of refraction on a direction's side of the normal: 1 above and `ior` below.
+/// A BSDF carries radiance from incident to outgoing.
+/// Its symmetric form is f / n_outgoing² (Veach 1997, section 5.2).
+/// Light that enters the denser side gains n².
+/// Energy therefore counts light from the other side times (n_incident / n_outgoing)².
+/// Reciprocity is not checked within 0.06 degrees of the surface.
 ///
-/// Outgoing directions are the normal, 3, 30, 60 and 80 degrees from it at several azimuths, and below it
-/// where transmits(); for values, reciprocity and the parts' sum random ones too. Each statistical test is
-/// made at `significance` over their number (Bonferroni), with an allowance of 0.05% and the quadrature's own
-/// error for integrals; numbers follow from `seed`, so that a verdict does not change from run to run.
+/// Outgoing directions are the normal, and 3, 30, 60 and 80 degrees from it at several azimuths.
+/// Where transmits(), their mirror images below the normal are added.
+/// Values, reciprocity and the parts' sum are checked at random directions too.
+/// Each statistical test is made at `significance` over the number of tests (Bonferroni).
+/// Integrals have an allowance of 0.05% and the quadrature's own error.
+/// Random numbers follow from `seed`, so that a verdict does not change from run to run.
 ///
-/// The BSDF is called inside kernels, by value. Cost: 11 outgoing directions, 22 where transmits(), times
-/// `samples` samples and as many evaluations again for the quadratures; three times that with separate
-/// parts. Lobes narrower than a GGX alpha of 0.01 exceed the quadrature, and the report says so.
+/// The BSDF is called inside kernels, by value.
+/// Cost: 11 outgoing directions, 22 where transmits(), times `samples` samples.
+/// The quadratures take as many evaluations again. Separate parts make it three times that.
+/// Lobes narrower than a GGX alpha of 0.01 exceed the quadrature, and the report says so.
 template <class Exec, class Bsdf>
 check_report check_bsdf(const Exec& exec, const Bsdf& bsdf, const bsdf_check_options& options = {});
 

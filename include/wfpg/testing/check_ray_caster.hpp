@@ -1,8 +1,9 @@
-// Checks a host's ray caster, in both of its forms.
-//
-// Checks run through an execution policy, so that what a device will call is what is checked. They allocate,
-// copy to the host and take up to seconds: not for a frame's time. They throw out_of_memory, and
-// std::invalid_argument for options out of range.
+// Checks a host's ray caster, in both of its forms. For a host's own tests, in any framework.
+// Checks run through an execution policy, so that they test what a device will call.
+// They throw out_of_memory, and std::invalid_argument for options out of range.
+// Source: none; each check is a property that the library relies on.
+// Cost: up to four casts of all rays, allocations and copies to the host. Not for a frame's time.
+// Memory: 40 bytes a ray in the policy's memory, and a few times that on the host.
 #pragma once
 
 #include <wfpg/base/types.hpp>
@@ -15,21 +16,27 @@
 
 namespace wfpg::testing {
 
-/// What check_ray_caster asks, and how strictly.
+/// Options of check_ray_caster(): its inputs and how strict it is.
 struct caster_check_options {
-  std::size_t rays = std::size_t(1) << 14;  ///< positive
-  std::uint64_t seed = 1;                   ///< of the rays
-  float tolerance = 1.0e-4f;    ///< between two hits of one ray, of the diagonal of the bounds, in [0, 1)
-  float least_distance = 0.0f;  ///< nearer hits are not cast anew, scene units, at least 0; of use where a
-                                ///< caster passes what is near, as svo_ray_caster does
-  double least_hits = 0.01;     ///< share of the rays that have to hit, in [0, 1]; 1 in a closed scene
-  double exceptions = 1.0e-3;   ///< share of the rays that order, anew, limits and leaves may find wrong:
-                                ///< edges and cracks; in [0, 1]
-  bool limits = false;          ///< t_max is asked too, which the guider itself never sets
+  std::size_t rays = std::size_t(1) << 14;  ///< rays that are cast; positive
+  std::uint64_t seed = 1;                   ///< seed of the rays' origins and directions
+  /// Difference allowed between two hits of one ray, as a fraction of the bounds' diagonal, in [0, 1).
+  /// For the environment's radiance it is relative.
+  float tolerance = 1.0e-4f;
+  /// Rays whose second half is shorter are not cast anew: scene units, at least 0.
+  /// Of use where a caster passes what is near, as svo_ray_caster does.
+  float least_distance = 0.0f;
+  /// Fraction of the rays that must hit, in [0, 1]. 1 suits a closed scene.
+  double least_hits = 0.01;
+  /// Fraction of the rays that order, anew, limits and leaves may find wrong, in [0, 1].
+  /// Edges and cracks make a few.
+  double exceptions = 1.0e-3;
+  /// True: t_max is checked too, which the guider itself never sets.
+  bool limits = false;
 };
 
-/// Checks a ray caster, inline or batch (of one that is both, each form), with rays from random points of
-/// `bounds` in random directions:
+/// Checks a ray caster with rays from random points of `bounds` in random directions.
+/// A caster that has both forms, inline and batch, is checked in each:
 ///
 ///   values   a hit has a finite positive distance, a miss a finite environment that is not negative, and
 ///            every hit is written; at least `least_hits` of the rays hit
@@ -43,7 +50,8 @@ template <class Exec, class Caster>
 check_report check_ray_caster(const Exec& exec, const Caster& caster, const bounds3& bounds,
                               const caster_check_options& options = {});
 
-/// The same inside an octree's cube, less one voxel at each face; and
+/// Checks a ray caster inside an octree's cube, less one voxel at each face.
+/// To the checks by bounds it adds:
 ///
 ///   leaves   a hit lies in a leaf's voxel or in one of the 26 around it
 ///

@@ -1,16 +1,18 @@
-// The outcome of a check of what a host hands to the guider.
+// The result of a check of what a host hands to the guider. Converts to bool, for any test framework.
+// Cost and memory: one string.
 #pragma once
 
 #include <string>
 
-/// Checks of what a host hands to the guider.
+/// Checks of what a host hands to the guider: BSDFs, ray casters, surfaces.
 namespace wfpg::testing {
 
-/// The outcome of a check.
+/// The result of a check: success, or the first violation.
 struct check_report {
-  std::string message;  ///< the first violation: where, what was found, what was expected; empty: all holds
+  /// The first violation: where, what was found, what was expected. Empty where all holds.
+  std::string message;
 
-  /// True where all holds.
+  /// Returns true where no violation was found.
   explicit operator bool() const { return message.empty(); }
 };
 

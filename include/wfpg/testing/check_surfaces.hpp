@@ -1,8 +1,9 @@
-// Checks the surfaces that a host describes to the guider.
-//
-// Checks run through an execution policy, so that what a device will call is what is checked. They allocate,
-// copy to the host and take up to seconds: not for a frame's time. They throw out_of_memory, and
-// std::invalid_argument for options out of range.
+// Checks the surfaces that a host describes to the guider. For a host's own tests, in any framework.
+// check_surfaces() runs through an execution policy, so that it tests what a device will call.
+// It throws out_of_memory.
+// Source: none; each check is a property that the library relies on.
+// Cost: one kernel, an allocation and a copy to the host. Not for a frame's time.
+// Memory: 52 bytes a surface, in the policy's memory and on the host.
 #pragma once
 
 #include <wfpg/base/types.hpp>
@@ -15,14 +16,21 @@
 
 namespace wfpg::testing {
 
-/// Checks a surface: all is finite; normals and outgoing have unit length, to 0.1%; outgoing does not lie in
-/// the surface; both normals are on one side; with a tree, the position lies in a leaf's voxel or in one of
-/// the 26 around it. An inactive surface is right whatever it holds. The tree has to lie in host memory.
+/// Checks one surface, on the host:
+///
+/// - position, normals and outgoing are finite;
+/// - normals and outgoing have unit length, to 0.1%;
+/// - outgoing does not lie in the surface;
+/// - both normals are on one side;
+/// - with a tree, the position lies in a leaf's voxel or in one of the 26 around it.
+///
+/// An inactive surface is right whatever it holds. The tree must lie in host memory.
 template <class Bsdf>
 check_report check_surface(const surface<Bsdf>& s, const sparse_voxel_octree_view& tree = {});
 
-/// The same of rays [0, count) of a wave, called inside a kernel; the report names the first ray. The tree
-/// lies in the policy's memory.
+/// Checks the surfaces of rays [0, count) of a wave, which a kernel asks for.
+/// The report names the first ray whose surface is wrong.
+/// The tree must lie in the policy's memory; an empty one is not asked.
 template <class Exec, class Surfaces>
 check_report check_surfaces(const Exec& exec, const Surfaces& surfaces, std::size_t count,
                             const sparse_voxel_octree_view& tree = {});

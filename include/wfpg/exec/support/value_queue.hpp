@@ -1,7 +1,11 @@
-// Values that the threads of a sample add to many sums: queued as they come, summed exactly at its end, so
-// that any order of arrival gives the same bits.
-//
-// Memory: 8 bytes a value of its capacity, 16 a key.
+// Sums of many values by key, exact in any order of arrival.
+// Threads queue values as they come.
+// The end of a sample adds them up in integers.
+// Results have the same bits however threads interleave, which float atomics do not give.
+// Source: sums of floats in fixed point, as in reproducible summation (Demmel and Nguyen 2013).
+// Cost: three atomics a value: its place, its count and its sum.
+// Emptying the queue resets one counter.
+// Memory: 8 bytes for each value of the capacity, 16 for each key, and 4.
 #pragma once
 
 #include <wfpg/base/math.hpp>
@@ -13,18 +17,19 @@
 
 namespace wfpg::detail {
 
-/// Values of a queue, at most.
+/// Largest capacity of a queue: the 32-bit counter cannot wrap around beyond it.
 inline constexpr std::size_t most_queued = std::size_t(1) << 31;
 
-/// What a key has received since the last time.
+/// What a key has received since the last take(). 16 bytes.
 struct pending_values {
-  std::uint64_t sum = 0;  ///< in units of exact_sum, once it is made
-  std::uint32_t count = 0;
-  std::uint32_t largest = 0;  ///< bits of the largest value
+  std::uint64_t sum = 0;      ///< in units of exact_sum; 0 until the queue is summed
+  std::uint32_t count = 0;    ///< values queued for the key
+  std::uint32_t largest = 0;  ///< bits of the largest value, which sets the unit of the sum
 };
 
-/// Adds `n` values that sum to `sum` to a mean of `count` values. The count stays at `most` when it is
-/// reached: from then on old values fade, and nothing overflows.
+/// Adds `n` values with the given sum to a mean of `count` values.
+/// The count stays at `most` once it is reached: from then on old values fade, and nothing overflows.
+/// Precondition: n > 0.
 WFPG_HD inline void add_to_mean(double& mean, std::uint32_t& count, double sum, std::uint32_t n,
                                 std::uint32_t most = 0xffffffffu) {
   const std::uint64_t total = std::uint64_t(count) + n;
@@ -32,19 +37,24 @@ WFPG_HD inline void add_to_mean(double& mean, std::uint32_t& count, double sum, 
   count = static_cast<std::uint32_t>(min<std::uint64_t>(total, most));
 }
 
-/// The exact sum of non-negative finite floats in any order: integers in units of the largest one's last
-/// bits, of which 39 lie below its own and make room for n to carry.
+/// Adds non-negative finite floats as 64-bit integers, with one result in any order.
+/// The unit is chosen from the largest value: 39 bits lie below its last one.
+/// As many of them as n needs are given to the carry.
+/// Bits below the unit are cut off from each value alone, so that they do not depend on the order.
 class exact_sum {
  public:
-  /// `largest`: the bits of the largest value; n > 0 values follow.
+  /// `largest`: bits of the largest value.
+  /// `n`: the number of values, in [1, 2³¹].
   WFPG_HD exact_sum(std::uint32_t largest, std::uint32_t n)
       : exponent_(exponent(largest)), shift_(39 - bits_of(n - 1)) {}
-  /// A value in these units.
+  /// Returns a value, given by its float bits, in these units.
+  /// Subnormal values are allowed.
   WFPG_HD std::uint64_t term(std::uint32_t bits) const {
     const std::uint64_t mantissa = bits >> 23 ? (bits & 0x7fffffu) | 0x800000u : bits;
     const int left = shift_ + exponent(bits) - exponent_;
     return left >= 0 ? mantissa << left : (left > -32 ? mantissa >> -left : 0);
   }
+  /// Returns a sum of terms as a number; rounded once, to double.
   WFPG_HD double value(std::uint64_t sum) const {
     const std::uint64_t unit = static_cast<std::uint64_t>(1023 + exponent_ - 150 - shift_)
                                << 52;  // a power of 2
@@ -54,33 +64,43 @@ class exact_sum {
   }
 
  private:
+  /// Returns the biased exponent; 1 for subnormal numbers, which have its scale.
   WFPG_HD static int exponent(std::uint32_t bits) { return max(static_cast<int>(bits >> 23), 1); }
 
   int exponent_;
   int shift_;
 };
 
-/// View of a queue, for kernels. A default-constructed one has room for nothing.
+/// View of a queue, for kernels.
+/// A default-constructed one has room for nothing.
+/// A thread reserves entries, writes or drops each that fits, and then counts each.
 class value_queue_view {
  public:
-  /// The first of n entries in a row. Each that fits is then written or dropped, and then counted: writing
-  /// all of a thread's first lets a processor overlap look-ups, which the atomics of counting would put in
-  /// order.
+  /// Reserves n entries in a row, and returns the first.
+  /// They may lie beyond the capacity: ask fits().
+  /// Write or drop all of a thread's entries before counting the first.
+  /// A processor then overlaps its look-ups, which the atomics of counting would order.
   WFPG_HD std::uint32_t reserve(std::uint32_t n) const {
     // Asked first, so that what comes to a full queue does not count on until the counter begins again. A
     // default view has no counter.
     if (capacity_ == 0 || atomic_load(queued_) >= capacity_) return capacity_;
     return atomic_add(queued_, n);
   }
+  /// Returns whether an entry lies inside the queue.
+  /// Values that do not fit are lost.
   WFPG_HD bool fits(std::uint32_t entry) const { return entry < capacity_; }
 
-  /// A non-negative finite value for a key. Precondition: the entry fits.
+  /// Writes a value for a key.
+  /// Preconditions: the entry fits, and the value is finite and not negative.
   WFPG_HD void write(std::uint32_t entry, std::uint32_t key, float value) const {
     queue_[entry] = std::uint64_t(float_bits(value) & 0x7fffffffu) << 32 | key;  // without zero's sign
     prefetch(pending_ + key);                                                    // for count()
   }
+  /// Leaves a reserved entry without a value.
   /// Precondition: the entry fits.
   WFPG_HD void drop(std::uint32_t entry) const { queue_[entry] = dropped; }
+  /// Counts an entry for its key, and raises the key's largest value.
+  /// Entries that do not fit are ignored.
   WFPG_HD void count(std::uint32_t entry) const {
     if (!fits(entry) || queue_[entry] == dropped) return;
     pending_values& pending = pending_[key_of(queue_[entry])];
@@ -89,7 +109,8 @@ class value_queue_view {
     if (atomic_load(&pending.largest) < bits) atomic_max(&pending.largest, bits);
   }
 
-  /// Adds an entry to its key's sum, once all are counted.
+  /// Adds an entry to its key's sum.
+  /// Precondition: all entries are counted.
   WFPG_HD void add(std::uint32_t entry) const {
     constexpr std::uint32_t ahead = 16;  // as many lines as a processor may wait for
     if (entry + ahead < min(*queued_, capacity_) && queue_[entry + ahead] != dropped)
@@ -98,7 +119,10 @@ class value_queue_view {
     pending_values& to = pending_[key_of(queue_[entry])];
     atomic_add(&to.sum, exact_sum(to.largest, to.count).term(bits_of_value(queue_[entry])));
   }
-  /// How many values a key has received; `sum` is their sum. Forgets them.
+  /// Returns how many values a key has received, and forgets them.
+  /// `sum` becomes their sum.
+  /// `sum` is left as it is where there are none.
+  /// One thread takes a key.
   WFPG_HD std::uint32_t take(std::size_t key, double& sum) const {
     const pending_values from = pending_[key];
     if (from.count == 0) return 0;
@@ -112,7 +136,9 @@ class value_queue_view {
   friend class value_queue;
   static constexpr std::uint64_t dropped = 0xffffffffull;  // an entry that is no key's
 
+  /// Returns the key of an entry, its lower half.
   WFPG_HD static std::uint32_t key_of(std::uint64_t entry) { return static_cast<std::uint32_t>(entry); }
+  /// Returns the float bits of an entry's value, its upper half.
   WFPG_HD static std::uint32_t bits_of_value(std::uint64_t entry) {
     return static_cast<std::uint32_t>(entry >> 32);
   }
@@ -123,18 +149,23 @@ class value_queue_view {
   std::uint32_t capacity_ = 0;
 };
 
+/// Functor that adds entry i to its key's sum.
 struct add_queued_values {
   value_queue_view queue;
   WFPG_HD void operator()(std::size_t i) const { queue.add(static_cast<std::uint32_t>(i)); }
 };
 
-/// Owns a queue.
+/// Owns the memory of a queue and its keys, in the memory of `Exec`.
+/// Movable, not copyable.
 template <class Exec>
 class value_queue {
  public:
+  /// Without memory; its view has room for nothing.
   value_queue() = default;
-  /// Of up to `capacity` values between two sums, at most 2³¹, for keys below `keys`, less than 2³² - 1.
-  /// Throws out_of_memory. Without capacity it takes 4 bytes.
+  /// Room for `capacity` values between two sums, at most 2³¹, and for keys below `keys`.
+  /// Precondition: keys < 2³² - 1.
+  /// Without capacity it takes 4 bytes.
+  /// Throws out_of_memory.
   value_queue(const Exec& exec, std::size_t capacity, std::size_t keys)
       : queue_(exec, capacity), pending_(exec, capacity > 0 ? keys : 0), queued_(exec, 1) {
     view_.queue_ = queue_.data();
@@ -144,16 +175,20 @@ class value_queue {
     clear(exec);
   }
 
+  /// Returns the view that kernels write through.
+  /// Valid until the queue is destroyed or moved into.
   value_queue_view view() const { return view_; }
+  /// Returns the number of values that fit between two sums.
   std::size_t capacity() const { return queue_.size(); }
+  /// Returns the memory in use, bytes.
   std::size_t bytes() const { return queue_.bytes() + pending_.bytes() + queued_.bytes(); }
 
-  /// Forgets what is queued.
+  /// Forgets all values, those that are summed and not yet taken included. O(keys).
   void clear(const Exec& exec) {
     exec.fill_bytes(pending_.data(), 0, pending_.bytes());
     empty(exec);
   }
-  /// Sums what is queued by key, for take(), and empties the queue. O(values).
+  /// Adds the queued values to their keys' sums, for take(), and empties the queue. O(values).
   void sum(const Exec& exec) {
     exec.for_each(exec::device_count{queued_.data(), queue_.size()}, add_queued_values{view_});
     empty(exec);

@@ -1,4 +1,9 @@
-// Recorded paths into the cache and into fields that learn, by back-propagation (paper, Eq. 5).
+// Deposits recorded paths into the exitance cache, and into fields that learn, by back-propagation. Each
+// vertex gets the light that the rest of its path brought to it.
+//
+// Source: Yalciner and Akyuz (2024), Eq. 5. Learning fields are wfpg's own.
+//
+// Cost: O(paths * depth), one thread a path. Memory: none beside the queues of the cache and of the fields.
 #pragma once
 
 #include <wfpg/guide/path_recorder.hpp>
@@ -7,22 +12,26 @@
 
 namespace wfpg {
 
-/// Deposits one path's vertices: L(k) = (sum of contributions at k and after) / throughput(k), Eq. 5. It is
-/// what leaves a vertex, for the cache, and what arrives along the direction before it, for kept fields.
+/// Kernel: deposits one path's vertices. L(k) = (sum of contributions at k and after) / throughput(k), Eq. 5.
+/// L(k) is the radiance that leaves vertex k, for the cache. It also arrives along the direction that led
+/// there, for kept fields.
 struct deposit_path {
-  path_recorder_view paths;     ///< what was recorded
-  exitance_cache_view cache;    ///< where it goes
-  learnt_radiance_view learnt;  ///< where it goes too, unless empty
+  path_recorder_view paths;     ///< recorded paths
+  exitance_cache_view cache;    ///< receives what leaves each surface
+  learnt_radiance_view learnt;  ///< receives what arrives along directions; may be empty
 
-  /// Path `place` of those recorded.
+  /// Deposits path `place` of those recorded. O(vertices). It writes all entries of the path before it counts
+  /// them, so that look-ups overlap.
   WFPG_HD void operator()(std::size_t place) const {
     const recorded_path path(paths, place);
     const std::uint32_t vertices = path.vertices(), surfaces = path.surfaces();
     if (surfaces == 0) return;
     const std::uint32_t first = cache.reserve(surfaces);
+    // Fields learn along the directions between vertices, of which there is one fewer.
     const std::uint32_t found = learnt.empty() || vertices < 2 ? 0 : vertices - 1;
     const std::uint32_t first_found = found > 0 ? learnt.reserve(found) : 0;
     vec3 arriving(0.0f);
+    // From the last vertex back: `arriving` sums the contributions at this vertex and after.
     for (std::uint32_t depth = vertices; depth-- > 0;) {
       arriving += path.contribution(depth);
       const float leaving = leaving_luminance(arriving, path.throughput(depth));
@@ -30,13 +39,17 @@ struct deposit_path {
       if (found > 0 && depth > 0)
         learnt.write(first_found + depth - 1, path.field(depth - 1), path.direction(depth - 1), leaving);
     }
+    // Counting is atomic, and would order the look-ups of the writes above.
     for (std::uint32_t depth = 0; depth < surfaces; ++depth) cache.count(first + depth);
     for (std::uint32_t i = 0; i < found; ++i) learnt.count(first_found + i);
   }
 };
 
-/// Queues the radiance of every recorded vertex in the cache, tells fields what their directions found unless
-/// `learnt` is empty, and forgets the paths. O(paths * depth).
+/// Deposits every recorded path, then clears the recorder. Fields learn where `learnt` is not empty and the
+/// recorder has directions. Whatever exceeds the queues' capacity is dropped.
+///
+/// The cache and the fields change when they are updated. On a GPU the call returns before its kernel has
+/// run.
 template <class Exec>
 void deposit_paths(const Exec& exec, path_recorder<Exec>& recorder, const exitance_cache_view& cache,
                    const learnt_radiance_view& learnt = {}) {

@@ -1,61 +1,47 @@
-// Kept fields: incident radiance fields that live on across depths and samples, in slots under a byte budget,
-// keyed by (octree node, orientation). A slot remembers what each cell's cone hit, and what paths found along
-// its directions; a refresh reads the cache anew through those hits and casts only a part of the cones again.
-// Fields are the paper's (section 3.3), and their nodes are chosen as its bins are (Algorithm 2); that they
-// are kept and that they learn is wfpg's own.
+// Stores kept fields: incident radiance fields that stay across depths and samples, in slots under a byte
+// budget. Each is keyed by (octree node, orientation). A slot stores what each cell's cone hit, and what
+// paths found along its directions. A refresh reads the cache anew through those hits, and casts only a part
+// of the cones again.
 //
-// A sample:  begin_sample, then for each wave prepare, or find_and_serve where it would build none, then
-//            end_sample. Nothing is read back to the host with an inline caster.
+// Source: fields are those of Yalciner and Akyuz (2024), section 3.3. Nodes are chosen by its Algorithm 2.
+// Keeping fields and learning are wfpg's own.
 //
-// Cost of a wave of n rays: O(n · depth) look-ups; F² cones a new slot, F²/R a refreshed one; O(F²) either.
-// Memory: the budget, 4 bytes a ray, 8 bytes a leaf and 4 an inner node; where fields learn, in a sample, 16
-// bytes a cell and 8 a value.
+// A sample:  begin_sample, then for each wave prepare, or find_and_sample where it would build none, then
+//   end_sample. Nothing is read back to the host with an inline caster.
+//
+// Cost of a wave of n rays: O(n · depth) look-ups. A new slot casts F² cones, and a refresh F²/R; either
+// takes O(F²). Memory: the budget, 4 bytes a ray, 8 bytes a leaf and 4 an inner node. Where fields learn, a
+// sample takes 16 bytes a cell and 8 a value more.
 #pragma once
 
 #include <wfpg/bins/wave_rays.hpp>
-#include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/guide/statistics.hpp>
-#include <wfpg/guides/octree/detail/allot_slots.hpp>
+#include <wfpg/guides/octree/build_schedule.hpp>
 #include <wfpg/guides/octree/detail/bin_marks.hpp>
-#include <wfpg/guides/octree/detail/field_slots.hpp>
-#include <wfpg/guides/octree/detail/kept_field.hpp>
+#include <wfpg/guides/octree/detail/field_pool.hpp>
+#include <wfpg/guides/octree/detail/slot_table.hpp>
 #include <wfpg/guides/octree/guide_view.hpp>
-#include <wfpg/guides/octree/learnt_radiance.hpp>
-#include <wfpg/guides/octree/transient_fields.hpp>
-
-#include <thrust/fill.h>
-#include <thrust/functional.h>
-#include <thrust/transform_scan.h>
+#include <wfpg/guides/octree/kept_field.hpp>
+#include <wfpg/guides/octree/options.hpp>
 
 #include <vector>
 
 namespace wfpg {
 
-/// How fields are kept.
-struct kept_field_options {
-  std::uint32_t resolution = 24;  ///< cells along a field's side, in [2, 128]
-  std::uint32_t recast = 32;      ///< R: a refresh casts one cone in so many again, at least 1
-  std::size_t budget_bytes = std::size_t(24) << 20;  ///< of the slots; one takes about 10 F² bytes, or 8
-  bool learn = true;          ///< from paths: where path_recorder_view::scatter() is called, or by itself
-  float cone_samples = 1.0f;  ///< what a cell's cone counts for beside so many paths, positive and finite
-  std::uint64_t max_wave_cones =
-      detail::build_limits::none;   ///< cones of a wave; what would need more waits, or goes unguided
-  std::uint32_t idle_samples = 16;  ///< a slot that no ray used for so many is freed, at least 1
-};
-
-/// What fields are made for in one wave.
+/// Input of one wave: its rays, and how their fields are built.
 ///   Surfaces  (std::uint32_t ray) -> surface<Bsdf>
 template <class Surfaces>
 struct kept_field_wave {
   std::size_t ray_count = 0;                   ///< rays of the wave, at most max_rays
-  Surfaces surfaces;                           ///< where they are
-  exitance_cache_view cache;                   ///< what cones read
+  Surfaces surfaces;                           ///< where the rays have hit
+  exitance_cache_view cache;                   ///< read by cones
   field_options options;                       ///< filter and floor
-  guiding_mode mode = guiding_mode::oriented;  ///< what fields cover
-  float fraction = 0.7f;                       ///< of guided samples in the mixture
+  guiding_mode mode = guiding_mode::oriented;  ///< decides between hemispheres and spheres
+  float fraction = 0.7f;                       ///< of guided directions in the mixture
   std::uint64_t seed = 0;                      ///< of the sample and depth
-  product_points points;                       ///< P divides the store's resolution
-  depth_statistics* statistics = nullptr;      ///< on the device: the wave's counts are added; null: nowhere
+  product_points points;                       ///< of products; P divides the store's resolution
+  /// On the device: the wave's counts are added to it. Null: they are not counted.
+  depth_statistics* statistics = nullptr;
 };
 
 /// Owns the slots, in the memory of `Exec`. The octree must outlive it. Results do not depend on the number
@@ -63,137 +49,114 @@ struct kept_field_wave {
 template <class Exec>
 class field_store {
  public:
+  /// An empty store, which can only be assigned to.
   field_store() = default;
-  /// Serves waves of up to `max_rays` rays, and learns up to `max_values`, at most 2³¹, in a sample. Throws
-  /// out_of_memory; std::invalid_argument where an option is out of its range, or the octree has 2²⁸ nodes or
-  /// more.
+  /// Makes a store for waves of up to `max_rays` rays over one octree. Fields learn up to `max_values` values
+  /// in a sample, at most 2^31; 0: they do not learn.
+  ///
+  /// Throws out_of_memory. Throws std::invalid_argument where an option is out of its range, or the octree
+  /// has 2^28 nodes or more.
   field_store(const Exec& exec, const sparse_voxel_octree_view& tree, const binning_options& binning,
               const kept_field_options& options, std::size_t max_rays, std::size_t max_values = 0);
 
-  /// Begins a sample, counted from 1: frees slots that are no longer used.
+  /// Begins a sample, counted from 1. Frees the slots that no ray used for idle_samples samples. O(slots).
   void begin_sample(const Exec& exec, std::uint32_t sample);
 
-  /// Counts a wave's rays and guides none. `Rays`: (std::size_t) -> ray_to_bin.
+  /// Counts a wave's rays for bins, and guides none. For samples before guiding starts, so that bins are
+  /// known then. `Rays`: (std::size_t) -> ray_to_bin. O(n).
   template <class Rays>
   void count(const Exec& exec, std::size_t n, const Rays& rays) {
-    if (counts_rays()) exec.for_each(n, detail::count_rays<Rays>{rays, tree_, marks_.view(), counted()});
+    if (schedule_.counts_rays())
+      exec.for_each(n, detail::count_rays<Rays>{rays, tree_, marks_.view(), schedule_.counted()});
   }
 
-  /// Finds or makes the fields of a wave's rays, and refreshes those that are due; what kernels sample from,
-  /// until the next call. A ray without room for its field has its nearest ancestor's, or none. After 32
-  /// samples little is left to make: one wave in 8 does then, but for 4 samples after nodes were chosen anew,
-  /// and the others use what there is. A batch caster gets at most `caster_buffer_bytes` of cones at once,
-  /// and the host reads how many fields are built. Throws std::invalid_argument beyond max_rays, or where P
-  /// does not divide; what a caster throws, and then the wave's fields are built again.
+  /// Finds or makes the fields of a wave's rays, and refreshes those that are due. Returns what kernels
+  /// sample from, until the next call. A ray without room for its field has its nearest ancestor's, or none.
+  /// build_schedule decides which waves build.
+  ///
+  /// A batch caster gets at most `caster_buffer_bytes` of cones at once, but at least one field's. The host
+  /// then reads how many fields are built.
+  ///
+  /// Throws std::invalid_argument beyond max_rays, or where P does not divide the resolution. Throws what the
+  /// caster throws; the wave's fields are then built again.
   template <class Surfaces, class Caster>
   guide_view prepare(const Exec& exec, const kept_field_wave<Surfaces>& wave, const Caster& caster,
                      std::size_t caster_buffer_bytes);
 
   /// Whether the next wave makes or refreshes fields.
-  bool builds_in_wave() const { return sample_ <= busy_until_ || (sample_ + waves_) % turns == 0; }
-  /// Finds the fields of a wave's rays, makes none, and draws from those that there are in the same pass:
-  ///   Serve  (std::size_t ray, std::uint32_t field), the number of one of fields(), or no_field
-  /// For waves in which prepare() would make none either. Throws std::invalid_argument beyond max_rays, or
-  /// where P does not divide.
-  template <class Surfaces, class Serve>
-  void find_and_serve(const Exec& exec, const kept_field_wave<Surfaces>& wave, const Serve& serve);
-  /// All fields, with a wave's points for products.
-  resident_fields fields(const product_points& points) const {
-    return {fields_.data(), words_.data(), options_.resolution, points};
-  }
+  bool builds_in_wave() const { return schedule_.builds_in_wave(); }
+  /// Finds the fields of a wave's rays and samples them in one pass; makes no field.
+  ///   Sampler  (std::size_t ray, std::uint32_t field), the number of one of fields(), or no_field
+  ///
+  /// For waves in which prepare() would build none: builds_in_wave() is false. One pass stores no field
+  /// numbers. Throws std::invalid_argument beyond max_rays, or where P does not divide the resolution.
+  template <class Surfaces, class Sampler>
+  void find_and_sample(const Exec& exec, const kept_field_wave<Surfaces>& wave, const Sampler& sampler);
+  /// All fields, with a wave's points for products. Valid until the next wave is prepared.
+  resident_fields fields(const product_points& points) const { return pool_.view(points); }
 
-  /// Where the sample's paths tell what they found; empty where fields do not learn.
-  learnt_radiance_view learnt() const {
-    if (!learns()) return {};
-    return {array_view<const resident_field>(fields_.data(), capacity_), options_.resolution, queue_.view()};
-  }
+  /// Where kernels deposit what the sample's paths found; empty where fields do not learn.
+  learnt_radiance_view learnt() const { return pool_.learnt(); }
 
-  /// Ends the sample: fields learn, unless nothing was `told` to learnt(); after samples 1, 2, 4, 8, ...
-  /// chooses the nodes anew by the rays counted so far.
-  void end_sample(const Exec& exec, bool told = true);
+  /// Ends the sample. Fields learn if anything was `recorded` in learnt(). After samples 1, 2, 4, 8, ...
+  /// chooses bins anew by the rays counted so far. O(cells of fields used + values), and O(nodes) where bins
+  /// are chosen.
+  void end_sample(const Exec& exec, bool recorded = true);
 
-  /// Forgets what fields learnt.
-  void forget(const Exec& exec) {
-    exec.fill_bytes(learnt_.data(), 0, learnt_.bytes());
-    if (learns()) queue_.clear(exec);
-  }
+  /// Forgets what fields learnt. Hits and distributions stay: a field changes when it is built next.
+  void forget(const Exec& exec) { pool_.forget(exec); }
 
-  /// Geometry moved inside `bounds`, or light in a way that hits do not tell: fields from which they may be
-  /// seen are cast anew when they are next used, or within 8 samples after 32 more. Light that changes on
-  /// surfaces needs no call.
+  /// Call after geometry moved inside `bounds`, or light changed in a way that hits do not see. Fields that
+  /// may see it cast all their cones when they are next used. Light that changes on surfaces needs no call.
   void invalidate(const Exec& exec, const bounds3& bounds) {
-    expect_builds(32);
-    exec.for_each(capacity_, detail::invalidate_fields{view(), fields_.data(), tree_, bounds});
+    schedule_.expect_builds(build_schedule_constants::invalidated_samples);
+    exec.for_each(table_.size(), invalidate_fields{table_.view(), pool_.fields(), tree_, bounds});
   }
-  /// The same everywhere.
+  /// Call after geometry moved anywhere: all fields cast all their cones when they are next used.
   void invalidate_all(const Exec& exec) { invalidate(exec, {vec3(-1.0e18f), vec3(1.0e18f)}); }
 
-  /// On the device.
-  const detail::field_store_state* state() const { return state_.data(); }
-  /// Of the last wave, on the device.
-  const detail::field_wave_counts* last_wave() const { return other_counts(); }
-  /// Cones of a refresh.
-  std::uint32_t refresh_cones() const { return detail::refresh_cones(options_.resolution, options_.recast); }
-  /// Waits for the work before it.
+  /// Counters of the store, in the policy's memory.
+  const field_store_state* state() const { return table_.state(); }
+  /// Counters of the last wave, in the policy's memory. Valid until the next wave begins.
+  const field_wave_counts* last_wave() const { return other_counts(); }
+  /// Number of cones that one refresh of a field casts: F² / R, rounded up.
+  std::uint32_t refresh_cones() const { return wfpg::refresh_cones(options_.resolution, options_.recast); }
+  /// Counters since the store was made, and the slots in use. Waits for the work before it.
   kept_field_statistics statistics(const Exec& exec) const;
-  /// A slot: node · orientations + orientation of its field, 0xffffffff where it is free. Waits for the work
-  /// before it.
+  /// Key of each slot's field: node * orientations + orientation; 0xffffffff where the slot is free. Waits
+  /// for the work before it.
   std::vector<std::uint32_t> keys(const Exec& exec) const;
-  /// Of the slots and all that finds them.
-  std::size_t slot_bytes() const;
-  /// Of what decides the level: running counts and bins.
+  /// Bytes of all slots, their fields, and the table that finds them. At most the budget, where it holds a
+  /// slot.
+  std::size_t slot_bytes() const { return table_.bytes() + pool_.bytes(); }
+  /// Bytes of running ray counts and of each leaf's bin.
   std::size_t level_bytes() const { return marks_.bytes(); }
-  /// Of a wave in flight.
-  std::size_t wave_bytes() const { return field_of_ray_.bytes() + counts_.bytes() + state_.bytes(); }
+  /// Bytes needed while a wave is in flight: 4 a ray, and counters.
+  std::size_t wave_bytes() const { return field_of_ray_.bytes() + counts_.bytes() + table_.state_bytes(); }
+  /// Bytes of the queue of values that one sample learns; 0 where fields do not learn.
+  std::size_t value_bytes() const { return pool_.value_bytes(); }
 
-  /// Of what a sample learns.
-  std::size_t value_bytes() const { return queue_.bytes(); }
-
-  /// Bytes of the budget that one slot takes at a resolution.
+  /// Bytes of the budget that one slot takes, with fields of `resolution`² cells. `learns`: with a 2-byte
+  /// mean in each cell.
   static std::size_t bytes_a_slot(std::uint32_t resolution, bool learns = true) {
-    const std::size_t cells = std::size_t(resolution) * resolution;
-    const std::size_t a_cell = sizeof(cone_hit) + (learns ? sizeof(rough_mean) : 0);
-    return a_cell * cells + sizeof(detail::field_slot) + sizeof(resident_field) +
-           (grid_distribution::words(resolution) + words_a_slot) * sizeof(std::uint32_t);
+    return detail::field_pool<Exec>::bytes_a_field(resolution, learns) + sizeof(field_slot) +
+           detail::slot_table<Exec>::words_a_slot * sizeof(std::uint32_t);
   }
 
  private:
-  friend struct detail::store_state;
-
-  // Through-counts (2), list of builds (2), free list, what is settled, and at most 4 entries each of the
-  // table (2) and of wanted keys with their own through-counts.
-  static constexpr std::size_t words_a_slot = 2 + 2 + 1 + 1 + 8 + 4 + 4;
+  friend struct detail::kept_state;
 
   static const kept_field_options& checked(const kept_field_options& options, std::uint32_t nodes);
   static kept_field_options completed(kept_field_options options, std::size_t max_values);
-  detail::field_slots_view view() const { return {slots_.view(), table_.data(), mask(), settled_.data()}; }
-  detail::wanted_keys wanted() const {
-    return {wanted_.data(), static_cast<std::uint32_t>(wanted_.size() - 1)};
-  }
-  // Once there is little to build, waves take turns: one field keeps a GPU as long as a hundred.
-  static constexpr std::uint32_t turns = 8;
-  // Bins that are chosen anew ask for fields that are not there yet: in so many samples all waves make some.
-  static constexpr std::uint32_t busy_samples = 4;
-  void expect_builds(std::uint32_t samples) { busy_until_ = max(busy_until_, sample_ + samples); }
-  bool learns() const { return learnt_.size() > 0; }
   bool limits_builds() const { return options_.max_wave_cones != detail::build_limits::none; }
-  std::uint32_t cells_a_field() const { return options_.resolution * options_.resolution; }
-  std::uint32_t words_a_field() const { return grid_distribution::words(options_.resolution); }
   // Of the wave that is made, and of the one before or after it.
-  detail::field_wave_counts* counts() { return counts_.data() + waves_ % 2; }
-  detail::field_wave_counts* other_counts() const { return counts_.data() + (waves_ + 1) % 2; }
-  // Counts settle soon, and sooner where a leaf has many rays of a wave.
-  bool counts_rays() const { return sample_ <= 8 || sample_ % (sample_ <= 32 ? 4 : 16) == 0; }
-  detail::counted_rays counted() const {
-    if (!counts_rays()) return {0, 0};
-    return {stride_, sample_ % stride_};
-  }
-  std::uint32_t mask() const { return static_cast<std::uint32_t>(table_.size() - 1); }
+  field_wave_counts* counts() { return counts_.data() + schedule_.wave() % 2; }
+  field_wave_counts* other_counts() const { return counts_.data() + (schedule_.wave() + 1) % 2; }
 
   template <class Surfaces>
   void begin_wave(const Exec& exec, const kept_field_wave<Surfaces>& wave);
   void end_wave() {
-    ++waves_;
+    schedule_.end_wave();
     in_wave_ = false;
   }
   template <class Surfaces>
@@ -201,41 +164,22 @@ class field_store {
                                                  detail::wanted_builds wanted_now);
   template <class Surfaces>
   void find(const Exec& exec, const kept_field_wave<Surfaces>& wave);
-  void bear(const Exec& exec);
-  void learn(const Exec& exec);
-  void list(const Exec& exec, std::uint64_t seed, const detail::build_list& builds);
   template <class Builder, class Caster>
   void build(const Exec& exec, const Builder& builder, const Caster& caster, std::size_t buffer_bytes);
   template <class Builder, class Caster>
   void build_batches(const Exec& exec, const Builder& builder, const Caster& caster, bool whole,
                      std::size_t count, array_view<ray> cones, array_view<ray_hit> hits);
-  const std::uint32_t* listed(bool whole) const { return list_.data() + (whole ? 0 : capacity_); }
 
   sparse_voxel_octree_view tree_;
   kept_field_options options_;
-  std::size_t capacity_ = 0;  // slots
-  std::uint32_t sample_ = 0;
-  std::uint32_t counted_samples_ = 0;
-  std::uint32_t stride_ = 1;       // of the rays that are counted
-  std::uint32_t waves_ = 0;        // of the sample
-  std::uint32_t busy_until_ = 32;  // sample
-  bool in_wave_ = false;           // also after one whose caster threw
-  bool adapted_ = false;           // bins to this sample: not twice where its end is made again
+  build_schedule schedule_;
   detail::bin_marks<Exec> marks_;
-  buffer<detail::field_slot, Exec> slots_;
-  buffer<resident_field, Exec> fields_;  // a slot
-  buffer<std::uint32_t, Exec> words_;    // a slot: its distribution
-  buffer<cone_hit, Exec> hits_;          // a slot: its cells
-  buffer<rough_mean, Exec> learnt_;      // the same, where fields learn
-  detail::value_queue<Exec> queue_;
-  buffer<std::uint64_t, Exec> table_;
-  buffer<std::uint8_t, Exec> settled_;
-  buffer<std::uint32_t, Exec> wanted_, wanted_through_;
-  buffer<std::uint32_t, Exec> free_slots_, list_;  // list: to cast whole, then to refresh
-  buffer<std::uint64_t, Exec> through_;            // a slot: scans
+  detail::slot_table<Exec> table_;
+  detail::field_pool<Exec> pool_;
   buffer<std::uint32_t, Exec> field_of_ray_;
-  buffer<detail::field_store_state, Exec> state_;
-  buffer<detail::field_wave_counts, Exec> counts_;
+  buffer<field_wave_counts, Exec> counts_;
+  bool in_wave_ = false;  // also after one whose caster threw
+  bool adapted_ = false;  // bins to this sample: not twice where its end is made again
 };
 
 }  // namespace wfpg

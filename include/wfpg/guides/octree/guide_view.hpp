@@ -1,7 +1,13 @@
-// The fields of one depth of a wave, as the renderer's own kernels see them: for renderers whose BSDFs exist
-// only inside their material kernels. Made by path_guider::prepare, from kept fields or from transient ones
-// that were made resident; the fused form draws the same directions from the same random numbers, but for
-// rounding where a compiler contracts the arithmetic of two kernels differently, as nvcc does.
+// The fields of one depth of a wave, as a renderer's own kernels see them. For renderers whose BSDFs exist
+// only inside their material kernels. path_guider::prepare returns it, over kept fields or over transient
+// ones that were made resident.
+//
+// The fused form draws the same directions from the same random numbers. They differ by rounding where a
+// compiler contracts the arithmetic of two kernels differently, as nvcc does.
+//
+// Source: Yalciner and Akyuz (2024), sections 3.5 and 3.6. Cost: O(log F) a direction and O(1) a density, and
+// the BSDF. Products: P^2 to 2 P^2 evaluations of the BSDF a ray. Memory: 16 bytes and 4 (F^2 + F) a field, 4
+// bytes a ray.
 #pragma once
 
 #include <wfpg/base/types.hpp>
@@ -10,37 +16,46 @@
 
 namespace wfpg {
 
-/// What a field in memory is, beside its distribution. One load.
+/// Frame and fraction of a field in memory, beside its distribution. 16 bytes, so that a kernel reads it in
+/// one load.
 struct alignas(16) resident_field {
-  vec3 normal{0.0f};      ///< of the hemisphere that it covers, unit length; zero: it covers the sphere
-  float fraction = 0.0f;  ///< of guided samples in the mixture; 0: not there yet, and guides nothing
+  /// Of the hemisphere that the field covers, unit length; zero: it covers the sphere.
+  vec3 normal{0.0f};
+  /// Fraction of guided directions in the mixture, in [0, 1]. 0: the field is not built, and guides nothing.
+  float fraction = 0.0f;
 
-  /// Whether it covers a hemisphere.
+  /// True: the field covers a hemisphere; false: the sphere.
   WFPG_HD bool hemisphere() const { return normal.x != 0.0f || normal.y != 0.0f || normal.z != 0.0f; }
 };
 
-/// Fields in memory: what each is, and its distribution.
+/// Fields in memory, with their distributions. Trivially copyable.
 struct resident_fields {
-  const resident_field* fields = nullptr;  ///< a field: what it is
-  const std::uint32_t* words = nullptr;    ///< of the distributions, one after the other
-  std::uint32_t resolution = 0;            ///< F
-  product_points points;                   ///< of this wave
+  /// One entry a field: frame and fraction.
+  const resident_field* fields = nullptr;
+  /// Distributions, one after the other, grid_distribution::words(F) words each.
+  const std::uint32_t* words = nullptr;
+  std::uint32_t resolution = 0;  ///< F: cells along a field's side
+  /// Where this wave's products evaluate BSDFs; a P of 0: no products.
+  product_points points;
 
-  /// What field i is; no_field guides nothing.
+  /// Returns frame and fraction of field `i`. no_field has fraction 0. Precondition: i is in range, or
+  /// no_field.
   WFPG_HD resident_field info(std::uint32_t i) const { return i == no_field ? resident_field{} : fields[i]; }
-  /// fields[i] and its distribution.
+  /// Returns field `i` for sampling. `what`: info(i), which the caller has read already.
   WFPG_HD directional_field field(std::uint32_t i, const resident_field& what) const {
     const grid_distribution grid(words + std::size_t(i) * grid_distribution::words(resolution), resolution);
     return what.hemisphere() ? directional_field(grid, what.normal) : directional_field(grid);
   }
-  /// The mixture of field i and a BSDF, without products; where the field guides nothing, the BSDF alone.
+  /// Mixture of field `i` and a BSDF, without products. Where the field guides nothing, the BSDF alone.
   WFPG_HD guide_mixture mixture(std::uint32_t i) const {
     const resident_field what = info(i);
     if (!(what.fraction > 0.0f)) return {};
     return {field(i, what), what.fraction, i};
   }
-  /// The mixture of its product and the BSDF: P² to 2 P² evaluations of the BSDF into `weights`, P² of them,
-  /// which it reads as long as it lives. Precondition: points.resolution > 0.
+  /// Mixture of the BSDF and of its product with field `i`. Evaluates the BSDF P² to 2 P² times.
+  ///
+  /// `weights`: room for P² words, which the mixture reads as long as it lives. Precondition:
+  /// points.resolution > 0.
   template <class Bsdf>
   WFPG_HD product_mixture product(std::uint32_t i, const surface<Bsdf>& s, std::uint32_t* weights) const {
     const resident_field what = info(i);
@@ -49,37 +64,41 @@ struct resident_fields {
   }
 };
 
-/// Trivially copyable; holds until the guider's next call. Rays are the wave's. With products each ray draws
-/// from its field times its BSDF.
+/// Samples directions for the rays of one wave, by ray number. Trivially copyable; valid until the guider's
+/// next call. With products, each ray samples its field times its BSDF.
 class guide_view {
  public:
+  /// A view that guides no ray: each ray samples its BSDF.
   guide_view() = default;
-  /// `field_of_ray`: a ray's number among the fields, or no_field.
+  /// `field_of_ray`: the number of each ray's field, or no_field. `fields`: those fields.
   WFPG_HD guide_view(array_view<const std::uint32_t> field_of_ray, const resident_fields& fields)
       : field_of_ray_(field_of_ray), fields_(fields) {}
 
-  /// Whether the ray has a field; without one it is its BSDF's.
+  /// Whether the ray has a field that guides. Without one, it samples its BSDF alone. O(1).
   WFPG_HD bool guides(std::uint32_t ray) const { return fields_.info(number(ray)).fraction > 0.0f; }
-  /// The ray's number among fields(), or no_field.
+  /// Number of the ray's field among fields(), or no_field. A ray beyond the wave has none.
   WFPG_HD std::uint32_t number(std::uint32_t ray) const {
     return ray < field_of_ray_.size() ? field_of_ray_[ray] : no_field;
   }
-  /// What rays draw from.
+  /// The fields that rays sample.
   WFPG_HD const resident_fields& fields() const { return fields_; }
 
   /// P, or 0 without products.
   WFPG_HD std::uint32_t product_resolution() const { return fields_.points.resolution; }
 
-  /// The ray's mixture of field and BSDF, without products; of a ray without field, the BSDF alone.
+  /// Mixture of a ray's field and BSDF, without products. A ray without a field samples its BSDF alone.
   WFPG_HD guide_mixture mixture(std::uint32_t ray) const { return fields_.mixture(number(ray)); }
-  /// The ray's mixture of product and BSDF: P² to 2 P² evaluations of the BSDF into `words`, P² of them,
-  /// which it reads as long as it lives. Precondition: product_resolution() > 0.
+  /// Mixture of a ray's BSDF and product. Evaluates the BSDF P² to 2 P² times. A caller that samples and
+  /// evaluates keeps it, instead of making it twice.
+  ///
+  /// `words`: P² of them, read as long as the mixture lives. Precondition: product_resolution() > 0.
   template <class Bsdf>
   WFPG_HD product_mixture product(std::uint32_t ray, const surface<Bsdf>& s, std::uint32_t* words) const {
     return fields_.product(number(ray), s, words);
   }
 
-  /// A direction and its density from the field alone. Precondition: guides(ray).
+  /// Samples a direction from the field alone, without the BSDF. `u`: in [0, 1)². The density is the field's.
+  /// Precondition: guides(ray).
   WFPG_HD sampled_direction sample(std::uint32_t ray, vec2 u) const {
     sampled_direction result;
     result.direction = mixture(ray).field.sample(u, result.pdf);
@@ -87,17 +106,21 @@ class guide_view {
     result.field = number(ray);
     return result;
   }
-  /// The field's density of a unit direction, per steradian. Precondition: guides(ray).
+  /// Density of a unit direction under the field alone, per steradian. Precondition: guides(ray).
   WFPG_HD float pdf(std::uint32_t ray, vec3 direction) const { return mixture(ray).field.pdf(direction); }
 
-  /// A direction of the mixture with the surface's BSDF, and the mixture's density. With products each call
-  /// makes the ray's anew, in 1 KiB of the thread's own; who calls twice keeps product().
+  /// Samples a direction from the mixture with the surface's BSDF. Its density is the whole mixture's.
+  /// `u_technique` in [0, 1) chooses the technique, and `u` in [0, 1)² the direction.
+  ///
+  /// With products each call makes the ray's product anew, in 1 KiB of the thread's local memory. Keep
+  /// product() instead where two calls are needed.
   template <class Bsdf>
   WFPG_HD sampled_direction sample(std::uint32_t ray, const surface<Bsdf>& s, float u_technique,
                                    vec2 u) const {
     return with_mixture(ray, s, [&](const auto& mixture) { return mixture.sample(s, u_technique, u); });
   }
-  /// The mixture's density of a unit direction, per steradian.
+  /// Density of a unit direction under the mixture, per steradian; 0 on delta BSDFs. With products it costs
+  /// as much as a sample.
   template <class Bsdf>
   WFPG_HD float pdf(std::uint32_t ray, const surface<Bsdf>& s, vec3 direction) const {
     return with_mixture(ray, s, [&](const auto& mixture) { return mixture.pdf(s, direction); });

@@ -1,43 +1,52 @@
-// What paths found along the directions of kept fields, cell by cell: running means beside what the cells'
-// cones see in the cache. A path tells what cones cannot: light that depends on the direction it leaves a
-// surface in, what a mirror shows, an emitter smaller than a voxel. That fields learn is wfpg's own; that
-// they are means of radiance by direction is as in Mueller et al., "Practical Path Guiding" (2017).
+// Learns what paths found along the directions of kept fields, cell by cell. Running means are kept beside
+// what the cells' cones see in the cache. A path finds what cones cannot: light that depends on the outgoing
+// direction, what a mirror shows, an emitter smaller than a voxel.
 //
-// Memory: 2 bytes a cell; in a sample 16 a cell and 8 a value.
+// Source: means of radiance by direction are those of Mueller et al., "Practical Path Guiding" (2017). That
+// these fields learn is wfpg's own.
+//
+// Cost: O(1) a deposit. Memory: 2 bytes a cell; in a sample 16 a cell and 8 a value.
 #pragma once
 
 #include <wfpg/exec/support/running_mean.hpp>
 #include <wfpg/exec/support/value_queue.hpp>
-#include <wfpg/guides/octree/detail/field_slots.hpp>
 #include <wfpg/guides/octree/guide_view.hpp>
 
 namespace wfpg {
 
-/// Where kernels tell kept fields what their directions found. Trivially copyable; an empty one learns
-/// nothing.
+/// Records radiance that directions found, for kept fields to learn. Trivially copyable. An empty view drops
+/// everything. Any number of threads may call it at once; results do not depend on their order.
 class learnt_radiance_view {
  public:
+  /// An empty view.
   learnt_radiance_view() = default;
-  /// Of fields of `resolution`² cells.
+  /// View of fields of `resolution`² cells. `fields`: one entry a slot. `queue`: its keys are the cells of
+  /// all slots.
   WFPG_HD learnt_radiance_view(array_view<const resident_field> fields, std::uint32_t resolution,
                                const detail::value_queue_view& queue)
       : fields_(fields), resolution_(resolution), queue_(queue) {}
 
-  /// Whether nothing is learnt.
+  /// Whether it has no fields to record for.
   WFPG_HD bool empty() const { return resolution_ == 0; }
 
-  /// Radiance (luminance, W/(m² sr)) that arrives along a unit direction where `field` was drawn from or
-  /// asked: sampled_direction::field, of this sample. Seen by fields that are built after the sample. What is
-  /// negative or not finite, of no field, outside of it, or does not fit the queue is dropped.
+  /// Queues radiance (luminance, W/(m² sr)) that arrives along a unit direction. `field`:
+  /// sampled_direction::field of this sample, where the direction was sampled or evaluated. Fields that are
+  /// built after the sample use it.
+  ///
+  /// Drops radiance that is negative or not finite, unknown fields, and directions outside a field's
+  /// hemisphere. Drops what exceeds the queue's capacity. Radiance is clamped to 1e30.
   WFPG_HD void deposit(std::uint32_t field, vec3 direction, float radiance) const {
     const std::uint32_t entry = reserve(1);
     write(entry, field, direction, radiance);
     count(entry);
   }
 
-  /// The same for several of one thread, as of exitance_cache_view.
+  /// Reserves `n` entries in a row and returns the first, for a thread with several values. Each entry must
+  /// be written, then each counted. Writing first lets a processor overlap look-ups, which counting's atomics
+  /// would order. An entry may lie beyond the capacity: write() and count() then do nothing.
   WFPG_HD std::uint32_t reserve(std::uint32_t n) const { return queue_.reserve(n); }
-  /// Writes an entry of reserve(), as deposit() does.
+  /// Writes one reserved entry: `radiance` that arrives along `direction`. Values that deposit() drops become
+  /// empty entries.
   WFPG_HD void write(std::uint32_t entry, std::uint32_t field, vec3 direction, float radiance) const {
     if (!queue_.fits(entry)) return;
     std::uint32_t cell;
@@ -46,11 +55,12 @@ class learnt_radiance_view {
     else
       queue_.drop(entry);
   }
-  /// Counts an entry that is written.
+  /// Counts a reserved entry, after it was written. Call it once an entry.
   WFPG_HD void count(std::uint32_t entry) const { queue_.count(entry); }
 
  private:
-  /// The cell, among those of all fields.
+  /// Finds the cell of a direction, numbered over all fields: field * F² + row-major index. False outside the
+  /// field.
   WFPG_HD bool find(std::uint32_t field, vec3 direction, std::uint32_t& cell) const {
     if (field >= fields_.size()) return false;
     const grid_distribution grid(nullptr, resolution_);
@@ -68,28 +78,4 @@ class learnt_radiance_view {
   detail::value_queue_view queue_;
 };
 
-namespace detail {
-
-/// Adds what the cells of the fields in use have received to their means; a field a block.
-struct fold_learnt {
-  array_view<field_slot> slots;
-  std::uint32_t sample;
-  std::uint32_t cells;  // of a field; all together fewer than 2³²
-  value_queue_view queue;
-  rough_mean* means;
-
-  template <class Block>
-  WFPG_HD void operator()(Block& block, std::size_t slot) const {
-    if (slots[slot].last_used != sample) return;
-    const std::size_t first = slot * cells;
-    block.for_each(static_cast<int>(cells), [&](int i) {
-      const std::size_t cell = first + static_cast<std::size_t>(i);
-      double sum;
-      const std::uint32_t n = queue.take(cell, sum);
-      if (n > 0) means[cell].add(sum, n, hash32(sample, static_cast<std::uint32_t>(cell)));
-    });
-  }
-};
-
-}  // namespace detail
 }  // namespace wfpg

@@ -1,24 +1,29 @@
-// A guide that knows where light comes from before the first path: records of the light that arrives at
-// voxels, by direction, which cones through the octree gather from emitters and from what they light directly
-// (Jhang & Chang, "An Unbiased Hybrid Rendering Approach to Path Guiding"). It learns nothing from paths.
+// A guide that knows where light comes from before the first path, and learns nothing from paths. Records
+// hold the light that arrives at voxels, by direction. Cones through the octree gather it from emitters, and
+// from the surfaces that emitters light directly.
 //
 //   wfpg::irradiance_records_options options;
 //   options.max_rays = paths;
 //   const wfpg::lit_scene<> scene{mesh, emitters};
 //   wfpg::path_guider<Exec, wfpg::irradiance_records<Exec>> guider(exec, scene, options);
 //
-// Records are built with the first wave that is guided, by the caster that comes with it, and again with the
-// first guided one after forget_light(), invalidate() or invalidate_all(): for lights that moved, the host
-// changes `emitters` where they lie. Rays from emitters are cast, and tag the voxels that they meet; voxels
-// lit by way of smooth surfaces, caustics, count as lit where the host says how light goes on there. All
-// other light is that which voxels are known to send, so what is lit indirectly is dark. Where light leaves
-// the octree, rays from beyond the scene ask the caster for the environment.
+// The first guided wave builds the records, with its caster. The first guided wave after forget_light(),
+// invalidate() or invalidate_all() builds them again. To move lights, the host changes the array `emitters`
+// in place and calls forget_light().
 //
-// Memory: 64 bytes a record and 48 for sums of it, 82 KiB for cosines; of the octree and its tags 11 a leaf,
-// 12 an inner node. While it builds 40 a leaf, 24 a node, 44 a ray in flight (2^16 of them), 512 a record
-// (4096 of them). Time: `emitter_rays` rays, with smooth surfaces one for each bounce more, 2048 for the
-// environment, and 128 `cones_per_direction` cones a record. Directions: some 100 integer operations each,
-// and 200 more where the normal is not that of most of the record; a density beside one, a few.
+// Building casts rays from emitters, which tag the voxels that they meet as lit. Caustics are voxels lit by
+// way of smooth surfaces. They count where the host says how light goes on there. Only emission and direct
+// illumination are stored; indirect light is missing. Cones that leave the octree gather the environment,
+// which rays from beyond the scene ask the caster for.
+//
+// Source: Jhang & Chang, "An Unbiased Hybrid Rendering Approach to Path Guiding"; docs/guides.md lists what
+// differs.
+// Cost: to build, `emitter_rays` rays and one more for each smooth bounce, 2048 rays for the environment, and
+// 128 `cones_per_direction` cones a record. A direction takes some 100 integer operations, and 200 more where
+// the normal is not that of most of the record. A density beside it takes a few.
+// Memory: 64 bytes a record and 48 for its row sums, 82 KiB for cosines. The octree and its tags take 11 a
+// leaf and 12 an inner node. While it builds, 40 a leaf and 24 a node. Also 44 for each of at most 2^16 rays
+// in flight, and 512 for each of at most 4096 records.
 #pragma once
 
 #include <wfpg/exec/buffer.hpp>
@@ -37,43 +42,48 @@
 
 namespace wfpg {
 
-/// Triangles and the emitters among them, in the policy's memory, and how light goes on at smooth surfaces:
+/// The scene of irradiance_records: surfaces, the emitters among them, and what smooth surfaces do to light.
+/// Smooth is a functor that kernels call, by value:
 ///   smooth_bounce operator()(std::uint32_t i, const ray& r, float distance, vec2 u) const;
-/// called in kernels, by value. Light came along `r`, the i-th of the rays that were cast together, and met a
-/// surface at `distance`. The host finds out what is there, by a ray of its own or by what its batch caster
-/// wrote down for i, and says where light goes on, by u in [0,1)² where there is a choice.
+/// Light came along `r` and met a surface at `distance`. The functor finds the surface with a ray of its own,
+/// or in what the host's batch caster stored for ray `i` of that cast. It returns where light goes on, and
+/// chooses by `u` in [0,1)² where there are several ways.
 template <class Smooth = no_smooth_surfaces>
 struct lit_scene {
-  triangle_mesh_view mesh;  ///< all surfaces, emitters too; read by the constructor only
-  array_view<const emitting_triangle> emitters{};  ///< read whenever records are built
-  Smooth smooth{};                                 ///< how light goes on
+  triangle_mesh_view mesh;  ///< all surfaces, emitters too; only the constructor reads it
+  /// Emitters, in the policy's memory, which must outlive the guider. Read whenever records are built.
+  array_view<const emitting_triangle> emitters{};
+  Smooth smooth{};  ///< what smooth surfaces do to light; default: all surfaces are rough
 };
 
-/// What building records took and found.
+/// Statistics of building records. All but `builds` and `records` are of the last build.
 struct irradiance_records_statistics {
-  std::uint32_t builds = 0;        ///< so far; what follows is of the last one
-  double seconds = 0.0;            ///< until it was done
-  std::uint64_t rays = 0;          ///< cast, those for the environment too
-  std::uint64_t cones = 0;         ///< through the octree
-  std::uint32_t records = 0;       ///< in memory
-  std::uint32_t objects = 0;       ///< voxels that are only that
-  std::uint32_t lights = 0;        ///< voxels that emit
-  std::uint32_t directly_lit = 0;  ///< other voxels that emitters light
+  std::uint32_t builds = 0;        ///< builds so far
+  double seconds = 0.0;            ///< host time of the build, which waits for the device
+  std::uint64_t rays = 0;          ///< rays cast, including those for the environment
+  std::uint64_t cones = 0;         ///< cones traced through the octree
+  std::uint32_t records = 0;       ///< records in memory
+  std::uint32_t objects = 0;       ///< voxels with surface that are neither of the following
+  std::uint32_t lights = 0;        ///< voxels with an emitter
+  std::uint32_t directly_lit = 0;  ///< voxels without emitter that light from one reached
 };
 
-/// What a wave's rays draw from. Trivially copyable; holds until the guider's next call.
+/// View of the records for kernels, from which rays sample. Trivially copyable. Valid until the guider's next
+/// call. mixture_view adds sample() and pdf().
 class irradiance_records_view : public mixture_view<irradiance_records_view> {
  public:
+  /// A view that guides nothing.
   irradiance_records_view() = default;
 
-  /// Whether a surface is guided: it lies in a node that has a record, or in a voxel beside one. Without it
-  /// is its BSDF's.
+  /// Whether a surface is guided: it lies in a node that has a record, or in a voxel beside a leaf. If not,
+  /// its rays sample the BSDF alone. Descends the octree: O(record_level), or O(depth) beside a leaf.
   template <class Bsdf>
   WFPG_HD bool guides(const surface<Bsdf>& s) const {
     return fraction_ > 0.0f && can_be_guided(s) && record(s.position) != nullptr;
   }
 
-  /// The mixture at a surface, whatever the ray; of one that is not guided, the BSDF alone.
+  /// Returns the mixture of record and BSDF at a surface; the BSDF alone where the surface is not guided. It
+  /// does not depend on the ray.
   template <class Bsdf>
   WFPG_HD basic_guide_mixture<detail::record_distribution> mixture(std::uint32_t,
                                                                    const surface<Bsdf>& s) const {
@@ -81,23 +91,27 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
     return {distribution(s.position, facing_normal(s), s.bsdf.transmits()), fraction_, no_field};
   }
 
-  /// What is drawn at a place with a normal on the side of the light: the record times the cosine; where
-  /// light comes from both sides, the record alone. Empty where there is none, or no light.
+  /// Returns the distribution of directions at a position, world space: the record times the cosine to
+  /// `normal`. That is of unit length and points to the side that light comes from. If the surface
+  /// `transmits`, light comes from both sides and the distribution is the record alone. Empty where there is
+  /// no record, or no light in it.
   WFPG_HD detail::record_distribution distribution(vec3 position, vec3 normal, bool transmits) const {
     const std::uint32_t at = index(position);
     if (at == none) return {};
     const std::uint32_t above = transmits ? normals_.size() : normals_.index(glm::normalize(normal));
+    // Row sums are stored above one normal, that of the record's surfaces; above others they are summed here.
     const detail::record_rows& known = rows_[at];
     return {records_ + at, cosines_ + above,
             known.normal == above ? known : detail::record_rows(records_[at], floor_, cosines_, above)};
   }
 
-  /// The record of a place, in the policy's memory; null far from all surface.
+  /// Returns the record at a position, in the policy's memory; null far from all surface.
   WFPG_HD const irradiance_record* record(vec3 position) const {
     const std::uint32_t at = index(position);
     return at == none ? nullptr : records_ + at;
   }
-  /// What the voxel is that a point lies in. As of the last build; before it no voxel is known to be lit.
+  /// Returns the tag of the voxel that a position lies in, as of the last build. Before the first build,
+  /// voxels with surface are `object`.
   WFPG_HD voxel_tag tag(vec3 position) const {
     const node_id leaf = tree_.leaf_at(position);
     return leaf == invalid_node ? voxel_tag::empty : tags_[leaf - tree_.first_leaf()];
@@ -109,7 +123,7 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
 
   static constexpr std::uint32_t none = 0xffffffffu;
 
-  /// Of the record of a place.
+  /// Index of the record at a position, or `none`: of the node around it, else of the nearest leaf's.
   WFPG_HD std::uint32_t index(vec3 position) const {
     uvec3 voxel;
     node_id node = tree_.grid().voxel_of(position, voxel) ? tree_.node_at(voxel, level_) : invalid_node;
@@ -132,55 +146,59 @@ class irradiance_records_view : public mixture_view<irradiance_records_view> {
   float fraction_ = 0.0f;
 };
 
-/// A guide as guide.hpp describes them. Movable, not copyable.
+/// A guide by irradiance records; path_guider calls its members. Movable, not copyable.
 template <class Exec, class Smooth = no_smooth_surfaces>
 class irradiance_records : public guide_base {
  public:
-  using options_type = irradiance_records_options;  ///< what it can be told
-  using view_type = irradiance_records_view;        ///< what kernels draw from
+  using options_type = irradiance_records_options;  ///< resolutions, and the work of building
+  using view_type = irradiance_records_view;        ///< what kernels sample from
 
-  /// Over triangles and emitters. Throws std::invalid_argument for options out of range, out_of_memory.
+  /// A guide for a scene with emitters. Builds the octree; records follow with the first guided wave. `exec`
+  /// allocates what is kept, `working` serves temporary memory. Throws std::invalid_argument for options out
+  /// of range, and out_of_memory.
   irradiance_records(const Exec& exec, const Exec& working, const lit_scene<Smooth>& scene,
                      const irradiance_records_options& options);
-  /// Without emitters: only the environment guides.
+  /// A guide for a scene whose only light is the environment.
   irradiance_records(const Exec& exec, const Exec& working, triangle_mesh_view mesh,
                      const irradiance_records_options& options)
       : irradiance_records(exec, working, lit_scene<Smooth>{mesh}, options) {}
 
-  /// Whether there is no octree.
+  /// Whether the scene has no surface, so that there are no records.
   bool empty() const { return octree_.view().empty(); }
-  /// It learns nothing from paths.
+  /// Paths are not recorded, since the guide does not learn from them.
   static constexpr bool records_paths = false;
 
-  /// What the wave's rays draw from. Builds records where they are not, or no longer; throws what the caster
-  /// throws, and then builds them in the next wave.
+  /// Returns the view for a wave. Builds the records first if the wave is guided and they are missing or out
+  /// of date. If the caster throws, so does this, and the next guided wave builds them.
   template <class Surfaces, class Random, class Caster>
-  irradiance_records_view prepare(const guide_sample<Exec>& at, const wave<Surfaces, Random>& w,
+  irradiance_records_view prepare(const sample_context<Exec>& at, const wave<Surfaces, Random>& w,
                                   const Caster& caster);
 
-  /// Emitters changed: records are built anew with the next guided wave.
+  /// Emitters changed: the next guided wave builds the records anew.
   void forget_light(const Exec&) { is_built_ = false; }
-  /// Geometry moved; the octree stays as it is. The same.
+  /// Geometry moved: the next guided wave builds all records anew. The octree keeps the old geometry.
   void invalidate(const Exec&, const bounds3&) { is_built_ = false; }
-  /// The same.
+  /// Geometry moved anywhere; as expensive as invalidate(), which does not look at its bounds.
   void invalidate_all(const Exec&) { is_built_ = false; }
 
-  /// The octree.
+  /// The octree of the scene's surfaces, whose leaves are the tagged voxels.
   const sparse_voxel_octree<Exec>& octree() const { return octree_; }
-  /// What all rays draw from: for those who look at records and tags.
+  /// A view for looking at records and tags. It guides nothing.
   irradiance_records_view view() const { return view_; }
-  /// Of records and voxels.
+  /// Counts and time of the last build.
   const irradiance_records_statistics& statistics() const { return statistics_; }
-  /// Adds what of the geometry was left out.
+  /// Adds the triangles that were left out of the octree.
   void report(const Exec&, guider_statistics& statistics) const { statistics.build = build_; }
-  /// Records; sums that rays need of them; cosines that they are multiplied by; the octree with its tags.
+  /// Four parts, all kept: "records", "sums of records", "cosines", and "octree" with its tags.
   std::vector<memory_part> memory() const;
 
  private:
+  /// Throws std::invalid_argument for options out of range.
   static const irradiance_records_options& checked(const irradiance_records_options& options);
   irradiance_records(const Exec& exec, const Exec& working, const lit_scene<Smooth>& scene,
                      voxel_fragments<Exec> fragments, const irradiance_records_options& options);
 
+  // build() calls those below it, in their order.
   template <class Caster>
   void build(const Exec& exec, const Caster& caster);
   detail::emitter_set weigh(const Exec& exec, buffer<std::uint64_t, Exec>& weights) const;
@@ -195,10 +213,12 @@ class irradiance_records : public guide_base {
   void fill_records(const Exec& exec, const buffer<detail::voxel_light, Exec>& nodes,
                     const buffer<float, Exec>& environment);
   void count_tags(const Exec& exec);
+  /// How far from a surface rays start, scene units: a thousandth of a voxel.
   float off_surface() const { return 1.0e-3f * octree_.view().grid().voxel_size(); }
-  /// Radiance times faces of leaves that a ray which arrives brings, per unit of its power.
+  /// Radiance times faces of a leaf that one unit of arriving power stands for, after reflection.
   float arrived_unit(const detail::emitter_set& from) const;
-  /// The same of what emitters leave where they are.
+  /// Radiance times faces of a leaf that one unit of emitted light stands for; `face` is in square scene
+  /// units.
   static float emitted_unit(const detail::emitter_set& from, float face);
 
   irradiance_records_options options_;
@@ -206,12 +226,12 @@ class irradiance_records : public guide_base {
   Smooth smooth_;
   build_report build_;
   sparse_voxel_octree<Exec> octree_;
-  buffer<std::uint16_t, Exec> normals_;  // a node
-  buffer<std::uint8_t, Exec> swapped_;   // an inner node
-  buffer<float, Exec> areas_;            // a leaf: in faces
-  buffer<voxel_tag, Exec> tags_;         // a leaf
+  buffer<std::uint16_t, Exec> normals_;  // of a node, packed
+  buffer<std::uint8_t, Exec> swapped_;   // of an inner node: a bit a child
+  buffer<float, Exec> areas_;            // of a leaf: surface, in its faces
+  buffer<voxel_tag, Exec> tags_;         // of a leaf
   buffer<irradiance_record, Exec> records_;
-  buffer<detail::record_rows, Exec> rows_;  // a record
+  buffer<detail::record_rows, Exec> rows_;  // of a record
   buffer<detail::cell_cosines, Exec> cosines_;
   irradiance_records_view view_;
   irradiance_records_statistics statistics_;

@@ -1,5 +1,7 @@
-// What irradiance_records can be told (Jhang & Chang, "An Unbiased Hybrid Rendering Approach to Path
-// Guiding").
+// Options of irradiance_records: resolutions of voxels and records, and how much work building them takes.
+//
+// Source: Jhang & Chang, "An Unbiased Hybrid Rendering Approach to Path Guiding", sections 2 and 4.
+// Cost and memory: irradiance_records.hpp says how they follow from these options.
 #pragma once
 
 #include <wfpg/guide/sampling_options.hpp>
@@ -8,20 +10,25 @@
 
 namespace wfpg {
 
-/// What irradiance_records can be told, beside sampling_options, of which guide_fraction is 0.5 by default,
-/// and unguided_samples 0, since nothing is learnt from them. Ranges are checked when a guider is made.
+/// Options of irradiance_records, beside sampling_options. guide_fraction is 0.5 where unset. The guide's
+/// constructor throws std::invalid_argument for values out of range.
 struct irradiance_records_options : sampling_options {
-  /// All samples are guided.
+  /// Sets unguided_samples to 0: the guide learns nothing from paths, so that the first sample is guided.
   irradiance_records_options() { unguided_samples = 0; }
 
-  std::uint32_t octree_resolution =
-      64;  ///< voxels along the scene's longest side that have tags and light; a power of two in [1, 4096]
-  std::uint32_t record_level = 4;  ///< records are of this level's nodes, at most the leaves'; 4: 16 a side
-  std::uint32_t emitter_rays = 1u << 18;  ///< that find directly lit voxels, in [1, 2^31]
-  float albedo = 0.5f;                    ///< of what they light, in [0, 1]
-  std::uint32_t cones_per_direction = 4;  ///< of each record, in [1, 256]
-  std::uint32_t smooth_bounces = 8;       ///< that a ray from an emitter follows, at most 64
-  float floor = 0.01f;  ///< that each direction has at least, times the record's mean, in [0, 1]
+  /// Voxels along the scene's longest side, a power of two in [1, 4096]. Voxels have tags and light.
+  std::uint32_t octree_resolution = 64;
+  /// Level of the octree whose nodes have a record; 4: 16 nodes a side. Levels below the leaves count as the
+  /// leaves'.
+  std::uint32_t record_level = 4;
+  /// Rays cast from emitters to find directly lit voxels, in [1, 2^31].
+  std::uint32_t emitter_rays = 1u << 18;
+  /// Fraction of light that a directly lit surface reflects, in [0, 1]; one for all surfaces.
+  float albedo = 0.5f;
+  /// Cones that each of a record's 128 directions gathers from, in [1, 256].
+  std::uint32_t cones_per_direction = 4;
+  std::uint32_t smooth_bounces = 8;  ///< most smooth surfaces that a ray from an emitter follows; at most 64
+  float floor = 0.01f;  ///< least weight of a direction, in multiples of the record's mean, in [0, 1]
 };
 
 }  // namespace wfpg

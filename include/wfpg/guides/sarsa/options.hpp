@@ -1,47 +1,65 @@
-// What a sarsa_grid can be told: how it learns, how it draws (Kim & Kim, "Fast and Lightweight Path Guiding
-// Algorithm on GPU", 2021).
+// Options of sarsa_grid: how it learns and how it samples directions.
+//
+// Source: Kim & Kim, "Fast and Lightweight Path Guiding Algorithm on GPU", 2021, sections 2 and 3.
+// Cost: of each choice, beside its name. Memory: as sarsa_grid.hpp says, by the resolutions.
 #pragma once
 
 #include <wfpg/guide/sampling_options.hpp>
 
 #include <cstdint>
+#include <optional>
 
 namespace wfpg {
 
-/// What a direction's radiance is learnt from (section 2).
+/// Values from which a direction's radiance is learnt (section 2). Each is the radiance that arrives along
+/// the direction, from the path's next vertex.
 enum class sarsa_update : std::uint8_t {
-  sarsa,           ///< the next vertex: what it emits, and the path's next direction as it is known (Eq. 6)
-  expected_sarsa,  ///< what it emits, and all directions there as they are known (Eq. 5): B² BSDFs a ray
-  monte_carlo      ///< all that the path gathers from there
+  /// What the next vertex emits, and what it scatters of the path's one next direction. The known radiance of
+  /// that direction counts (Eq. 6).
+  sarsa,
+  /// What the next vertex emits, and what it scatters of all its directions, at their known radiances (Eq.
+  /// 5).
+  /// Evaluates B² BSDFs a ray.
+  expected_sarsa,
+  /// All radiance that the rest of the path brings to the next vertex. Reads no known radiance.
+  monte_carlo
 };
 
-/// How a sarsa_grid draws directions (section 3).
+/// How a sarsa_grid samples directions (section 3). B is direction_resolution.
 enum class sarsa_sampler : std::uint8_t {
-  sphere_inversion,      ///< the radiance alone, by inversion: O(log B), and half of it below the surface
-  hemisphere_inversion,  ///< radiance times cosine above the surface, by inversion: O(B²)
-  rejection,       ///< the same by rejection from the uniform hemisphere: O(1/c), c being its acceptance
-  mixed_rejection  ///< that mixed with the uniform hemisphere by the optimal share (Eqs. 8, 9)
+  /// Proportional to radiance over the sphere, by inversion: O(log B). Directions below the surface are lost.
+  sphere_inversion,
+  /// Proportional to radiance times cosine above the surface, by inversion: O(B²).
+  hemisphere_inversion,
+  /// Density of hemisphere_inversion, by rejection from the uniform hemisphere: O(1/c) tries, where c is the
+  /// acceptance.
+  rejection,
+  /// Rejection mixed with the uniform hemisphere, with the optimal weights of Eqs. 8 and 9: fewer tries.
+  mixed_rejection
 };
 
-/// What a sarsa_grid can be told, beside sampling_options, of which guide_fraction is 0.5 by default. Ranges
-/// are checked when a guider is made.
+/// Options of sarsa_grid, beside sampling_options; guide_fraction is 0.5 where unset. The guide's constructor
+/// throws std::invalid_argument for values out of range.
 struct sarsa_grid_options : sampling_options {
-  std::uint32_t resolution = 8;               ///< cells along each side of the scene's bounds, in [1, 64]
-  std::uint32_t direction_resolution = 16;    ///< B: directions along their square's side, even, in [2, 64]
-  std::uint32_t normal_resolution = 16;       ///< steps between normals along their square's side, even, in
-                                              ///< [2, 64]
-  sarsa_update update = sarsa_update::sarsa;  ///< what is learnt
-  sarsa_sampler sampler = sarsa_sampler::mixed_rejection;  ///< how directions are drawn
-  std::uint32_t step = 8;  ///< samples after which what was learnt is used, at least 1
-  /// alpha of Eq. 7, in [0, 1]: what a new value counts for beside what is known, once 1 / learning_rate
-  /// values are; before that, and with 0, all count alike. SARSA forgets by it what it took for radiance
-  /// before light had come so far.
+  std::uint32_t resolution = 8;  ///< cells along each side of the scene's bounds, in [1, 64]
+  /// B: directions along each side of the octahedral square, even, in [2, 64]. A cell has B² directions.
+  std::uint32_t direction_resolution = 16;
+  /// Resolution of the normals that products are normalised for: steps along each side of the octahedral
+  /// square, even, in [2, 64].
+  std::uint32_t normal_resolution = 16;
+  sarsa_update update = sarsa_update::sarsa;               ///< which values are learnt
+  sarsa_sampler sampler = sarsa_sampler::mixed_rejection;  ///< the sampling algorithm
+  std::uint32_t step = 8;  ///< period, in samples, in which learnt radiance is published to rays; at least 1
+  /// Weight of a new value in a mean, alpha of Eq. 7, in [0, 1]. It applies once a direction has
+  /// 1 / learning_rate values. Before that, and with 0, all values weigh alike. SARSA needs it to forget
+  /// early values, which lack light that had not reached the next vertex yet.
   float learning_rate = 0.05f;
-  float floor = 0.01f;  ///< that each direction has at least, times the cell's mean: finite, at least 0
-  /// Of the paths of a sample so many are recorded, others in each, that directions get about as many values
-  /// on average, or up to twice as many; once means have settled a quarter of that, in one sample of four, or
-  /// in two or all where there are few paths. 0: all are, in all samples.
-  std::uint32_t values_per_direction = 4;
+  float floor = 0.01f;  ///< least weight of a direction, in multiples of the cell's mean: finite, at least 0
+  /// Target for the values that a direction gets a sample, on average over all directions, at least 1. It
+  /// sets the recorded fraction of paths, which yields up to twice as many. After the warm-up a quarter
+  /// suffices: one sample of four is recorded, or one of two, or all where there are few paths. Unset: all
+  /// paths of all samples are recorded.
+  std::optional<std::uint32_t> values_per_direction = 4;
 };
 
 }  // namespace wfpg

@@ -1,4 +1,5 @@
-// Implementation of sparse_voxel_octree.hpp: levels from sorted Morton codes.
+// Implementation of sparse_voxel_octree.hpp: all levels of an octree from sorted Morton codes (after Karras
+// 2012). Nodes of all levels are made by the same loops, one over the leaves and one over the inner nodes.
 #pragma once
 
 #include <wfpg/base/math.hpp>
@@ -16,14 +17,14 @@
 namespace wfpg {
 namespace detail {
 
-/// Whether a fragment is the first of its voxel's.
+/// Whether a fragment is the first of its voxel's, in the order of Morton codes.
 struct starts_voxel {
   array_view<const morton_code> codes;
   WFPG_HD bool operator()(std::uint32_t i) const { return i == 0 || codes[i] != codes[i - 1]; }
 };
 
-/// What is known of a leaf before there are nodes: its code, and the first level, from the root, on which it
-/// and the leaf before it have nodes of their own.
+/// Writes the code of each leaf, and its first level. That is the first level, from the root on, on which the
+/// leaf and the one before it have nodes of their own. The first leaf's is 0.
 struct describe_leaves {
   array_view<const morton_code> codes;
   array_view<const std::uint32_t> fragment_begin;
@@ -42,23 +43,26 @@ struct describe_leaves {
   }
 };
 
-/// Inner nodes by their numbers, before there are nodes: bits that say which leaves a node of a level begins
-/// with, in words of 32 leaves, one level's words after the other's, and the nodes through each word.
+/// Numbers the inner nodes before they exist. For each level there are bits that say with which leaves a node
+/// of that level begins, in words of 32 leaves. `prefix` has the number of nodes up to and with each word,
+/// over all levels in turn.
 struct node_numbers {
-  array_view<const std::uint32_t> begins, through;
+  array_view<const std::uint32_t> begins, prefix;
   std::uint32_t words;  // of a level
 
   static constexpr std::uint32_t leaves_a_word = 32;
 
-  /// The node of an inner level that holds a leaf: nodes that begin by then, but one.
+  /// The node of an inner level that holds a leaf: the number of nodes that begin up to it, less 1.
   WFPG_HD node_id node(std::uint32_t level, std::uint32_t leaf) const {
     const std::size_t word = std::size_t(level) * words + leaf / leaves_a_word;
-    return through[word] - popcount(begins[word] >> leaf % leaves_a_word >> 1) - 1;
+    return prefix[word] - popcount(begins[word] >> leaf % leaves_a_word >> 1) - 1;
   }
-  /// One past the last of an inner level.
-  WFPG_HD node_id end(std::uint32_t level) const { return through[(std::size_t(level) + 1) * words - 1]; }
+  /// One past the last node of an inner level.
+  WFPG_HD node_id end(std::uint32_t level) const { return prefix[(std::size_t(level) + 1) * words - 1]; }
 };
 
+/// Writes one word of node_numbers: a bit for each of 32 leaves, set where a node of the level begins with
+/// it.
 struct mark_beginnings {
   array_view<const std::uint8_t> first_levels;
   std::uint32_t words;  // of a level
@@ -73,10 +77,12 @@ struct mark_beginnings {
   }
 };
 
+/// Number of nodes that begin in a word.
 struct count_bits {
   WFPG_HD std::uint32_t operator()(std::uint32_t bits) const { return popcount(bits); }
 };
 
+/// Copies the end of each inner level for the host.
 struct gather_level_ends {
   node_numbers inner;
   node_id* ends;
@@ -85,7 +91,8 @@ struct gather_level_ends {
   }
 };
 
-/// Links the nodes that begin with a leaf with their parents, and remembers that leaf.
+/// Links the nodes that begin with a leaf with their parents, and stores that leaf for each of them. One call
+/// a leaf.
 struct link_nodes {
   array_view<const std::uint8_t> first_levels;
   node_numbers inner;
@@ -114,7 +121,7 @@ struct link_nodes {
   }
 };
 
-/// Which octants the children of an inner node are in. They end where those of the next node begin.
+/// Finds the octants of an inner node's children. They end where the children of the next inner node begin.
 struct find_child_masks {
   array_view<const morton_code> leaf_codes;
   const std::uint32_t* first_leaf_of;
@@ -134,7 +141,8 @@ struct find_child_masks {
   }
 };
 
-/// A level's nodes by their coordinates, each as the step that it has; leaves as themselves.
+/// Fills the table where descents begin: the nodes of one level by their coordinates. An entry is the node's
+/// index among the steps of its level; leaves enter their ids.
 struct fill_top {
   array_view<const morton_code> leaf_codes;
   const std::uint32_t* first_leaf_of;
@@ -148,7 +156,8 @@ struct fill_top {
   }
 };
 
-/// The steps that descents take from the nodes of a level.
+/// Computes the steps that descents take from the nodes of a level: which nodes exist two levels below, and
+/// the first one.
 struct fill_steps {
   sparse_voxel_octree_view tree;
   std::uint32_t level;
@@ -167,7 +176,8 @@ struct fill_steps {
   }
 };
 
-/// Fragments in the order of their codes; those of one voxel keep their order.
+/// Sorts fragments by Morton code. The sort is stable: fragments of one voxel keep their order. While it
+/// runs, it takes 16 more bytes a fragment, besides the sort's temporaries.
 template <class Exec>
 void sort_fragments(const Exec& exec, voxel_fragments<Exec>& fragments) {
   const std::size_t n = fragments.size();
@@ -190,7 +200,7 @@ sparse_voxel_octree<Exec>::sparse_voxel_octree(const Exec& exec, voxel_fragments
   build_levels(exec, find_leaves(exec, fragments));
 }
 
-/// The fragments' voxels.
+/// Finds the fragments' distinct voxels, and where the fragments of each begin.
 template <class Exec>
 auto sparse_voxel_octree<Exec>::find_leaves(const Exec& exec, const voxel_fragments<Exec>& fragments)
     -> leaves_of_build {
@@ -214,12 +224,12 @@ void sparse_voxel_octree<Exec>::build_levels(const Exec& exec, const leaves_of_b
   require(most < invalid_node, "number of leaves times levels", most, "less than 2^32 - 1");
   constexpr std::size_t leaves_a_word = detail::node_numbers::leaves_a_word;
   const auto words = static_cast<std::uint32_t>((leaf_count + leaves_a_word - 1) / leaves_a_word);
-  const buffer<std::uint32_t, Exec> begins(exec, view_.depth_ * words), through(exec, begins.size());
+  const buffer<std::uint32_t, Exec> begins(exec, view_.depth_ * words), prefix(exec, begins.size());
   const array_view<const std::uint8_t> first_levels = leaves.first_levels.view();
   exec.for_each(begins.size(), detail::mark_beginnings{first_levels, words, begins.data()});
   ::thrust::transform_inclusive_scan(exec.thrust(), begins.data(), begins.data() + begins.size(),
-                                     through.data(), detail::count_bits{}, ::thrust::plus<std::uint32_t>());
-  const detail::node_numbers inner{begins.view(), through.view(), words};
+                                     prefix.data(), detail::count_bits{}, ::thrust::plus<std::uint32_t>());
+  const detail::node_numbers inner{begins.view(), prefix.view(), words};
   find_level_ends(exec, inner, leaf_count);
   allocate(exec);
   const buffer<std::uint32_t, Exec> first_leaf_of(exec, view_.node_count());
@@ -258,7 +268,8 @@ void sparse_voxel_octree<Exec>::allocate(const Exec& exec) {
   view_.first_children_ = first_children_.data();
   view_.child_masks_ = child_masks_.data();
   if (view_.node_count() == 0) return;
-  // An even number of levels above the leaves, and no larger than a byte a node.
+  // The table's level is an even number of levels above the leaves. The table has at most a byte for each
+  // node of the octree.
   std::uint32_t& top = view_.top_level_ = view_.depth_ % 2;
   while (top + 2 < view_.depth_ && (4ull << 3 * (top + 2)) <= view_.node_count()) top += 2;
   std::uint32_t steps = 0;
@@ -269,7 +280,7 @@ void sparse_voxel_octree<Exec>::allocate(const Exec& exec) {
   view_.steps_ = steps_.data();
 }
 
-/// The table where descents begin, and their steps.
+/// Fills the table where descents begin, and the steps of every other level.
 template <class Exec>
 void sparse_voxel_octree<Exec>::build_descents(const Exec& exec, const buffer<morton_code, Exec>& leaf_codes,
                                                const buffer<std::uint32_t, Exec>& first_leaf_of) {

@@ -1,5 +1,6 @@
-// Implementation of voxelizer.hpp: triangles in items of equal work, which find their voxels and then write
-// them. Each test of a triangle is evaluated once and kept: two kernels may round one expression differently.
+// Implementation of voxelizer.hpp. Triangles are divided into items of equal work. One kernel finds the
+// items' voxels, and another writes them. Each test of a triangle is evaluated once and its result kept,
+// since two kernels may round one expression differently.
 #pragma once
 
 #include <wfpg/base/error.hpp>
@@ -22,6 +23,7 @@ namespace detail {
 
 inline constexpr std::uint32_t largest_resolution = 1u << 12;
 
+/// Throws std::invalid_argument where the resolution is no power of two in [1, 4096].
 inline void require_resolution(std::uint32_t resolution) {
   require(resolution >= 1 && resolution <= largest_resolution && (resolution & (resolution - 1)) == 0,
           "octree resolution", resolution, "a power of two in [1, 4096]");
@@ -35,8 +37,9 @@ enum report_counter : std::uint32_t {
   counters
 };
 
-/// The cube around a box, about half a voxel wider on each side so that axis-aligned walls at the box's faces
-/// lie in the middle of their voxels. A point gets a cube that floats can divide.
+/// The cube around a box, about half a voxel wider on each side. Axis-aligned walls at the box's faces thus
+/// lie in the middle of their voxels. A point gets a cube that is large enough for floats to divide it. An
+/// empty box gets the default cube, of side 1.
 inline voxel_grid grid_around(const bounds3& box, std::uint32_t resolution) {
   voxel_grid grid;
   grid.resolution = resolution;
@@ -50,11 +53,12 @@ inline voxel_grid grid_around(const bounds3& box, std::uint32_t resolution) {
   return grid;
 }
 
-/// The validated triangle i in grid units; false, with the reason, where it is left out.
+/// Reads and validates triangles.
 struct triangle_reader {
   triangle_mesh_view mesh;
   voxel_grid grid;
 
+  /// Reads triangle i, in world space. Returns false where it is left out; `reason` says why.
   WFPG_HD bool vertices(std::size_t i, grid_triangle& t, report_counter& reason) const {
     const uvec3 index = mesh.triangles[i];
     const std::size_t n = mesh.positions.size();
@@ -68,17 +72,19 @@ struct triangle_reader {
     return n_unit.x != 0.0f || n_unit.y != 0.0f || n_unit.z != 0.0f;
   }
 
-  /// The same of one that is known to be sound.
+  /// Reads a triangle that is known to be valid, in world space.
   WFPG_HD grid_triangle checked(std::uint32_t i) const {
     const uvec3 index = mesh.triangles[i];
     return {mesh.positions[index.x], mesh.positions[index.y], mesh.positions[index.z]};
   }
 
+  /// A triangle's vertices in grid units.
   WFPG_HD grid_triangle in_grid(const grid_triangle& t) const {
     return {grid.to_grid(t.a), grid.to_grid(t.b), grid.to_grid(t.c)};
   }
 };
 
+/// The box of a valid triangle; an empty box for the others.
 struct triangle_bounds {
   triangle_reader reader;
   WFPG_HD bounds3 operator()(std::size_t i) const {
@@ -89,9 +95,12 @@ struct triangle_bounds {
   }
 };
 
-/// A triangle's columns in items of work of equal size, so that a wall and a sliver weigh alike.
+/// Columns of one item of work. Triangles are divided into such items, so that a large wall does not occupy
+/// one thread while others wait.
 inline constexpr std::uint64_t columns_per_item = 16;
 
+/// Counts the items of each triangle and stores its box. Invalid triangles get none, and are counted by
+/// reason.
 struct count_items {
   triangle_reader reader;
   array_view<column_box> boxes;     // a triangle
@@ -113,34 +122,35 @@ struct count_items {
   }
 };
 
-/// Gives the first item of each triangle that triangle; the largest up to an item is its own.
+/// Writes each triangle's number at its first item. A running maximum then gives each item its triangle.
 struct mark_first_items {
-  array_view<const std::uint64_t> items_through;  // a triangle
-  std::uint32_t* triangles;                       // an item
+  array_view<const std::uint64_t> items_prefix;  // a triangle
+  std::uint32_t* triangles;                      // an item
   WFPG_HD void operator()(std::size_t i) const {
-    const std::uint64_t first = i > 0 ? items_through[i - 1] : 0;
-    if (items_through[i] > first) triangles[first] = static_cast<std::uint32_t>(i);
+    const std::uint64_t first = i > 0 ? items_prefix[i - 1] : 0;
+    if (items_prefix[i] > first) triangles[first] = static_cast<std::uint32_t>(i);
   }
 };
 
 /// The columns of one item of work, and the run of voxels that was found in each.
 struct item_columns {
-  array_view<const column_box> boxes;             // a triangle
-  array_view<const std::uint64_t> items_through;  // a triangle: the items up to and with its own
-  array_view<const std::uint32_t> triangles;      // an item
+  array_view<const column_box> boxes;            // a triangle
+  array_view<const std::uint64_t> items_prefix;  // a triangle: the items up to and with its own
+  array_view<const std::uint32_t> triangles;     // an item
   std::uint32_t* runs;  // a column and item: packed; items side by side, so that threads write in a row
 
   /// f(column, run) for each column.
   template <class F>
   WFPG_HD void for_each(std::size_t item, const column_box& box, F f) const {
     const std::uint32_t triangle = triangles[item];
-    const std::uint64_t first = (item - (triangle > 0 ? items_through[triangle - 1] : 0)) * columns_per_item;
+    const std::uint64_t first = (item - (triangle > 0 ? items_prefix[triangle - 1] : 0)) * columns_per_item;
     const std::uint64_t n = min(columns_per_item, box.count() - first);
     for (std::uint64_t c = 0; c < n; ++c) f(box.column(first + c), runs[c * triangles.size() + item]);
   }
 };
 
-/// Decides which voxels the triangles touch.
+/// Decides which voxels the triangles touch: a run in each column of an item, and the item's number of
+/// voxels.
 struct find_runs {
   triangle_reader reader;
   item_columns columns;
@@ -161,17 +171,18 @@ struct find_runs {
   }
 };
 
-/// Writes fragments, with their triangles where their normals will be.
+/// Writes the codes of fragments. Their triangle's number is stored in place of the normal, for
+/// measure_fragments.
 struct emit_fragments {
   item_columns columns;
-  array_view<const std::uint64_t> fragments_through;
+  array_view<const std::uint64_t> fragments_prefix;
   array_view<morton_code> codes;
   array_view<fragment_surface> surfaces;
 
   WFPG_HD void operator()(std::size_t item) const {
     const std::uint32_t triangle = columns.triangles[item];
     const column_box box = columns.boxes[triangle];
-    std::uint64_t at = item ? fragments_through[item - 1] : 0;
+    std::uint64_t at = item ? fragments_prefix[item - 1] : 0;
     columns.for_each(item, box, [&](glm::uvec2 column, std::uint32_t packed) {
       const std::uint32_t first = packed & 0xffffu, end = first + (packed >> 16);
       for (std::uint32_t along = first; along < end; ++along, ++at) {
@@ -182,7 +193,8 @@ struct emit_fragments {
   }
 };
 
-/// The surface of each fragment: clipping takes longer than finding it, and here all threads clip.
+/// Computes normal and area of each fragment. Clipping takes longer than finding the voxels, so it has a loop
+/// of its own, in which all threads clip.
 struct measure_fragments {
   triangle_reader reader;
   array_view<const morton_code> codes;
@@ -198,25 +210,28 @@ struct measure_fragments {
   }
 };
 
-/// In-place inclusive sums; returns the last one, which is read back to the host.
+/// Replaces counts by their inclusive sums. Returns the last sum, which is read back to the host.
 template <class Exec>
-std::uint64_t sum_through(const Exec& exec, buffer<std::uint64_t, Exec>& counts) {
+std::uint64_t sum_prefix(const Exec& exec, buffer<std::uint64_t, Exec>& counts) {
   if (counts.size() == 0) return 0;
   ::thrust::inclusive_scan(exec.thrust(), counts.data(), counts.data() + counts.size(), counts.data());
   return read_element(exec, counts.data() + counts.size() - 1);
 }
 
+/// Reads the counters back to the host.
 template <class Exec>
 build_report read_report(const Exec& exec, const buffer<std::uint32_t, Exec>& counters) {
   const auto host = counters.to_host(exec);
   return {host[counter_non_finite], host[counter_out_of_range], host[counter_degenerate]};
 }
 
+/// Throws std::invalid_argument for 2³² - 1 fragments or more.
 inline void require_fragment_count(std::uint64_t n) {
   require(n < 0xffffffffull, "number of voxel fragments", n,
           "less than 2^32 - 1: lower the octree resolution");
 }
 
+/// World-space box around the valid triangles; empty without any.
 template <class Exec>
 bounds3 bounds_of(const Exec& exec, triangle_mesh_view mesh) {
   const ::thrust::counting_iterator<std::size_t> first(0);
@@ -225,6 +240,7 @@ bounds3 bounds_of(const Exec& exec, triangle_mesh_view mesh) {
                                     triangle_bounds{triangle_reader{mesh, {}}}, bounds3{}, bounds_union());
 }
 
+/// The position of a sample as a box; an empty box where it is not valid.
 struct sample_bounds {
   array_view<const surface_fragment> samples;
   WFPG_HD bounds3 operator()(std::size_t i) const {
@@ -256,16 +272,17 @@ struct check_samples {
   }
 };
 
+/// Writes the fragments of the samples that are used, in the samples' order.
 struct emit_samples {
   array_view<const surface_fragment> samples;
   voxel_grid grid;
-  array_view<const std::uint64_t> used_through;
+  array_view<const std::uint64_t> used_prefix;
   array_view<morton_code> codes;
   array_view<fragment_surface> surfaces;
 
   WFPG_HD void operator()(std::size_t i) const {
-    const std::uint64_t at = i ? used_through[i - 1] : 0;
-    if (used_through[i] == at) return;
+    const std::uint64_t at = i ? used_prefix[i - 1] : 0;
+    if (used_prefix[i] == at) return;
     const vec3 g =
         glm::clamp(grid.to_grid(samples[i].position), 0.0f, static_cast<float>(grid.resolution - 1));
     codes[at] = morton_encode(uvec3(g));
@@ -287,7 +304,7 @@ voxel_fragments<Exec> voxelize(const Exec& exec, triangle_mesh_view mesh, std::u
   const buffer<detail::column_box, Exec> boxes(exec, n);
   buffer<std::uint64_t, Exec> items(exec, n);
   exec.for_each(n, detail::count_items{reader, boxes.view(), items.view(), counters.data()});
-  const std::uint64_t item_count = detail::sum_through(exec, items);
+  const std::uint64_t item_count = detail::sum_prefix(exec, items);
   const buffer<std::uint32_t, Exec> triangles(exec, item_count);
   ::thrust::fill_n(exec.thrust(), triangles.data(), item_count, 0u);
   exec.for_each(n, detail::mark_first_items{items.view(), triangles.data()});
@@ -298,7 +315,7 @@ voxel_fragments<Exec> voxelize(const Exec& exec, triangle_mesh_view mesh, std::u
   const detail::item_columns columns{boxes.view(), items.view(), triangles.view(), runs.data()};
   buffer<std::uint64_t, Exec> counts(exec, item_count);
   exec.for_each(item_count, detail::find_runs{reader, columns, counts.view()});
-  const std::uint64_t fragment_count = detail::sum_through(exec, counts);
+  const std::uint64_t fragment_count = detail::sum_prefix(exec, counts);
   detail::require_fragment_count(fragment_count);
 
   voxel_fragments<Exec> result(exec, fragment_count);
@@ -327,7 +344,7 @@ voxel_fragments<Exec> fragments_from_samples(const Exec& exec, array_view<const 
   const buffer<std::uint32_t, Exec> counters(exec, std::vector<std::uint32_t>(detail::counters, 0));
   buffer<std::uint64_t, Exec> used(exec, n);
   exec.for_each(n, detail::check_samples{samples, grid, used.view(), counters.data()});
-  voxel_fragments<Exec> result(exec, detail::sum_through(exec, used));
+  voxel_fragments<Exec> result(exec, detail::sum_prefix(exec, used));
   exec.for_each(
       n, detail::emit_samples{samples, grid, used.view(), result.codes.view(), result.surfaces.view()});
   result.grid = grid;

@@ -30,7 +30,7 @@ inline bool is_value(float x) {
   return is_finite(x) && x >= 0.0f;
 }
 
-/// One check of one BSDF. Each step gives the first violation in words, or nothing.
+/// One check of one BSDF. Each step returns the first violation in words, or an empty string.
 template <class Exec, class Bsdf>
 class bsdf_check {
  public:
@@ -88,7 +88,7 @@ class bsdf_check {
   outgoing_directions from() const { return {device_outgoing_.view(), options_.normal, transmits_}; }
   float above(vec3 d) const { return glm::dot(d, options_.normal); }
   double index_at(vec3 d) const { return above(d) >= 0.0f ? 1.0 : double(options_.ior); }
-  /// What light from `incident` counts as energy where it goes to `outgoing`.
+  /// Returns the energy of light that goes from `incident` to `outgoing`, over its radiance: the ratio of n².
   double energy_factor(vec3 outgoing, vec3 incident) const {
     const double ratio = index_at(incident) / index_at(outgoing);
     return ratio * ratio;
@@ -151,8 +151,8 @@ class bsdf_check {
     }
     if (eval > 0.0f && !(pdf > 0.0f))
       return found("eval() is ", eval, " where pdf() is 0, expected a positive pdf()");
-    const bool through = above(outgoing) * above(incident) < 0.0f && std::fabs(above(incident)) > 1.0e-4f;
-    if (!transmits_ && through && (eval > 0.0f || pdf > 0.0f))
+    const bool prefix = above(outgoing) * above(incident) < 0.0f && std::fabs(above(incident)) > 1.0e-4f;
+    if (!transmits_ && prefix && (eval > 0.0f || pdf > 0.0f))
       return found("eval() is ", eval, " and pdf() is ", pdf, " through the surface of normal ",
                    in_words{options_.normal}, ", expected 0 since transmits() is false");
     return {};
@@ -171,7 +171,7 @@ class bsdf_check {
       if (d.drawn.pdf > 0.0f) directions.push_back(d.drawn.direction);
     return directions;
   }
-  /// Directions that guide a quadrature: others than those that are counted.
+  /// Returns directions that guide a quadrature. They are independent of those that are counted.
   std::vector<vec3> hints(bsdf_part part, vec3 outgoing, std::uint64_t seed) const {
     return directions_of(draw(part, outgoing, hash(seed, 1), options_.samples / 8));
   }

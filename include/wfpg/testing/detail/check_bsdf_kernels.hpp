@@ -11,7 +11,7 @@
 
 namespace wfpg::detail {
 
-/// What of a BSDF draws.
+/// Which part of a BSDF draws: all of it, its narrow part, or the rest.
 enum class bsdf_part : std::uint32_t { whole, glossy, rest };
 
 template <class Bsdf>
@@ -21,7 +21,7 @@ WFPG_HD glossy_part glossy_of(const Bsdf& bsdf, vec3 outgoing) {
   else
     return {};
 }
-/// False for a part that sample() never draws: nothing is asked of it then.
+/// Returns whether sample() ever draws from a part. Other parts are not checked.
 template <class Bsdf>
 WFPG_HD bool draws(const Bsdf& bsdf, bsdf_part part, vec3 outgoing) {
   if (part == bsdf_part::glossy) return glossy_of(bsdf, outgoing).share > 0.0f;
@@ -123,7 +123,7 @@ struct draw_bsdf {
   }
 };
 
-/// eval() or a part's pdf() for a quadrature.
+/// Evaluates eval() or a part's pdf() at the points of a quadrature.
 template <class Bsdf>
 struct tabulate_bsdf {
   Bsdf bsdf;

@@ -19,7 +19,7 @@
 
 namespace wfpg::detail {
 
-/// 1 where a hit lies in a leaf or beside one.
+/// Writes 1 where a hit lies in a leaf or beside one, otherwise 0.
 struct find_hit_leaves {
   sparse_voxel_octree_view tree;
   array_view<const ray> rays;
@@ -213,7 +213,7 @@ class caster_check {
   std::vector<ray_hit> hits_;
 };
 
-/// Each form of a caster.
+/// Checks a caster in each of its forms, and stops at the first violation.
 template <class Exec, class Caster>
 testing::check_report check_caster_forms(const Exec& exec, const Caster& caster, const bounds3& bounds,
                                          const sparse_voxel_octree_view* tree,

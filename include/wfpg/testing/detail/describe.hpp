@@ -17,7 +17,7 @@ inline std::ostream& operator<<(std::ostream& out, const in_words& w) {
   return out << '(' << w.v.x << ", " << w.v.y << ", " << w.v.z << ')';
 }
 
-/// Its arguments one after the other, four digits a number.
+/// Returns its arguments one after the other as text, with four digits a number.
 template <class... Parts>
 std::string sentence(const Parts&... parts) {
   std::ostringstream text;

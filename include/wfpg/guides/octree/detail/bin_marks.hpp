@@ -1,14 +1,17 @@
-// Which node of the octree a ray's kept field belongs to: Algorithm 2 of the paper over running counts. Rays
-// of all depths and samples are counted at their leaves; from time to time counts are summed upward, and each
-// leaf learns its deepest ancestor with enough rays a sample. Kept fields need bins that stay, and these do.
+// Finds the octree node that a ray's kept field belongs to: Algorithm 2 of Yalciner and Akyuz (2024), over
+// running counts. Rays of all depths and samples are counted at their leaves. From time to time counts are
+// summed upward. Each leaf then gets its deepest ancestor with enough rays a sample. Kept fields need bins
+// that do not change with each wave.
 //
-// Memory: 8 bytes a leaf, 4 an inner node. Count: O(1). Mark: O(nodes).
+// Cost: counting O(1) a ray; marking O(nodes). Memory: 8 bytes a leaf, 4 an inner node.
 #pragma once
 
-#include <wfpg/bins/spatial_binner.hpp>
+#include <wfpg/bins/binning_options.hpp>
+#include <wfpg/bins/marking.hpp>
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/support/atomic.hpp>
 #include <wfpg/exec/support/thrust.hpp>
+#include <wfpg/guides/octree/build_schedule.hpp>
 #include <wfpg/octree/bottom_up.hpp>
 #include <wfpg/octree/sparse_voxel_octree.hpp>
 
@@ -16,61 +19,59 @@
 
 namespace wfpg::detail {
 
-/// A leaf's rays, and its deepest marked ancestor or itself; together, since a ray reads both.
+/// Ray count of a leaf, and its bin: the deepest marked ancestor, or the leaf itself. Both lie together,
+/// since a ray reads both.
 struct leaf_mark {
   std::uint32_t rays = 0;
   node_id bin = 0;
 };
 
-/// What a kernel sees of the marks.
+/// Counts and bins as kernels see them. Trivially copyable.
 struct bin_marks_view {
-  // Counts stop about here, so that 32 bits do not overflow; no threshold is higher.
+  // Counts stop near this value, so that 32 bits do not overflow. No threshold is higher.
   static constexpr std::uint32_t most = 0x80000000u;
 
   node_id first_leaf = 0;
   leaf_mark* leaves = nullptr;
-  std::uint32_t* inner = nullptr;  // an inner node: rays, as of the last marking
+  // Rays of each inner node, as of the last marking.
+  std::uint32_t* inner = nullptr;
 
+  // The node whose field a leaf's rays sample.
   WFPG_HD node_id bin(node_id leaf) const { return leaves[leaf - first_leaf].bin; }
+  // Rays counted at a node: of inner nodes, up to the last marking.
   WFPG_HD std::uint32_t rays(node_id node) const {
     return node < first_leaf ? inner[node] : leaves[node - first_leaf].rays;
   }
+  // Counts `n` rays at a leaf. Any number of threads may call it.
   WFPG_HD void count(node_id leaf, std::uint32_t n) const {
     std::uint32_t* const rays = &leaves[leaf - first_leaf].rays;
     if (atomic_load(rays) < most) atomic_add(rays, n);
   }
 };
 
-/// Which rays of a wave are counted: all, or one in a stride for as many; none where it is 0. Each costs an
-/// atomic.
-struct counted_rays {
-  std::uint32_t stride = 1;
-  std::uint32_t first = 0;  // below the stride
-
-  WFPG_HD bool includes(std::size_t ray) const { return stride > 0 && ray % stride == first; }
-};
-
-struct sum_counts {
+/// Kernel: sets an inner node's count to the sum of its children's.
+struct sum_running_counts {
   sparse_voxel_octree_view tree;
   bin_marks_view marks;
   WFPG_HD void operator()(node_id node) const {
-    const node_id first = tree.first_child(node);
-    std::uint64_t sum = 0;
-    for (std::uint32_t c = 0; c < tree.child_count(node); ++c) sum += marks.rays(first + c);
-    marks.inner[node] = static_cast<std::uint32_t>(min<std::uint64_t>(sum, 0xffffffffull));
+    marks.inner[node] = sum_of_children(tree, node, [&](node_id child) { return marks.rays(child); });
   }
 };
 
-/// How many rays mark a node: so many that bins hold about c_ray a sample; or as many more as it takes for
-/// the marked nodes' fields to fit the room that there is. A surface has four times the rays one level up, so
-/// that nodes marked by half of c_ray and more hold, in ratio, about c_ray.
+/// Number of counted rays that make a node a bin. A bin then holds about c_ray rays a sample, or more where
+/// the fields of all bins would not fit `room`.
+///
+/// A surface has four times the rays one level up. So nodes marked at half of c_ray and above hold, in ratio,
+/// about c_ray.
 struct mark_threshold {
-  static constexpr std::uint32_t pressure_unit = 64;
+  static constexpr std::uint32_t pressure_unit = build_schedule_constants::pressure_unit;
 
+  // c_ray, and the samples whose rays were counted.
   std::uint32_t rays_per_bin;
   std::uint32_t samples;
-  std::uint64_t room;  // bins
-  // How many times as many rays a bin is to have as fit the room; on the device.
+  std::uint64_t room;  // slots
+  // On the device: how many times as many rays a bin should have as make all bins fit, in units of 1 /
+  // pressure_unit.
   const std::uint32_t* pressure;
 
   WFPG_HD std::uint64_t operator()(std::uint32_t rays) const {
@@ -81,21 +82,20 @@ struct mark_threshold {
   }
 };
 
+/// Kernel: sets each leaf's bin.
 struct mark_leaves {
   sparse_voxel_octree_view tree;
   bin_marks_view marks;
   std::uint32_t min_level;
   mark_threshold threshold;
   WFPG_HD void operator()(std::size_t i) const {
-    const std::uint64_t enough = threshold(marks.rays(0));
-    const node_id least_end = tree.level_begin(min_level + 1);
-    node_id node = marks.first_leaf + static_cast<node_id>(i);
-    while (marks.rays(node) < enough && node >= least_end) node = tree.parent(node);
-    marks.leaves[i].bin = node;
+    const node_id leaf = marks.first_leaf + static_cast<node_id>(i);
+    marks.leaves[i].bin = marked_ancestor(tree, leaf, min_level, threshold(marks.rays(0)),
+                                          [&](node_id node) { return marks.rays(node); });
   }
 };
 
-/// Owns the counts and marks of an octree. Before the first marking every leaf's bin is its ancestor of the
+/// Owns the counts and bins of an octree. Before the first marking, each leaf's bin is its ancestor at the
 /// least level.
 template <class Exec>
 class bin_marks {
@@ -112,14 +112,15 @@ class bin_marks {
   bin_marks_view view() const { return {tree_.first_leaf(), leaves_.data(), inner_.data()}; }
   std::size_t bytes() const { return leaves_.bytes() + inner_.bytes(); }
 
-  /// Marks anew after `samples` samples. `room`: bins that can have fields; `pressure`: on the device.
+  /// Chooses bins anew from the counts of `samples` samples. `room`: slots for bins' fields. `pressure`: on
+  /// the device. O(nodes).
   void mark(const Exec& exec, std::uint32_t samples, std::size_t room, const std::uint32_t* pressure) {
-    for_each_bottom_up(exec, tree_, 0, sum_counts{tree_, view()});
+    for_each_bottom_up(exec, tree_, 0, sum_running_counts{tree_, view()});
     mark_bins(exec, {options_.rays_per_bin, samples, room, pressure});
   }
 
  private:
-  friend struct store_state;
+  friend struct kept_state;
 
   void mark_bins(const Exec& exec, const mark_threshold& threshold) {
     exec.for_each(leaves_.size(), mark_leaves{tree_, view(), options_.min_level, threshold});

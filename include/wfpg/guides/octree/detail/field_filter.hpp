@@ -1,6 +1,9 @@
-// The Gaussian that smooths a field's cells (paper, section 4; thesis, Eq. 5.1): separable, in place, across
-// the square's edges as the sphere goes on. Scratch memory holds a few rows, so that the cells themselves may
-// fill what a thread block has.
+// Smooths a field's cells by a separable Gaussian, in place. At the square's edges it continues as the sphere
+// does. Scratch memory holds a few rows alone, so that the cells themselves may fill what a thread block has.
+//
+// Source: Yalciner and Akyuz (2024), section 4; thesis (2024), Eq. 5.1.
+//
+// Cost: O(F^2) a field. Memory: scratch_floats() of scratch a block.
 #pragma once
 
 #include <wfpg/base/octahedral_map.hpp>
@@ -8,7 +11,7 @@
 
 namespace wfpg::detail {
 
-/// A normalised Gaussian of a few taps on either side.
+/// A normalized Gaussian exp(-x²/alpha²) with `radius` taps on either side. `alpha`: in cells, positive.
 struct gaussian_taps {
   static constexpr int radius = 2;
   float weights[radius + 1];
@@ -23,26 +26,27 @@ struct gaussian_taps {
     for (float& w : weights) w /= sum;
   }
 
-  /// Of five neighbours, the middle one's new value.
+  /// Returns the middle one's new value, of five neighbours.
   WFPG_HD float operator()(float a, float b, float middle, float c, float d) const {
     return weights[0] * middle + weights[1] * (b + c) + weights[2] * (a + d);
   }
 };
 
-/// Filters the cells of a square of at least 4 x 4. Over the sphere a step off an edge comes back on the same
-/// edge, mirrored about its middle; over a hemisphere the horizon mirrors.
+/// Filters the cells of a square of at least 4 x 4 cells. Over the sphere, a step off an edge comes back on
+/// the same edge, mirrored about its middle. Over a hemisphere the horizon mirrors.
 class field_filter {
  public:
   WFPG_HD field_filter(const cell_words& cells, int resolution, bool hemisphere, float alpha)
       : cells_(cells), size_(resolution), hemisphere_(hemisphere), taps_(alpha) {}
 
-  /// Scratch memory that blocks of so many warps need.
+  /// Floats of scratch memory that a block of `warps` warps needs.
   WFPG_HD static std::size_t scratch_floats(std::uint32_t resolution, int warps) {
     const std::size_t rows = 2 * (std::size_t(resolution) + 2 * radius) * static_cast<std::size_t>(warps);
     const std::size_t columns = 2 * radius * std::size_t(resolution) * segments(resolution);
     return max(rows, columns);
   }
 
+  // Filters rows, then columns. All threads of the block call it.
   template <class Block>
   WFPG_HD void apply(const Block& block, float* scratch) const {
     filter_rows(block, scratch);
@@ -59,7 +63,8 @@ class field_filter {
     return (resolution + segment - 1) / segment;
   }
 
-  /// Row y, and the row that its taps reach over the sphere's edges: a warp has both before it changes one.
+  /// Filters row y together with the row that its taps reach over the sphere's edges. A warp copies both
+  /// before it changes either.
   template <class Block>
   WFPG_HD void filter_rows(const Block& block, float* scratch) const {
     block.for_each_warp((size_ + 1) / 2, [&](const auto& warp, int y) {
@@ -80,6 +85,7 @@ class field_filter {
     });
   }
 
+  // Continues a row by `radius` cells on either side, mirrored from the row beyond the edge.
   template <class Warp>
   WFPG_HD void pad(const Warp& warp, float* row, const float* beyond) const {
     warp.for_each(radius, [&](int i) {
@@ -95,7 +101,8 @@ class field_filter {
     });
   }
 
-  /// Lanes walk down the columns in segments, whose neighbouring rows are put aside first.
+  /// Filters columns in segments of rows, a lane a column. The rows next to each segment are copied first,
+  /// since neighbouring segments change them.
   template <class Block>
   WFPG_HD void filter_columns(const Block& block, float* aside) const {
     const auto segment_count = static_cast<int>(segments(static_cast<std::uint32_t>(size_)));

@@ -1,4 +1,4 @@
-// The kernels of light_guide.hpp: what rows have received becomes means, and means become probabilities.
+// Kernels of light_guide.hpp: they turn recorded values into means, and means into probabilities.
 #pragma once
 
 #include <wfpg/exec/support/running_mean.hpp>
@@ -6,8 +6,8 @@
 
 namespace wfpg::detail {
 
-/// Rows of an octree's nodes, one for each dominant_axis of a normal, and in each row one element a group of
-/// lights.
+/// Layout of rows: an octree node has one for each dominant_axis of a normal. A row has one element a group
+/// of lights.
 struct light_rows {
   static constexpr std::uint32_t faces = 6;
 
@@ -21,14 +21,14 @@ struct light_rows {
     return row(tree.level_begin(level), 0);
   }
 
-  /// The probability of a group; `sums` are of the probabilities of each row's groups and those before them.
+  /// Probability of a group in a row. `sums`: inclusive sums of the probabilities of each row's groups.
   WFPG_HD float probability(const float* sums, std::size_t row, std::uint32_t group) const {
-    const float* const through = sums + row * groups;
-    return group > 0 ? through[group] - through[group - 1] : through[0];
+    const float* const prefix = sums + row * groups;
+    return group > 0 ? prefix[group] - prefix[group - 1] : prefix[0];
   }
 };
 
-/// Adds what the elements of the deepest rows have received to their means.
+/// Kernel: adds a sample's values to the means of the deepest rows.
 struct fold_light_values {
   value_queue_view queue;
   std::size_t first;  // element
@@ -41,7 +41,7 @@ struct fold_light_values {
   }
 };
 
-/// The means of a level's rows from those of their children, of the same face; an element each.
+/// Kernel: sets a level's means from those of its children, of the same face. One element a thread.
 struct gather_light_means {
   sparse_voxel_octree_view tree;
   light_rows rows;
@@ -64,9 +64,9 @@ struct gather_light_means {
   }
 };
 
-/// The share of a row's choices that each group has: of `defensive` a part that is always the same, and the
-/// rest in proportion to what is known of the groups. What is not yet known is taken from the parent's row,
-/// and counts as some values.
+/// Kernel: sets the probabilities of a row's groups. A fraction `floor` follows `defensive`; the rest is
+/// proportional to the estimates of the groups. The parent's row is the prior, which counts as
+/// `parent_weight` values.
 struct choose_light_groups {
   static constexpr float parent_weight = 8.0f;
 
@@ -74,10 +74,12 @@ struct choose_light_groups {
   light_rows rows;
   std::size_t first;  // row
   const learnt_mean* means;
-  const float* weights;    // what a group is worth before anything is known; they sum to 1
-  const float* defensive;  // sum to 1
-  float floor;             // of choices that are made by those, in (0, 1)
-  float* sums;             // of the probabilities of an element and those before it in its row
+  // A group's weight before anything is learnt; they sum to 1.
+  const float* weights;
+  // Probabilities that ignore what is learnt; they sum to 1.
+  const float* defensive;
+  float floor;  // fraction of choices that follow `defensive`, in (0, 1)
+  float* sums;  // inclusive sums of probabilities, row by row
 
   WFPG_HD void operator()(std::size_t i) const {
     const std::size_t row = first + i;
@@ -90,7 +92,7 @@ struct choose_light_groups {
       found += n * mean.mean();
       expected += n * prior(above, g);
     }
-    // What a prior of 1 amounts to here. Nothing is known where nothing has been found.
+    // Scales the prior, which has no unit, to the row's values. It is 0 where every value was 0.
     const float scale = found / max(expected, 1e-6f);
     float total = 0.0f;
     for (std::uint32_t g = 0; g < rows.groups; ++g) total += estimate(row, above, g, scale);
@@ -107,13 +109,15 @@ struct choose_light_groups {
   }
 
  private:
-  static constexpr std::size_t none = ~std::size_t(0);  // what is above the root
+  // The row above the root's.
+  static constexpr std::size_t none = ~std::size_t(0);
 
+  // Mean of a group in a row, mixed with the scaled prior. The prior alone where nothing was found.
   WFPG_HD float estimate(std::size_t row, std::size_t above, std::uint32_t g, float scale) const {
     if (!(scale > 0.0f)) return prior(above, g);
     return mixed_with(means[row * rows.groups + g], scale * prior(above, g), parent_weight);
   }
-  /// `above`: the parent's row.
+  /// What the parent's row has learnt of a group; `above`: that row. The root's prior is the weight.
   WFPG_HD float prior(std::size_t above, std::uint32_t g) const {
     if (above == none) return weights[g];
     return max((rows.probability(sums, above, g) - floor * defensive[g]) / (1.0f - floor), 0.0f);

@@ -15,7 +15,8 @@
 namespace wfpg {
 namespace detail {
 
-/// Rays of each direction of a record to beyond the scene, from there on.
+/// Kernel that makes 16 rays for each direction of a record, which look at the environment. They start beyond
+/// the scene and lead away from it, so that they meet no surface.
 struct look_outside {
   static constexpr std::uint32_t rays_per_cell = 16;
 
@@ -47,8 +48,9 @@ struct average_outside {
   }
 };
 
-/// Radiance that arrives at records from `first` on, along each direction: cones from some of its leaves, off
-/// the surface there on the side that they lead to.
+/// Kernel that gathers the radiance that arrives at each record from each direction, for records from `first`
+/// on. Cones start at random leaves of the record's node. They start off the surface, on the side that they
+/// lead to.
 struct gather_records {
   voxel_cones<lit_nodes> cones;
   std::uint32_t level;  // of records
@@ -78,7 +80,7 @@ struct gather_records {
   }
 
  private:
-  /// Of a node of the records' level, or one past the last.
+  /// First leaf below a node of the records' level. For one past the last node, one past the last leaf.
   WFPG_HD node_id first_leaf_of(node_id node) const {
     if (node >= cones.tree.level_begin(level + 1)) return cones.tree.node_count();
     while (!cones.tree.is_leaf(node)) node = cones.tree.first_child(node);
@@ -92,7 +94,8 @@ struct gather_records {
   }
 };
 
-/// Above a record's normal, on the side that more light comes to: most rays that are there leave that side.
+/// Kernel that computes each record's row sums above its normal or the opposite: the one with more light.
+/// Most rays at the record leave that side.
 struct sum_rows {
   const irradiance_record* records;
   const std::uint16_t* normals;  // a record
@@ -172,13 +175,13 @@ irradiance_records<Exec, Smooth>::irradiance_records(const Exec& exec, const Exe
 
 template <class Exec, class Smooth>
 template <class Surfaces, class Random, class Caster>
-irradiance_records_view irradiance_records<Exec, Smooth>::prepare(const guide_sample<Exec>& at,
+irradiance_records_view irradiance_records<Exec, Smooth>::prepare(const sample_context<Exec>& at,
                                                                   const wave<Surfaces, Random>&,
                                                                   const Caster& caster) {
   irradiance_records_view view = view_;
   if (!at.guided) return view;
   if (!is_built_) build(at.exec, caster);
-  view.fraction_ = options_.guide_fraction > 0.0f ? options_.guide_fraction : 0.5f;
+  view.fraction_ = options_.guide_fraction.value_or(0.5f);
   return view;
 }
 
@@ -207,7 +210,8 @@ void irradiance_records<Exec, Smooth>::build(const Exec& exec, const Caster& cas
   is_built_ = true;
 }
 
-/// Emitters by their power, in integers: sums of floats would depend on their order.
+/// Makes the distribution of emitters by power. Its sums are integers, since those of floats depend on their
+/// order.
 template <class Exec, class Smooth>
 detail::emitter_set irradiance_records<Exec, Smooth>::weigh(const Exec& exec,
                                                             buffer<std::uint64_t, Exec>& weights) const {
@@ -219,14 +223,14 @@ detail::emitter_set irradiance_records<Exec, Smooth>::weigh(const Exec& exec,
   detail::emitter_set result;
   if (!(greatest > 0.0f)) return result;
   exec.for_each(emitters_.size(), detail::weigh_emitters{power, greatest, weights.data()});
-  result.total = detail::sum_through(exec, weights);
+  result.total = detail::sum_prefix(exec, weights);
   result.emitters = emitters_;
-  result.weights_through = weights.view();
+  result.weights_prefix = weights.view();
   result.power_of_weight = greatest * 0x1p-24f;
   return result;
 }
 
-/// Casts rays from emitters, and where they arrive they leave light.
+/// Casts rays from emitters and adds their power to the leaves where they end.
 template <class Exec, class Smooth>
 template <class Caster>
 void irradiance_records<Exec, Smooth>::send_light(const Exec& exec, const Caster& caster,
@@ -267,7 +271,7 @@ float irradiance_records<Exec, Smooth>::emitted_unit(const detail::emitter_set& 
   return static_cast<float>(double(from.total) * double(from.power_of_weight) / double(face) * 0x1p-32);
 }
 
-/// Light and tags of voxels, from the leaves up.
+/// Computes light and tags of leaves, and then the light of inner nodes from the leaves up.
 template <class Exec, class Smooth>
 void irradiance_records<Exec, Smooth>::light_voxels(const Exec& exec, const detail::emitter_set& from,
                                                     const buffer<detail::leaf_light, Exec>& light,
@@ -283,7 +287,7 @@ void irradiance_records<Exec, Smooth>::light_voxels(const Exec& exec, const deta
   detail::for_each_bottom_up(exec, tree, 0, detail::gather_children{tree, swapped_.data(), nodes.data()});
 }
 
-/// The environment along each direction of records, which is the same for all.
+/// Computes the environment's mean radiance in each direction of a record. All records share it.
 template <class Exec, class Smooth>
 template <class Caster>
 void irradiance_records<Exec, Smooth>::see_environment(const Exec& exec, const Caster& caster,
@@ -299,7 +303,7 @@ void irradiance_records<Exec, Smooth>::see_environment(const Exec& exec, const C
   exec.for_each(environment.size(), detail::average_outside{hits.data(), environment.data()});
 }
 
-/// Cones from all records, some at once, and what rays need of what they found.
+/// Fills all records by cones, 4096 at a time, and then computes their row sums.
 template <class Exec, class Smooth>
 void irradiance_records<Exec, Smooth>::fill_records(const Exec& exec,
                                                     const buffer<detail::voxel_light, Exec>& nodes,

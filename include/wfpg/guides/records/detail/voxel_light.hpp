@@ -1,6 +1,9 @@
-// What light leaves voxels, for cones to gather: of a leaf from the emitters in it and the light that they
-// send there, of inner nodes the mean of their children, and how opaque nodes are along each axis. Nodes have
-// two sides, as in the exitance cache.
+// Light that leaves voxels, and their opacity, for cones to gather. A leaf's light is that of the emitters in
+// it and what it reflects of theirs. An inner node's is the mean of its children's. Opacity is kept for each
+// axis. Nodes have two sides, as in the exitance cache.
+//
+// Source: Jhang & Chang, "An Unbiased Hybrid Rendering Approach to Path Guiding", section 2.2.
+// Memory: 40 bytes a leaf and 24 a node, while records are built.
 #pragma once
 
 #include <wfpg/base/types.hpp>
@@ -20,24 +23,25 @@ enum class voxel_tag : std::uint8_t {
 
 namespace detail {
 
-/// Light of a leaf's sides, in integers: their sums are exact in any order.
+/// Sums of a leaf's light by side, in integers, which are exact in any order. 40 bytes.
 struct leaf_light {
-  std::uint64_t emitted[2];
-  std::uint64_t arrived[2];
-  std::uint64_t crossed;  ///< went through, from either side to the other
+  std::uint64_t emitted[2];  ///< by emitters in the leaf
+  std::uint64_t arrived[2];  ///< power of rays that ended here
+  std::uint64_t crossed;     ///< power of rays that went through, from either side to the other
 
-  /// Cones see through it, as straight as they are: what is behind is about where it seems to be.
+  /// Whether more light crosses than ends here. Cones then pass through, unbent: what is behind is about
+  /// where it seems to be.
   WFPG_HD bool is_clear() const { return crossed > arrived[0] + arrived[1]; }
 };
 
-/// What a cone finds in a node.
+/// Light and opacity of a node. 24 bytes.
 struct voxel_light {
-  float radiance[2];  ///< that leaves a side
-  vec3 opacity;       ///< along each axis, of all of the node
-  float area;         ///< of surface, in faces of a leaf
+  float radiance[2];  ///< mean radiance that leaves each side
+  vec3 opacity;       ///< along each axis, in [0, 1], of the whole node
+  float area;         ///< area of surface in the node, in faces of a leaf
 };
 
-/// Area of surface in each leaf, in faces.
+/// Kernel that sums the area of surface in each leaf, in faces of the leaf.
 struct measure_leaves {
   array_view<const std::uint32_t> fragment_begin;  // a leaf
   array_view<const fragment_surface> fragments;
@@ -53,7 +57,8 @@ struct measure_leaves {
   }
 };
 
-/// Light and tags of leaves.
+/// Kernel that converts a leaf's sums to radiance, opacity and a tag. Its opacity is its area, at most 1, or
+/// 0 if it is clear and does not emit.
 struct light_leaves {
   const leaf_light* light;
   const float* areas;
@@ -83,7 +88,7 @@ struct light_leaves {
   static constexpr float least_area = 0x1p-10f;  // a cone hardly sees what has less
 };
 
-/// An inner node from its children.
+/// Kernel that computes an inner node from its children. Radiance is the mean by area.
 struct gather_children {
   sparse_voxel_octree_view tree;
   const std::uint8_t* swapped;  // an inner node: children whose sides are swapped, a bit each
@@ -111,7 +116,7 @@ struct gather_children {
   }
 };
 
-/// All nodes, as cones see them.
+/// The interface of nodes that voxel_cones asks for.
 struct lit_nodes {
   const voxel_light* lights = nullptr;
   const std::uint16_t* normals = nullptr;
@@ -120,7 +125,7 @@ struct lit_nodes {
   WFPG_HD float radiance(node_id node, vec3 toward) const {
     return lights[node].radiance[side_facing(node, toward)];
   }
-  /// The side of a node that faces a direction.
+  /// Side of a node that faces a direction: 0 on the side of the node's normal, else 1.
   WFPG_HD std::uint32_t side_facing(node_id node, vec3 direction) const {
     return glm::dot(unpack_voxel_direction(normals[node]), direction) >= 0.0f ? 0u : 1u;
   }

@@ -1,14 +1,16 @@
-// What rays draw from in one cell of a sarsa_grid: learnt radiance by direction, times the cosine at the
-// surface where the sampler knows of one. Every density is that of its sampler, to rounding (Kim & Kim, "Fast
-// and Lightweight Path Guiding Algorithm on GPU", 2021, section 3). Three things are wfpg's own:
+// The distribution that rays sample in one cell of a sarsa_grid: learnt radiance by direction, times the
+// cosine at the surface for all samplers but sphere_inversion. Every density is that of its sampler, to
+// rounding.
 //
-//   The paper's normaliser, kept by cell and discretised normal, is that of another hemisphere than the
-//   surface's, and densities with it are off. Here the cosine is the discretised normal's too, and a
-//   direction that it allows below the surface is turned over: products over the sphere keep their sum, which
-//   the kept normaliser is.
-//   Rejection that has failed for long goes on by inversion of the same density, so that it ends.
-//   A mixture of acceptance c + (1 - c) eps, as the paper has it, is not that of Eq. 8. Here it is Eq. 8's,
-//   with its own acceptance, 1 / ((1 - eps) / c + eps).
+// Source: Kim & Kim, "Fast and Lightweight Path Guiding Algorithm on GPU", 2021, section 3. Three things are
+// wfpg's own:
+//
+// - The paper keeps normalisers by cell and discretised normal. They belong to another hemisphere than the
+//   surface's, so that densities are off. Here the cosines are those of the discretised normal, too. A
+//   direction below the surface is flipped. So products over the sphere keep their sum, the normaliser.
+// - Rejection that failed 1024 times continues by inversion of the same density, so that it ends.
+// - The paper's acceptance c + (1 - c) eps is not that of the mixture of Eq. 8. Here the mixture is that of
+//   Eq. 8, with its own acceptance, 1 / ((1 - eps) / c + eps).
 #pragma once
 
 #include <wfpg/base/math.hpp>
@@ -22,18 +24,17 @@ namespace wfpg {
 
 namespace detail {
 
-/// The sum of a cell's products for a discretised normal, and the largest sum of a direction's and its
-/// opposite's.
+/// Normaliser of a cell's products for one discretised normal. 16 bytes.
 struct sarsa_normaliser {
-  std::uint64_t total = 0;
-  std::uint64_t peak = 0;
+  std::uint64_t total = 0;  ///< sum of the products of all directions
+  std::uint64_t peak = 0;   ///< largest sum of a direction's product and its opposite's
 };
 
-/// B x B directions of a cell: weights that sum to about 2³¹, as they are and as a distribution's sums.
+/// The B x B directions of a cell. Their weights sum to about 2³¹.
 struct sarsa_cell {
-  const std::uint32_t* sums = nullptr;
-  const std::uint32_t* weights = nullptr;
-  std::uint32_t resolution = 0;
+  const std::uint32_t* sums = nullptr;     ///< words of a grid_distribution of the weights
+  const std::uint32_t* weights = nullptr;  ///< weight of each direction
+  std::uint32_t resolution = 0;            ///< B
 
   WFPG_HD directional_field sphere() const { return directional_field(grid_distribution(sums, resolution)); }
   WFPG_HD std::uint32_t directions() const { return resolution * resolution; }
@@ -44,11 +45,13 @@ struct sarsa_cell {
   }
 };
 
-/// A cell's products with a discretised normal's cosines, over the hemisphere above a normal near it.
+/// Products of a cell's weights with the cosines to a discretised normal, flipped into the hemisphere above
+/// the surface's own normal.
 class sarsa_products {
  public:
   sarsa_products() = default;
-  /// `cosines`: of the discretised normal, a direction: in 255ths.
+  /// `cosines` and `normaliser` are those of the discretised normal; a cosine of each direction, in 255ths.
+  /// `normal` is the surface's, of unit length.
   WFPG_HD sarsa_products(const sarsa_cell& cell, const std::uint8_t* cosines,
                          const sarsa_normaliser& normaliser, vec3 normal)
       : cell_(cell), cosines_(cosines), normaliser_(normaliser), normal_(normal) {}
@@ -56,15 +59,16 @@ class sarsa_products {
   WFPG_HD bool empty() const { return normaliser_.total == 0; }
   WFPG_HD bool is_above(vec3 d) const { return glm::dot(normal_, d) >= 0.0f; }
 
-  /// The density of a unit direction above the surface, per steradian: that of the direction and of its
-  /// opposite, which is turned over.
+  /// Density of a unit direction above the surface, per steradian. It is the sum of the direction's and of
+  /// its opposite's, which is flipped onto it.
   WFPG_HD float pdf(vec3 d) const { return density_of(weight_at(d)); }
-  /// c: the mean density over the hemisphere in units of the largest.
+  /// The paper's c: mean density over the hemisphere, divided by the largest.
   WFPG_HD float acceptance() const {
     return 2.0f * static_cast<float>(normaliser_.total) /
            (static_cast<float>(normaliser_.peak) * static_cast<float>(cell_.directions()));
   }
 
+  /// Samples a direction by inversion: a linear search over all products, O(B²).
   WFPG_HD vec3 invert(vec2 u) const {
     const auto scaled = static_cast<std::uint64_t>(u.x * 0x1p24f) * normaliser_.total;
     const std::uint64_t target = scaled >> 24;
@@ -80,7 +84,8 @@ class sarsa_products {
                   static_cast<float>(i / cell_.resolution) + inside_cell(u.y)};
     return above(square_to_sphere(uv / static_cast<float>(cell_.resolution)));
   }
-  /// By rejection of p, `target` of it, and the rest of the uniform density: Eq. 8 with target = 1 - eps.
+  /// Samples a direction by rejection from the uniform hemisphere. Its density is that of Eq. 8: `target` is
+  /// 1 - eps, the fraction of pdf(), and the uniform density has the rest.
   WFPG_HD vec3 reject(vec2 u, float target) const {
     const frame around(normal_);
     const float peak = target / acceptance() + (1.0f - target);
@@ -117,13 +122,14 @@ class sarsa_products {
   vec3 normal_{0.0f, 0.0f, 1.0f};
 };
 
-/// What a mixture (mis.hpp) draws from.
+/// Distribution of directions for a mixture (sampling/mixture.hpp).
 class sarsa_distribution {
  public:
+  /// An empty distribution.
   sarsa_distribution() = default;
-  /// Radiance alone.
+  /// Radiance alone, over the sphere.
   WFPG_HD explicit sarsa_distribution(const sarsa_cell& cell) : cell_(cell) {}
-  /// With the cosine. `sampler` is not sphere_inversion.
+  /// Radiance times cosine. Precondition: `sampler` is not sphere_inversion.
   WFPG_HD sarsa_distribution(const sarsa_cell& cell, const sarsa_products& products, sarsa_sampler sampler)
       : cell_(cell), products_(products), sampler_(sampler) {
     if (sampler != sarsa_sampler::mixed_rejection || products.empty()) return;
@@ -132,7 +138,7 @@ class sarsa_distribution {
   }
 
   WFPG_HD bool empty() const { return cell_.resolution == 0 || (!is_sphere() && products_.empty()); }
-  /// It knows of no lobe but the diffuse one.
+  /// GGX roughness that it resolves: that of fields, since it accounts for the diffuse lobe alone.
   WFPG_HD static constexpr float resolved_alpha() { return directional_field::resolved_alpha(); }
 
   WFPG_HD vec3 sample(vec2 u, float& density) const {

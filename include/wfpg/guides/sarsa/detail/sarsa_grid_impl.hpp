@@ -31,6 +31,8 @@ const sarsa_grid_options& sarsa_grid<Exec>::checked(const sarsa_grid_options& o)
   require_even("direction_resolution", o.direction_resolution);
   require_even("normal_resolution", o.normal_resolution);
   require(o.step >= 1, "step", o.step, "at least 1");
+  require(o.values_per_direction.value_or(1) >= 1, "values_per_direction", o.values_per_direction.value_or(1),
+          "at least 1, or unset to record all paths");
   require(o.learning_rate >= 0.0f && o.learning_rate <= 1.0f, "learning_rate", o.learning_rate, "in [0, 1]");
   require(o.floor >= 0.0f, "floor", o.floor, "finite, at least 0");
   return o;
@@ -76,7 +78,7 @@ void sarsa_grid<Exec>::forget_light(const Exec& exec) {
 
 template <class Exec>
 template <class Surfaces, class Random, class Caster>
-sarsa_grid_view sarsa_grid<Exec>::prepare(const guide_sample<Exec>& at, const wave<Surfaces, Random>& w,
+sarsa_grid_view sarsa_grid<Exec>::prepare(const sample_context<Exec>& at, const wave<Surfaces, Random>& w,
                                           const Caster&) {
   sarsa_grid_view view = view_;
   if (!at.guided) view.fraction_ = 0.0f;
@@ -91,7 +93,7 @@ sarsa_grid_view sarsa_grid<Exec>::prepare(const guide_sample<Exec>& at, const wa
 }
 
 template <class Exec>
-void sarsa_grid<Exec>::learn(const guide_sample<Exec>& at, path_recorder<Exec>& paths) {
+void sarsa_grid<Exec>::learn(const sample_context<Exec>& at, path_recorder<Exec>& paths) {
   if (queue_.capacity() == 0) return;
   at.exec.for_each(paths.recorded(),
                    detail::learn_path{
@@ -111,7 +113,7 @@ void sarsa_grid<Exec>::publish(const Exec& exec) {
       normalisers_.size(),
       detail::normalise_products{weights_.data(), cosines_.data(), opposites_.data(), normalisers_.data(),
                                  view_.resolution_ * view_.resolution_, view_.normals_.size()});
-  view_.fraction_ = options_.guide_fraction > 0.0f ? options_.guide_fraction : 0.5f;
+  view_.fraction_ = options_.guide_fraction.value_or(0.5f);
 }
 
 template <class Exec>

@@ -1,5 +1,6 @@
-// What a sarsa_grid learns, and what follows from it: kernels. Values are summed exactly in any order
-// (value_queue.hpp), tables are integers, so that reruns give the same bits.
+// Kernels of a sarsa_grid: they compute values from recorded paths, fold them into means, and publish
+// distributions. Values are summed exactly in any order (value_queue.hpp), and tables are integers. So reruns
+// give the same bits.
 #pragma once
 
 #include <wfpg/exec/support/value_queue.hpp>
@@ -11,11 +12,11 @@ namespace wfpg {
 
 namespace detail {
 
-/// Cells over a box: positions beyond it are the next cell's.
+/// Cells over a box. Positions beyond it belong to the nearest cell.
 struct sarsa_cells {
-  vec3 lower{0.0f};
-  vec3 per_unit{0.0f};  // cells along each axis
-  std::uint32_t resolution = 0;
+  vec3 lower{0.0f};              // corner of the box, world space
+  vec3 per_unit{0.0f};           // cells a scene unit, along each axis
+  std::uint32_t resolution = 0;  // cells along a side
 
   WFPG_HD std::uint32_t index(vec3 p) const {
     const vec3 at = (p - lower) * per_unit;
@@ -29,13 +30,13 @@ struct sarsa_cells {
   }
 };
 
-/// What is known of a direction: the mean of `count` values.
+/// Running mean of a direction's radiance, of `count` values.
 struct direction_mean {
   float radiance;
   std::uint32_t count;
 };
 
-/// What learning reads: radiance as of the last step, a direction of a cell each.
+/// The known radiance that learning reads: of each cell and direction, as of the last step.
 struct sarsa_table {
   sarsa_cells cells;
   const float* radiance = nullptr;
@@ -47,9 +48,10 @@ struct sarsa_table {
   }
 };
 
-/// Queues a value for each direction that a path took. Monte Carlo's is what left the next vertex; SARSA's is
-/// Le + a L of Eq. 6, with what the next vertex scatters of sampled light in Le, and a the growth of the
-/// throughput there, which a path that ends has none of.
+/// Queues a value for each direction that a recorded path took. With Monte Carlo it is all radiance that left
+/// the next vertex. With SARSA it is Le + a L of Eq. 6. There Le includes the light that next-event
+/// estimation sampled at the next vertex. The attenuation `a` is the ratio of the throughputs after and
+/// before that vertex; it is 0 where the path ends.
 struct learn_path {
   path_recorder_view paths;
   sarsa_table table;
@@ -80,25 +82,27 @@ struct learn_path {
             : leaving_luminance(path.contribution(next), path.throughput(next)) + scattered(path, next);
     vec3 direction;
     const vec3 position = path.position(next - 1);
-    if (value >= 0.0f && is_finite(value) && is_finite(position) && path.leads(next - 1, direction))
+    if (value >= 0.0f && is_finite(value) && is_finite(position) && path.has_direction(next - 1, direction))
       queue.write(entry, table.index(position, direction), min(value, 1.0e30f));
     else
       queue.drop(entry);
   }
 
-  /// What a vertex scatters of the light that is known to arrive there.
+  /// Luminance that a vertex scatters of the known radiance: all of it by number (Eq. 5), or the path's next
+  /// direction's (Eq. 6).
   WFPG_HD float scattered(const recorded_path& path, std::uint32_t vertex) const {
     if (vertex >= path.surfaces()) return 0.0f;
     if (update == sarsa_update::expected_sarsa && path.field(vertex) < expected.size())
       return expected[path.field(vertex)];
     vec3 direction;
-    if (vertex + 1 >= path.vertices() || !path.leads(vertex, direction)) return 0.0f;
+    if (vertex + 1 >= path.vertices() || !path.has_direction(vertex, direction)) return 0.0f;
     const float attenuation = leaving_luminance(path.throughput(vertex + 1), path.throughput(vertex));
     return attenuation * table.radiance[table.index(path.position(vertex), direction)];
   }
 };
 
-/// The integral of Eq. 5 at a wave's surfaces: a random direction of each of a cell's, all around.
+/// Estimates the integral of Eq. 5 at each surface of a wave: with one random direction in each of the cell's
+/// B² directions, over the sphere.
 template <class Surfaces>
 struct expect_scattering {
   Surfaces surfaces;
@@ -125,8 +129,8 @@ struct expect_scattering {
   }
 };
 
-/// Moves means toward the n values that directions have received: by Eq. 7 once for each, which is
-/// 1 - (1 - alpha)^n of the way, and where that is less as values do that all count alike.
+/// Moves each mean toward the n values that its direction received. Eq. 7, applied n times, moves it by the
+/// fraction 1 - (1 - alpha)^n. A mean whose values all weigh alike moves by n / count. The larger one counts.
 struct fold_values {
   value_queue_view queue;
   direction_mean* means;
@@ -147,8 +151,8 @@ struct fold_values {
   }
 };
 
-/// A step's end, a cell a block: what learning reads from here on, and what rays draw from. Directions that
-/// nothing is known of are as bright as the mean of the others.
+/// Publishes the means at the end of a step, one block a cell: as the radiance that learning reads, and as
+/// the distribution that rays sample. Directions without values get the mean of the others.
 struct publish_cell {
   const direction_mean* means;
   float* radiance;
@@ -180,8 +184,9 @@ struct publish_cell {
   }
 };
 
-/// The cosine between a normal of the lattice and the directions of each cell, clamped, in 255ths: the mean
-/// of some in the cell. Of a cell and its opposite one is positive.
+/// Tabulates the clamped cosine between each normal of the lattice and each direction, in 255ths: the mean
+/// over 16 points of the direction's range, at least 1 where any is positive. Of a direction and its
+/// opposite, one is positive.
 struct tabulate_cosines {
   normal_lattice normals;
   std::uint32_t resolution;
@@ -204,7 +209,7 @@ struct tabulate_cosines {
   }
 };
 
-/// The paper's memoised normalisers: f(i) for a cell and a normal of the lattice.
+/// Computes the paper's memoised normalisers, of each cell and each normal of the lattice.
 struct normalise_products {
   const std::uint32_t* weights;
   const std::uint8_t* cosines;
@@ -226,7 +231,8 @@ struct normalise_products {
   }
 };
 
-/// Opposite cells of the octahedral square, which are cells where `resolution` is even.
+/// Tabulates the opposite of each direction of the octahedral square. It is a direction of the grid, since
+/// `resolution` is even.
 struct find_opposites {
   std::uint32_t resolution;
   std::uint32_t* opposites;

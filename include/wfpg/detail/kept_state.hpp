@@ -1,7 +1,8 @@
-// Kept fields to and from bytes: which node each leaf's rays belong to, and the slots in use with what their
-// cells hold. All that finds slots is made anew when the next sample begins.
+// Converts kept fields to and from bytes: the bin of each leaf, and the slots in use with the content of
+// their cells. The table that finds slots is made anew when the next sample begins.
+//
 // Memory: a copy of the whole pool, and the bytes of the fields in use. The pool is copied in three pieces,
-// since a device takes microseconds for each copy.
+// since each copy costs a device microseconds.
 #pragma once
 
 #include <wfpg/guides/octree/field_store.hpp>
@@ -14,7 +15,7 @@
 
 namespace wfpg::detail {
 
-/// Sets each leaf's rays and the level of the node that they belong to.
+/// Kernel: sets each leaf's ray count, and its bin from the bin's level.
 struct place_marks {
   sparse_voxel_octree_view tree;
   const std::uint32_t* rays;
@@ -25,7 +26,7 @@ struct place_marks {
   }
 };
 
-/// A slot in use, as a file has it. It has cells once it has been built: its fraction is positive then.
+/// A slot in use, as a file has it. Its cells follow once it has been built: its fraction is positive then.
 struct saved_slot {
   std::uint32_t index = 0;
   field_slot slot;
@@ -40,47 +41,47 @@ struct pool_copy {
   std::vector<std::uint16_t> learnt;  // empty where fields do not learn
 };
 
-/// Whether words are the sums of a distribution with weight.
+/// Whether words are the inclusive sums of a distribution with positive weight. Kernels search them without
+/// checks.
 inline bool is_distribution(const std::vector<std::uint32_t>& words, std::size_t resolution) {
   std::uint32_t above = 0;  // of all rows so far
   for (std::size_t y = 0; y < resolution; ++y) {
     const auto row = words.begin() + static_cast<std::ptrdiff_t>(y * resolution),
                end = row + static_cast<std::ptrdiff_t>(resolution);
     if (!std::is_sorted(row, end)) return false;
-    const std::uint32_t through = words[resolution * resolution + y];
-    if (through < above || through - above != *(end - 1)) return false;
-    above = through;
+    const std::uint32_t prefix = words[resolution * resolution + y];
+    if (prefix < above || prefix - above != *(end - 1)) return false;
+    above = prefix;
   }
   return words.back() > 0;
 }
 
-/// In [0, most]; by bits, since compilers may assume that numbers are finite.
+/// Whether a value is in [0, most]. Compares bits, since compilers may assume that numbers are finite.
 inline bool is_up_to(float value, float most) {
   return float_bits(value) <= float_bits(most);
 }
 
-/// To and from the members of a field_store that a guide file holds.
-struct store_state {
+/// Reads and writes the members of a field_store that a guide file holds; its friend.
+struct kept_state {
+  // Section "levels": samples counted, the last busy sample, then each leaf's rays and its bin's level.
   template <class Exec>
   static section_writer levels_to_bytes(const Exec& exec, const field_store<Exec>& store) {
     section_writer bytes;
-    bytes.put(store.counted_samples_);
-    bytes.put(store.busy_until_);
+    bytes.put(store.schedule_.counted_samples());
+    bytes.put(store.schedule_.busy_until());
     const std::vector<leaf_mark> leaves = store.marks_.leaves_.to_host(exec);
     for (const leaf_mark& leaf : leaves) bytes.put(leaf.rays);
     for (const leaf_mark& leaf : leaves) bytes.put(static_cast<std::uint8_t>(store.tree_.level_of(leaf.bin)));
     return bytes;
   }
 
+  // Reads section "levels" after `samples` samples. Throws file_error for wrong levels or counters.
   template <class Exec>
   static void restore_levels(const Exec& exec, section_reader bytes, std::uint32_t samples,
                              field_store<Exec>& store) {
     const std::size_t leaf_count = store.tree_.leaf_count();
-    store.sample_ = samples;
-    store.counted_samples_ = bytes.get<std::uint32_t>();
-    store.busy_until_ = bytes.get<std::uint32_t>();
-    bytes.require(store.counted_samples_ <= samples && store.busy_until_ <= samples + 32,
-                  "has more samples than there were");
+    const auto counted = bytes.get<std::uint32_t>(), busy_until = bytes.get<std::uint32_t>();
+    bytes.require(store.schedule_.restore(samples, counted, busy_until), "has more samples than there were");
     const buffer<std::uint32_t, Exec> rays(exec, bytes.get_all<std::uint32_t>(leaf_count));
     const auto levels = bytes.get_all<std::uint8_t>(leaf_count);
     bytes.end();
@@ -91,18 +92,19 @@ struct store_state {
                   place_marks{store.tree_, rays.data(), levels_there.data(), store.marks_.leaves_.data()});
   }
 
+  // Section "fields": counters, then the slots in use in ascending order, each with its cells.
   template <class Exec>
   static section_writer fields_to_bytes(const Exec& exec, const field_store<Exec>& store) {
-    const auto state = read_element(exec, store.state_.data());
+    const auto state = read_element(exec, store.state());
     section_writer bytes;
     bytes.put(state.pressure);
-    bytes.put(state.refused_births);
-    bytes.put(state.delayed_births);
-    bytes.put(state.born);
+    bytes.put(state.refused);
+    bytes.put(state.delayed);
+    bytes.put(state.allocated);
     bytes.put(state.refreshed);
-    bytes.put(std::uint32_t(store.learns()));
-    const std::vector<field_slot> slots = store.slots_.to_host(exec);
-    const std::vector<resident_field> fields = store.fields_.to_host(exec);
+    bytes.put(std::uint32_t(store.pool_.learns()));
+    const std::vector<field_slot> slots = store.table_.to_host(exec);
+    const std::vector<resident_field> fields = store.pool_.fields_.to_host(exec);
     pool_copy pool = empty_pool(store);
     copy_pool(store, pool,
               [&](auto* host, const auto& cells) { exec.copy_to_host(host, cells.data(), cells.bytes()); });
@@ -112,19 +114,22 @@ struct store_state {
     return bytes;
   }
 
+  // Reads section "fields". Throws file_error for what kernels could not rely on, before it changes the
+  // store.
   template <class Exec>
   static void restore_fields(const Exec& exec, section_reader bytes, field_store<Exec>& store) {
     field_store_state state;
     state.pressure = bytes.get<std::uint32_t>();
-    state.refused_births = bytes.get<std::uint32_t>();
-    state.delayed_births = bytes.get<std::uint32_t>();
-    bytes.require(state.pressure >= adapt_pressure::least && state.pressure <= adapt_pressure::most,
+    state.refused = bytes.get<std::uint32_t>();
+    state.delayed = bytes.get<std::uint32_t>();
+    bytes.require(state.pressure >= build_schedule_constants::least_pressure &&
+                      state.pressure <= build_schedule_constants::largest_pressure,
                   "has a pressure out of range");
-    state.born = bytes.get<std::uint64_t>();
+    state.allocated = bytes.get<std::uint64_t>();
     state.refreshed = bytes.get<std::uint64_t>();
     const bool learnt = bytes.get<std::uint32_t>() != 0;
-    std::vector<field_slot> slots(store.capacity_);
-    std::vector<resident_field> fields(store.capacity_);
+    std::vector<field_slot> slots(store.table_.size());
+    std::vector<resident_field> fields(store.table_.size());
     std::vector<std::uint32_t> keys;
     pool_copy pool = empty_pool(store);
     for (std::size_t first = 0; bytes.left() > 0;) {
@@ -137,40 +142,40 @@ struct store_state {
     }
     std::sort(keys.begin(), keys.end());
     bytes.require(std::adjacent_find(keys.begin(), keys.end()) == keys.end(), "has a field twice");
-    state.free = static_cast<std::uint32_t>(store.capacity_ - keys.size());
+    state.free = static_cast<std::uint32_t>(store.table_.size() - keys.size());
     copy_pool(store, pool, [&](const auto* host, const auto& cells) {
       exec.copy_from_host(cells.data(), host, cells.bytes());
     });
-    exec.copy_from_host(store.slots_.data(), slots.data(), store.slots_.bytes());
-    exec.copy_from_host(store.fields_.data(), fields.data(), store.fields_.bytes());
-    exec.copy_from_host(store.state_.data(), &state, sizeof state);
+    exec.copy_from_host(store.pool_.fields(), fields.data(), fields.size() * sizeof(resident_field));
+    store.table_.restore(exec, slots, state);
   }
 
  private:
-  static_assert(sizeof(cone_hit) == 4 && sizeof(rough_mean) == 2, "files hold them as words");
+  static_assert(sizeof(cone_hit) == 4 && sizeof(stochastic_mean16) == 2, "files hold them as words");
 
   template <class Exec>
   static pool_copy empty_pool(const field_store<Exec>& store) {
-    return {std::vector<std::uint32_t>(store.words_.size()), std::vector<std::uint32_t>(store.hits_.size()),
-            std::vector<std::uint16_t>(store.learns() ? store.learnt_.size() : 0)};
+    return {std::vector<std::uint32_t>(store.pool_.words_.size()),
+            std::vector<std::uint32_t>(store.pool_.hits_.size()),
+            std::vector<std::uint16_t>(store.pool_.learns() ? store.pool_.learnt_.size() : 0)};
   }
 
-  /// copy(host, buffer) for each part of the pool.
+  /// Calls copy(host, buffer) for each part of the pool.
   template <class Exec, class Copy>
   static void copy_pool(const field_store<Exec>& store, pool_copy& pool, const Copy& copy) {
-    copy(pool.words.data(), store.words_);
-    copy(pool.hits.data(), store.hits_);
-    if (store.learns()) copy(pool.learnt.data(), store.learnt_);
+    copy(pool.words.data(), store.pool_.words_);
+    copy(pool.hits.data(), store.pool_.hits_);
+    if (store.pool_.learns()) copy(pool.learnt.data(), store.pool_.learnt_);
   }
 
-  /// Appends a slot's part of what a pool has, `n` a slot.
+  /// Appends one slot's part of an array with `n` entries a slot.
   template <class Word>
   static void put_part(const std::vector<Word>& of_all, std::size_t n, std::size_t slot,
                        section_writer& bytes) {
     bytes.put_all(of_all.data() + slot * n, n);
   }
 
-  /// The ray that a build was to start from is not there: the wave that it was of has ended.
+  /// Appends one slot. The origin of a build that was asked for is left out: its wave has ended.
   template <class Exec>
   static void put(const saved_slot& s, const field_store<Exec>& store, const pool_copy& pool,
                   section_writer& bytes) {
@@ -182,41 +187,42 @@ struct store_state {
     bytes.put(s.field.normal);
     bytes.put(s.field.fraction);
     if (!s.is_built()) return;
-    put_part(pool.words, store.words_a_field(), s.index, bytes);
-    put_part(pool.hits, store.cells_a_field(), s.index, bytes);
-    if (store.learns()) put_part(pool.learnt, store.cells_a_field(), s.index, bytes);
+    put_part(pool.words, store.pool_.words_a_field(), s.index, bytes);
+    put_part(pool.hits, store.pool_.cells_a_field(), s.index, bytes);
+    if (store.pool_.learns()) put_part(pool.learnt, store.pool_.cells_a_field(), s.index, bytes);
   }
 
-  /// The next slot in use, `first` or one after it, up to its cells.
+  /// Reads the next slot in use up to its cells. Its index is at least `first`.
   template <class Exec>
   static saved_slot take(section_reader& bytes, const field_store<Exec>& store, std::size_t first) {
     saved_slot s;
     s.index = bytes.get<std::uint32_t>();
     bytes.require(s.index >= first, "has slots out of order");
-    bytes.require(s.index < store.capacity_, "has more fields than option kept.budget_bytes has room for");
+    bytes.require(s.index < store.table_.size(),
+                  "has more fields than option kept.budget_bytes has room for");
     s.slot.key = bytes.get<std::uint32_t>();
     s.slot.last_used = bytes.get<std::uint32_t>();
     s.slot.last_built = bytes.get<std::uint32_t>();
     s.slot.builds = bytes.get<std::uint32_t>();
     s.field.normal = bytes.get_vec3();
     s.field.fraction = bytes.get<float>();
-    check(bytes, s, store.tree_.node_count(), store.sample_);
+    check(bytes, s, store.tree_.node_count(), store.schedule_.sample());
     return s;
   }
 
-  /// The cells of a slot, into its part of the pool.
+  /// Reads the cells of a slot into its part of the pool.
   template <class Exec>
   static void take_cells(section_reader& bytes, const field_store<Exec>& store, std::size_t slot, bool learnt,
                          pool_copy& pool) {
-    const std::size_t cells = store.cells_a_field();
-    const auto words = bytes.get_all<std::uint32_t>(store.words_a_field());
+    const std::size_t cells = store.pool_.cells_a_field();
+    const auto words = bytes.get_all<std::uint32_t>(store.pool_.words_a_field());
     const auto hits = bytes.get_all<std::uint32_t>(cells);
     check_cells(bytes, words, hits, store.options_.resolution, store.tree_.node_count());
     place(words, slot, pool.words);
     place(hits, slot, pool.hits);
     if (!learnt) return;
     const auto values = bytes.get_all<std::uint16_t>(cells);
-    if (store.learns()) place(values, slot, pool.learnt);
+    if (store.pool_.learns()) place(values, slot, pool.learnt);
   }
   template <class Word>
   static void place(const std::vector<Word>& words, std::size_t slot, std::vector<Word>& of_all) {

@@ -1,5 +1,7 @@
-// What a guide of lights has learnt, to and from bytes: the means of the deepest rows. All else follows.
-// Memory: the section's.
+// Converts what a light_guide has learnt to and from bytes: the means of the deepest rows. All else follows
+// from these.
+//
+// Memory: the section's bytes.
 #pragma once
 
 #include <wfpg/guides/octree/light_guide.hpp>
@@ -11,8 +13,9 @@
 
 namespace wfpg::detail {
 
-/// To and from the members of a light_guide that a guide file holds.
+/// Reads and writes the members of a light_guide that a guide file holds; its friend.
 struct light_state {
+  // Section "lights": the deepest rows' means, a word each.
   template <class Exec>
   static section_writer to_bytes(const Exec& exec, const light_guide<Exec>& lights) {
     std::vector<std::uint32_t> words(means_of(lights));
@@ -22,6 +25,7 @@ struct light_state {
     return bytes;
   }
 
+  // Reads section "lights". Throws file_error for a mean out of range, before it changes the guide.
   template <class Exec>
   static void restore(const Exec& exec, section_reader bytes, light_guide<Exec>& lights) {
     const auto words = bytes.get_all<std::uint32_t>(means_of(lights));

@@ -1,98 +1,25 @@
-// The slots of kept fields: which holds which field, how a wave's rays find theirs through a hash table of
-// (node, orientation) keys, and what they ask for on the way. Who gets it is allot_slots.hpp's.
+// Finds the slots of a wave's rays, and collects what rays ask for: builds of fields that are due, and slots
+// for keys without one. allocate_slots.hpp decides who gets a slot.
+//
+// Cost: O(1) expected a ray, and O(depth) for a ray whose key has no slot.
 #pragma once
 
 #include <wfpg/base/math.hpp>
-#include <wfpg/base/types.hpp>
 #include <wfpg/bins/spatial_binner.hpp>
 #include <wfpg/exec/support/atomic.hpp>
 #include <wfpg/guide/statistics.hpp>
 #include <wfpg/guides/octree/detail/bin_marks.hpp>
-#include <wfpg/guides/octree/guide_view.hpp>
+#include <wfpg/guides/octree/field_slots.hpp>
 
 namespace wfpg::detail {
 
-inline constexpr std::uint32_t no_slot = no_field;
-inline constexpr std::uint32_t no_key = 0xffffffffu;
-
-/// What is known of a slot, beside its field.
-struct field_slot {
-  static constexpr std::uint64_t unpicked = ~0ull;
-
-  std::uint32_t key = no_key;       ///< node · orientations + orientation; no_key: free
-  std::uint32_t last_used = 0;      ///< sample in which a ray had its field
-  std::uint32_t last_built = 0;     ///< sample
-  std::uint32_t builds = 0;         ///< 0: all of its cells are to be cast
-  std::uint64_t origin = unpicked;  ///< the ray that its next build starts from, below a random number
-
-  /// Fields settle as samples accumulate: an eighth of them may pass between two builds, and a quarter once
-  /// there are many.
-  WFPG_HD bool is_due(std::uint32_t sample) const {
-    const std::uint64_t passed = sample - last_built;
-    return builds == 0 || (passed >= 1 && (sample <= 32 ? 8 : 4) * passed >= sample);
-  }
-};
-
-/// Slots and the table that finds them.
-struct field_slots_view {
-  static constexpr std::uint64_t no_entry = ~0ull;
-
-  array_view<field_slot> slots;
-  // Keys above their slots, by the keys' hashes, linear probing, at most half full.
-  std::uint64_t* table = nullptr;
-  std::uint32_t table_mask = 0;
-  // A slot: 1 once nothing is left to note of it in this sample. Most rays need to read no more of their slot
-  // than this, and what all of them read is few cache lines.
-  std::uint8_t* settled = nullptr;
-
-  WFPG_HD static std::uint32_t hash_key(std::uint32_t key) {
-    return static_cast<std::uint32_t>(key * 0x9e3779b97f4a7c15ull >> 32);
-  }
-
-  WFPG_HD std::uint32_t find(std::uint32_t key) const {
-    for (std::uint32_t i = hash_key(key);; ++i) {
-      const std::uint64_t entry = table[i & table_mask];
-      if (entry == no_entry || entry >> 32 == key) return static_cast<std::uint32_t>(entry);
-    }
-  }
-  WFPG_HD void insert(std::uint32_t slot) const {
-    const std::uint32_t key = slots[slot].key;
-    const std::uint64_t entry = std::uint64_t(key) << 32 | slot;
-    std::uint32_t i = hash_key(key);
-    while (atomic_compare_exchange(table + (i & table_mask), no_entry, entry) != no_entry) ++i;
-  }
-};
-
-/// What became of one wave.
-struct field_wave_counts {
-  std::uint32_t missing = 0;   ///< 1 where some ray found no slot at first
-  std::uint32_t unbinned = 0;  ///< rays outside every voxel
-  std::uint32_t unserved = 0;  ///< rays that got no field
-  std::uint32_t served = 0;    ///< rays that got one
-  std::uint32_t all = 0;       ///< builds that cast all cells
-  std::uint32_t part = 0;      ///< builds that cast a part of them
-  std::uint32_t builds = 0;    ///< both
-};
-
-/// What the host never has to read in a sample.
-struct field_store_state {
-  std::uint32_t pressure = 2 * mark_threshold::pressure_unit;
-  std::uint32_t free = 0;            ///< slots in the list of free ones, made at the beginning of a sample
-  std::uint32_t taken = 0;           ///< of that list
-  std::uint32_t refused_births = 0;  ///< in this sample, for want of a free slot
-  std::uint32_t delayed_births = 0;  ///< in this sample, for the limit on cones
-  std::uint32_t waiting = 0;         ///< fields that one wave of this sample asked for in vain, at most
-  std::uint32_t used = 0;            ///< fields of the bins that there are, where these are chosen anew
-  // Since the beginning:
-  std::uint64_t born = 0, refreshed = 0;
-};
-
-/// The slots to build in a wave: those to cast whole, from the number of slots on those to refresh.
+/// Lists of the slots to build in a wave. Those to cast whole come first; those to refresh begin at entry
+/// `slots`.
 struct build_list {
   std::uint32_t* list = nullptr;
   field_wave_counts* counts = nullptr;
 
-  /// In any order: fields do not depend on each other.
+  /// Appends a slot. The order depends on threads, which is harmless: fields do not depend on each other.
   WFPG_HD void add(std::uint32_t slot, bool whole, std::size_t slots) const {
     const std::uint32_t rank = atomic_add(whole ? &counts->all : &counts->part, 1);
     list[(whole ? 0 : slots) + rank] = slot;
@@ -102,12 +29,12 @@ struct build_list {
 
 /// How a wave's rays ask for builds.
 enum class wanted_builds : std::uint32_t {
-  none,    ///< not in this wave
-  marked,  ///< list_builds() chooses among the slots
-  listed,  ///< all are built
+  none,    ///< this wave builds nothing
+  marked,  ///< rays mark slots, and list_builds() chooses among them
+  listed,  ///< rays list slots, and all of them are built
 };
 
-/// Notes that a ray of the wave has a slot.
+/// Notes that a ray uses a slot, and asks for its build where that is due.
 struct use_slot {
   field_slots_view slots;
   std::uint32_t sample;
@@ -116,18 +43,18 @@ struct use_slot {
   build_list builds;
 
   WFPG_HD void operator()(std::uint32_t slot, std::size_t ray) const {
-    if (atomic_load_cached(slots.settled + slot) != 0) return;
+    if (atomic_load_cached(slots.noted + slot) != 0) return;
     field_slot& s = slots.slots[slot];
     const bool is_due = s.is_due(sample);
     if (atomic_load(&s.last_used) != sample) {
       atomic_store(&s.last_used, sample);
-      if (!is_due) atomic_store(slots.settled + slot, std::uint8_t(1));
+      if (!is_due) atomic_store(slots.noted + slot, std::uint8_t(1));
     }
     if (is_due && wanted != wanted_builds::none) want_build(s, slot, ray);
   }
 
  private:
-  // The least random number picks the origin, whichever ray comes first.
+  // The least random number picks the origin, so the choice does not depend on which ray comes first.
   WFPG_HD void want_build(field_slot& s, std::uint32_t slot, std::size_t ray) const {
     const std::uint64_t candidate = (hash(seed, ray) & ~0xffffffffull) | ray;
     if (candidate >= atomic_load(&s.origin)) return;
@@ -136,7 +63,7 @@ struct use_slot {
   }
 };
 
-/// Rays whose own field is missing are marked with its key, where others have their slot.
+/// Encoding of a ray whose key has no slot: the key with its top bit set, where other rays have their slot.
 struct missing_key {
   static constexpr std::uint32_t mark = 0x80000000u;
   static constexpr std::uint32_t most_nodes = mark / orientations;
@@ -146,7 +73,8 @@ struct missing_key {
   WFPG_HD static std::uint32_t key(std::uint32_t field) { return field & ~mark; }
 };
 
-/// Keys that want a slot, one a bucket: the least key has it, the others ask again in the next wave.
+/// Hash buckets of keys that want a slot, one key a bucket. The least key wins a bucket; the others ask again
+/// in the next wave.
 struct wanted_keys {
   std::uint32_t* buckets = nullptr;
   std::uint32_t mask = 0;
@@ -157,18 +85,20 @@ struct wanted_keys {
   }
 };
 
-/// What became of a wave's rays: sums of `served`, `unserved` and 0, of up to 65,535 rays at once.
+/// Counts what became of a wave's rays. A ray adds `with_field`, `without_field` or 0 to a sum, of up to
+/// 65,535 rays at once.
 struct ray_counts {
-  static constexpr std::uint32_t served = 1;
-  static constexpr std::uint32_t unserved = 1u << 16;
+  static constexpr std::uint32_t with_field = 1;
+  static constexpr std::uint32_t without_field = 1u << 16;
 
   field_wave_counts* counts;
-  depth_statistics* statistics;  // null: none are wanted
+  // Null: no statistics are wanted.
+  depth_statistics* statistics;
 
   WFPG_HD void add(std::uint32_t sum) const {
     const std::uint32_t with = sum & 0xffffu, without = sum >> 16;
-    if (with > 0) atomic_add(&counts->served, with);
-    if (without > 0) atomic_add(&counts->unserved, without);
+    if (with > 0) atomic_add(&counts->with_field, with);
+    if (without > 0) atomic_add(&counts->without_field, without);
     if (!statistics) return;
     if (with > 0) atomic_add(&statistics->rays, std::uint64_t(with));
     if (without > 0) atomic_add(&statistics->unbinned, std::uint64_t(without));
@@ -179,8 +109,8 @@ struct ray_counts {
   }
 };
 
-/// The slot of a ray whose own field is missing: its nearest ancestor's with one, or none. What finds a field
-/// tells what became of its ray.
+/// Finds the slot of a ray whose own key has none: its nearest ancestor's with one, or no slot. Returns what
+/// ray_counts adds for the ray.
 struct use_ancestor {
   sparse_voxel_octree_view tree;
   use_slot use;
@@ -190,13 +120,14 @@ struct use_ancestor {
     for (node_id node = key / orientations; slot == no_slot && node != invalid_node; node = tree.parent(node))
       slot = use.slots.find(node * orientations + key % orientations);
     field = slot;
-    if (slot == no_slot) return ray_counts::unserved;
+    if (slot == no_slot) return ray_counts::without_field;
     use(slot, ray);
-    return ray_counts::served;
+    return ray_counts::with_field;
   }
 };
 
-/// Finds rays' slots, and counts the rays where `counted`. `Rays`: (std::size_t) -> ray_to_bin.
+/// Finds a ray's slot, and counts the ray where `counted` includes it. `Rays`: (std::size_t) -> ray_to_bin.
+/// Returns what ray_counts adds for the ray.
 template <class Rays>
 struct find_field {
   Rays rays;
@@ -221,7 +152,7 @@ struct find_field {
     if (slot != no_slot) {
       field = slot;
       use(slot, i);
-      return ray_counts::served;
+      return ray_counts::with_field;
     }
     if (use.wanted == wanted_builds::none) return ancestor(key, i, field);
     field = missing_key::marked(key);
@@ -231,7 +162,7 @@ struct find_field {
   }
 };
 
-/// A wave's rays, so many a block.
+/// A wave's rays, `length` of them a block.
 struct ray_blocks {
   static constexpr std::size_t length = 2048;
 
@@ -241,7 +172,8 @@ struct ray_blocks {
 
   std::size_t size() const { return max<std::size_t>((rays + length - 1) / length, 1); }
 
-  /// find(ray, field) gives the rays of block i their fields.
+  /// Gives the rays of block i their fields: find(ray, field) writes a field and returns what ray_counts
+  /// adds.
   template <class Block, class Find>
   WFPG_HD void find(Block& block, std::size_t i, const Find& find) const {
     const std::size_t first = i * length;
@@ -254,14 +186,15 @@ struct ray_blocks {
   }
 };
 
-/// Fields are written, to be built next.
+/// Kernel: writes each ray's slot, for a wave whose fields are built next.
 template <class Rays>
 struct find_fields {
   static constexpr bool waits_for_memory = true;
 
   find_field<Rays> find;
   ray_blocks blocks;
-  field_wave_counts* next;  // of the wave after this one
+  // Counts of the wave after this one, which it clears.
+  field_wave_counts* next;
 
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t i) const {
@@ -270,7 +203,8 @@ struct find_fields {
   }
 };
 
-/// The rays that find_fields left marked: their fields have been born, or an ancestor's serve, or none do.
+/// Kernel: finds slots for the rays that find_fields left marked. Their fields have been allocated since, or
+/// they use an ancestor's, or none.
 struct find_missing_fields {
   ray_blocks blocks;
   use_ancestor own_or_ancestor;
@@ -284,11 +218,12 @@ struct find_missing_fields {
   }
 };
 
-/// Fields are found and drawn from at once: serve(ray, field).
-template <class Rays, class Serve>
-struct find_and_serve {
+/// Kernel: finds each ray's field and samples it at once: sampler(ray, field).
+template <class Rays, class Sampler>
+struct find_and_sample {
   find_field<Rays> find;
-  Serve serve;
+  Sampler sampler;
+  // Counts of the next wave, cleared here.
   field_wave_counts* next;
 
   template <class Run>
@@ -299,11 +234,11 @@ struct find_and_serve {
       find.counts.add(sum);
       if (run.first() == 0) *next = {};
     });
-    run.for_each([&](std::size_t ray, int i) { serve(ray, fields[i]); });
+    run.for_each([&](std::size_t ray, int i) { sampler(ray, fields[i]); });
   }
 };
 
-/// Counts rays, where nothing is guided yet.
+/// Kernel: counts rays for bins, in samples that guide nothing yet.
 template <class Rays>
 struct count_rays {
   Rays rays;

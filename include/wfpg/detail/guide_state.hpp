@@ -1,0 +1,66 @@
+// A guider's state to and from a guide file: the facade's own counters around the sections of its guide.
+#pragma once
+
+#include <wfpg/detail/guide_sections.hpp>
+#include <wfpg/path_guider.hpp>
+
+namespace wfpg::detail {
+
+/// To and from the members of a path_guider that a guide file holds.
+struct state_access {
+  template <class Exec, class Guide>
+  static section_writer counts_to_bytes(const path_guider<Exec, Guide>& guider) {
+    section_writer bytes;
+    bytes.put(guider.samples_);
+    bytes.put(guider.warm_up_end_);
+    guide_sections::put_build(guider.guide_, bytes);
+    bytes.put(guider.recorder_.dropped(guider.exec_));
+    guide_sections::put_depths(guider.exec_, guider.guide_, bytes);
+    return bytes;
+  }
+
+  template <class Exec, class Guide>
+  static void restore_counts(section_reader bytes, path_guider<Exec, Guide>& guider) {
+    guider.samples_ = bytes.get<std::uint32_t>();
+    bytes.require(guider.samples_ < 0x80000000u, "has samples without end");
+    guider.warm_up_end_ = bytes.get<std::uint32_t>();
+    bytes.require(guider.warm_up_end_ <= guider.samples_ + recording_needs::warm_up_samples,
+                  "warms up until after samples that are to come");
+    guide_sections::take_build(bytes, guider.guide_);
+    const auto dropped = bytes.get<std::uint32_t>();
+    guide_sections::take_depths(guider.exec_, bytes, guider.guide_);
+    guider.exec_.copy_from_host(guider.recorder_.dropped_.data(), &dropped, sizeof dropped);
+  }
+
+  template <class Exec, class Guide>
+  static void save(const path_guider<Exec, Guide>& guider, file_writer& file) {
+    const Exec& exec = guider.exec_;
+    file.section("options", options_to_bytes(guider.options_, guider.guide_.octree().resolution()));
+    guide_sections::save_scene(exec, guider.guide_, file);
+    file.section("counts", counts_to_bytes(guider));
+    guide_sections::save_fields(exec, guider.guide_, file);
+    guide_sections::save_lights(exec, guider.guide_, file);
+    file.end();
+  }
+
+  /// `mesh`: what the octree must be of; null where that is not known.
+  template <class Guide, class Exec>
+  static path_guider<Exec, Guide> load(const Exec& exec, file_reader& file,
+                                       const typename Guide::options_type& options,
+                                       const triangle_mesh_view* mesh) {
+    check_options(file, options);
+    voxel_fragments<Exec> fragments =
+        fragments_from_bytes(exec, file.section("octree"), options.octree_resolution);
+    if (mesh && !is_octree_of(exec, fragments, voxelize(exec, *mesh, options.octree_resolution)))
+      file.fail("is of another scene: its octree is not that of the triangles");
+    path_guider<Exec, Guide> guider(exec, std::move(fragments), options);
+    guide_sections::load_scene(guider.exec_, file, guider.guide_);
+    restore_counts(file.section("counts"), guider);
+    guide_sections::load_fields(guider.exec_, file, guider.samples_, guider.guide_);
+    guide_sections::load_lights(guider.exec_, file, guider.guide_);
+    file.end();
+    return guider;
+  }
+};
+
+}  // namespace wfpg::detail

@@ -1,0 +1,116 @@
+// Owns the memory of kept fields. Each slot has its field's frame and fraction, its distribution, what its
+// cones hit, and what paths found in its cells.
+//
+// Memory: 8 F^2 + 4 F + 16 bytes a slot, and 2 F^2 more where fields learn. A sample takes 16 bytes a cell
+// and 8 a value.
+#pragma once
+
+#include <wfpg/exec/buffer.hpp>
+#include <wfpg/exec/support/running_mean.hpp>
+#include <wfpg/exec/support/value_queue.hpp>
+#include <wfpg/guides/octree/field_cells.hpp>
+#include <wfpg/guides/octree/field_slots.hpp>
+#include <wfpg/guides/octree/guide_view.hpp>
+#include <wfpg/guides/octree/learnt_radiance.hpp>
+
+#include <vector>
+
+namespace wfpg::detail {
+
+/// Kernel: adds the values of a sample to the means of the fields used in it. A block folds one field.
+struct fold_learnt {
+  array_view<field_slot> slots;
+  std::uint32_t sample;
+  std::uint32_t cells;  // of a field; all together fewer than 2^32
+  value_queue_view queue;
+  stochastic_mean16* means;
+
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t slot) const {
+    if (slots[slot].last_used != sample) return;
+    const std::size_t first = slot * cells;
+    block.for_each(static_cast<int>(cells), [&](int i) {
+      const std::size_t cell = first + static_cast<std::size_t>(i);
+      double sum;
+      const std::uint32_t n = queue.take(cell, sum);
+      if (n > 0) means[cell].add(sum, n, hash32(sample, static_cast<std::uint32_t>(cell)));
+    });
+  }
+};
+
+/// The fields of all slots, in the memory of `Exec`.
+template <class Exec>
+class field_pool {
+ public:
+  field_pool() = default;
+  /// Makes `slots` fields of `resolution`² cells. They learn up to `max_values` values in a sample; 0: they
+  /// do not learn.
+  field_pool(const Exec& exec, std::size_t slots, std::uint32_t resolution, std::size_t max_values)
+      : resolution_(resolution),
+        fields_(exec, std::vector<resident_field>(slots)),
+        words_(exec, slots * words_a_field()),
+        hits_(exec, slots * cells_a_field()),
+        learnt_(exec, max_values > 0 ? hits_.size() : 0),
+        queue_(exec, learnt_.size() > 0 ? max_values : 0, learnt_.size()) {
+    exec.fill_bytes(words_.data(), 0, words_.bytes());  // files are written from copies of whole buffers
+    exec.fill_bytes(hits_.data(), 0, hits_.bytes());
+    forget_means(exec);
+  }
+
+  std::uint32_t resolution() const { return resolution_; }
+  std::uint32_t cells_a_field() const { return resolution_ * resolution_; }
+  std::uint32_t words_a_field() const { return grid_distribution::words(resolution_); }
+  /// Bytes of one slot's field.
+  static std::size_t bytes_a_field(std::uint32_t resolution, bool learns) {
+    const std::size_t a_cell = sizeof(cone_hit) + (learns ? sizeof(stochastic_mean16) : 0);
+    return a_cell * resolution * resolution + sizeof(resident_field) +
+           grid_distribution::words(resolution) * sizeof(std::uint32_t);
+  }
+
+  bool learns() const { return learnt_.size() > 0; }
+  resident_field* fields() const { return fields_.data(); }
+  std::uint32_t* words() const { return words_.data(); }
+  cone_hit* hits() const { return hits_.data(); }
+  stochastic_mean16* means() const { return learnt_.data(); }  ///< null where fields do not learn
+
+  /// All fields, with the points of a wave's products.
+  resident_fields view(const product_points& points) const {
+    return {fields_.data(), words_.data(), resolution_, points};
+  }
+  /// Where a sample's paths are recorded; empty where fields do not learn.
+  learnt_radiance_view learnt() const {
+    if (!learns()) return {};
+    return {array_view<const resident_field>(fields_.data(), fields_.size()), resolution_, queue_.view()};
+  }
+  /// Adds the recorded values to the means of the fields that were used in `sample`. O(values + cells of
+  /// these fields).
+  void learn(const Exec& exec, array_view<field_slot> slots, std::uint32_t sample) {
+    if (!learns()) return;
+    queue_.sum(exec);
+    exec.for_each_block(fields_.size(), 0,
+                        fold_learnt{slots, sample, cells_a_field(), queue_.view(), learnt_.data()});
+  }
+  /// Forgets all means, and values recorded since the last learn().
+  void forget(const Exec& exec) {
+    forget_means(exec);
+    if (learns()) queue_.clear(exec);
+  }
+
+  /// Bytes of all fields, without the values that a sample records.
+  std::size_t bytes() const { return fields_.bytes() + words_.bytes() + hits_.bytes() + learnt_.bytes(); }
+  std::size_t value_bytes() const { return queue_.bytes(); }
+
+ private:
+  friend struct kept_state;
+
+  void forget_means(const Exec& exec) { exec.fill_bytes(learnt_.data(), 0, learnt_.bytes()); }
+
+  std::uint32_t resolution_ = 0;
+  buffer<resident_field, Exec> fields_;     // a slot
+  buffer<std::uint32_t, Exec> words_;       // a slot: its distribution
+  buffer<cone_hit, Exec> hits_;             // a slot: its cells
+  buffer<stochastic_mean16, Exec> learnt_;  // a slot: its cells; empty where fields do not learn
+  value_queue<Exec> queue_;
+};
+
+}  // namespace wfpg::detail

@@ -1,0 +1,84 @@
+// Implementation of octree_scene.hpp.
+#pragma once
+
+#include <wfpg/guides/octree/octree_scene.hpp>
+
+namespace wfpg {
+
+template <class Exec>
+void octree_scene<Exec>::require_valid(const octree_guide_options& o) {
+  detail::require_resolution(o.octree_resolution);
+  require(o.binning.rays_per_bin >= 1, "binning.rays_per_bin", o.binning.rays_per_bin, "at least 1");
+  require(o.field.filter_alpha >= 0.0f, "field.filter_alpha", o.field.filter_alpha, "finite, at least 0");
+  require(o.field.floor >= 0.0f, "field.floor", o.field.floor, "finite, at least 0");
+  require(product_resolution(o) == 0 || o.guide_fraction.value_or(0.5f) < 1.0f, "guide_fraction",
+          o.guide_fraction.value_or(0.5f),
+          "less than 1 with products, which do not reach all that a BSDF does");
+  require(o.product_resolution.value_or(4) >= 4, "product_resolution", o.product_resolution.value_or(4),
+          "4, 8 or 16, or unset for none");
+  detail::require_valid(o.lights);
+  require(o.deposits_per_leaf.value_or(1) >= 1, "deposits_per_leaf", o.deposits_per_leaf.value_or(1),
+          "at least 1, or unset to record all paths");
+  require(o.deposit_capacity.value_or(0) <= detail::most_queued, "deposit_capacity",
+          o.deposit_capacity.value_or(0), "at most 2^31");
+}
+
+template <class Exec>
+octree_scene<Exec>::octree_scene(const Exec& exec, const Exec& working, voxel_fragments<Exec> fragments,
+                                 const octree_guide_options& options)
+    : options_((require_valid(options), options)),
+      build_(fragments.report),
+      octree_(exec, fragments),
+      cache_(exec, octree_, fragments, deposits_of_sample()),
+      product_points_(working, std::size_t(2) * product_resolution(options) * product_resolution(options)),
+      counts_(working, options_.max_depth) {
+  // The cache has read the sorted fragments: they are not needed any more.
+  octree_.release_build_data();
+  lights_ = light_guide<Exec>(working, octree_.view(), options_.lights,
+                              max(options_.max_paths, options_.max_rays.value_or(0)), options_.max_depth);
+  ::thrust::fill_n(working.thrust(), counts_.data(), counts_.size(), depth_statistics{});
+  // The means and radii of blocks do not change: measured once.
+  const std::uint32_t p = product_resolution(options_);
+  product_point* const hemisphere = product_points_.data();
+  if (p > 0) working.for_each(std::size_t(p) * p, measure_product_blocks{hemisphere, hemisphere + p * p, p});
+}
+
+template <class Exec>
+std::size_t octree_scene<Exec>::deposits_of_sample() const {
+  if (options_.deposit_capacity) return *options_.deposit_capacity;
+  return recorded().vertices("deposits_per_leaf, or deposit_capacity");
+}
+
+template <class Exec>
+mixture_fraction octree_scene<Exec>::fraction() const {
+  // An option counts for bins of every size.
+  if (options_.guide_fraction) return {*options_.guide_fraction, *options_.guide_fraction, 0};
+  if (options_.mode == guiding_mode::plain) return {0.5f, 0.5f, 0};
+  return {0.7f, 0.5f, options_.binning.rays_per_bin};
+}
+
+template <class Exec>
+product_points octree_scene<Exec>::draw_points(const sample_context<Exec>& at, std::uint32_t depth) {
+  const std::uint32_t p = product_resolution(options_);
+  if (p == 0) return {};
+  product_point* const hemisphere = product_points_.data();
+  at.exec.for_each(std::size_t(p) * p,
+                   draw_product_points{hemisphere, hemisphere + p * p, p, hash(at.seed, depth)});
+  return {hemisphere, hemisphere + p * p, p};
+}
+
+template <class Exec>
+std::vector<memory_part> octree_scene<Exec>::scene_memory(const std::vector<memory_part>& kept,
+                                                          std::size_t values, std::size_t binning,
+                                                          std::size_t fields) const {
+  std::vector<memory_part> parts{{"octree", octree_.bytes(), true},
+                                 {"cache", cache_.persistent_bytes(), true}};
+  parts.insert(parts.end(), kept.begin(), kept.end());
+  parts.push_back({"lights", lights_.persistent_bytes(), true});
+  parts.push_back({"deposits", cache_.transient_bytes() + values + lights_.transient_bytes(), false});
+  parts.push_back({"binning", binning + counts_.bytes() + product_points_.bytes(), false});
+  parts.push_back({"fields", fields, false});
+  return parts;
+}
+
+}  // namespace wfpg

@@ -1,0 +1,164 @@
+// The default guide: its fields stay across depths and samples, under a byte budget. They are refreshed in
+// part, and learn from paths (field_store.hpp).
+//
+// Source: fields are those of Yalciner and Akyuz (2024), section 3.3. Keeping fields and learning are wfpg's
+// own.
+//
+// Cost: that of field_store for each wave, and of octree_scene for each sample. Memory: that of octree_scene,
+// and kept.budget_bytes.
+#pragma once
+
+#include <wfpg/guide/sample_rays.hpp>
+#include <wfpg/guides/octree/detail/sample_fields.hpp>
+#include <wfpg/guides/octree/field_store.hpp>
+#include <wfpg/guides/octree/guide_view.hpp>
+#include <wfpg/guides/octree/octree_scene.hpp>
+
+#include <vector>
+
+namespace wfpg {
+
+/// A guide with kept fields, for path_guider; guide.hpp describes the interface. Movable, not copyable.
+///   Surfaces  (std::uint32_t ray) -> surface<Bsdf>
+///   Random    (std::uint32_t ray, std::uint32_t dimension) -> vec2 in [0, 1)²
+///   Caster    an inline or batch ray caster
+template <class Exec>
+class kept_guide : public octree_scene<Exec> {
+  using scene = octree_scene<Exec>;
+
+ public:
+  /// Options of the constructors.
+  using options_type = kept_guide_options;
+  /// Returned by prepare(), for kernels.
+  using view_type = guide_view;
+
+  /// Builds the guide over triangles, which are read during the call alone. `exec` allocates octree and
+  /// cache. `working` keeps memory that is given back to it; it allocates fields, choices of lights, and all
+  /// that a sample needs.
+  ///
+  /// Throws std::invalid_argument for options out of range, and out_of_memory.
+  kept_guide(const Exec& exec, const Exec& working, triangle_mesh_view mesh,
+             const kept_guide_options& options)
+      : kept_guide(exec, working, scene::fragments_of(exec, mesh, checked(options)), options) {}
+  /// Builds the guide over fragments: of geometry that is not triangles, or of hit points
+  /// (fragments_from_samples). Throws as the other constructor does.
+  kept_guide(const Exec& exec, const Exec& working, voxel_fragments<Exec> fragments,
+             const kept_guide_options& options)
+      : scene(exec, working, std::move(fragments), checked(options)),
+        options_(options),
+        store_(working, scene::octree().view(), options.binning, options.kept,
+               options.max_rays.value_or(options.max_paths), scene::deposits_of_sample()) {}
+
+  /// Which fraction of paths is recorded, by deposits_per_leaf. Directions are recorded where fields learn,
+  /// at 8 bytes a vertex.
+  recording_needs recording() const { return scene::recording(options_.kept.learn); }
+
+  /// Call before the waves of a sample. Frees slots that are no longer used. O(slots).
+  void begin_sample(const sample_context<Exec>& at) {
+    store_.begin_sample(at.exec, at.number);
+    scene::begin_scene_sample(at);
+  }
+  /// Finds, makes and refreshes the fields of a wave's rays. Returns the view that kernels sample from, valid
+  /// until the next call. In unguided samples it counts rays for bins, and returns an empty view.
+  ///
+  /// With an inline caster nothing is read back to the host. Throws std::invalid_argument where the wave has
+  /// more rays than max_rays, and what the caster throws.
+  template <class Surfaces, class Random, class Caster>
+  guide_view prepare(const sample_context<Exec>& at, const wave<Surfaces, Random>& w, const Caster& caster);
+
+  /// True: path_guider calls sample_wave(). It finds and samples fields in one pass in waves that build none.
+  static constexpr bool samples_waves = true;
+  /// Samples the directions of a wave, with products where options ask for them. `Sampler`: sample_ray.
+  /// Unguided waves sample their BSDFs. Throws what prepare() throws.
+  template <class Surfaces, class Random, class Caster, class Sampler>
+  void sample_wave(const sample_context<Exec>& at, const wave<Surfaces, Random>& w, const Caster& caster,
+                   const Sampler& sampler) {
+    if (scene::product_resolution(options_) > 0)
+      sample_fields<detail::sample_product<Sampler>>(at, w, caster, sampler);
+    else
+      sample_fields<detail::sample_field<Sampler>>(at, w, caster, sampler);
+  }
+
+  /// Deposits the recorded paths of a sample into the cache, and into fields that learn. Clears the recorder.
+  /// Both change in update().
+  void learn(const sample_context<Exec>& at, path_recorder<Exec>& paths) {
+    scene::deposit(at, paths, store_.learnt());
+  }
+  /// Updates the cache, fields and choices of lights. Call after each sample, recorded or not. O(deposits +
+  /// nodes + cells of the fields used).
+  void update(const sample_context<Exec>& at) {
+    const bool recorded = scene::update_cache(at);
+    store_.end_sample(at.exec, recorded);
+    scene::end_scene_sample(at);
+  }
+
+  /// Call after geometry moved inside `bounds`. Fields that may see it cast all their cones when they are
+  /// next used. The octree itself does not change.
+  void invalidate(const Exec& exec, const bounds3& bounds) { store_.invalidate(exec, bounds); }
+  /// Call after geometry moved anywhere. Every field loses its hits and what it learnt when it is next used.
+  void invalidate_all(const Exec& exec) { store_.invalidate_all(exec); }
+  /// Forgets all cached light, and what fields and choices of lights learnt. Fields keep their cones' hits.
+  void forget_light(const Exec& exec) {
+    scene::forget_scene_light(exec);
+    store_.forget(exec);
+  }
+
+  /// Where a host's kernels record what their directions found, without the recorder. Empty where fields do
+  /// not learn. Such a host sets deposit_capacity, which is also the capacity here.
+  learnt_radiance_view learnt() const { return store_.learnt(); }
+  /// Key of each kept field, indexed by sampled_direction::field. A key is node * orientations + orientation,
+  /// or 0xffffffff where the number is not in use. Waits for the work before it.
+  std::vector<std::uint32_t> field_keys(const Exec& exec) const { return store_.keys(exec); }
+
+  /// Adds depths, kept fields, deposits and the build to a guider's statistics. Counts by depth start when
+  /// the guide is made. Waits for the work before it.
+  void report(const Exec& exec, guider_statistics& statistics) const {
+    scene::report_scene(exec, statistics);
+    statistics.kept = store_.statistics(exec);
+  }
+  /// Bytes of octree, cache, fields and lights, and of what a sample needs.
+  std::vector<memory_part> memory() const {
+    return scene::scene_memory(
+        {{"kept fields", store_.slot_bytes(), true}, {"levels", store_.level_bytes(), true}},
+        store_.value_bytes(), store_.wave_bytes(), 0);
+  }
+
+ private:
+  friend struct detail::guide_sections;
+
+  // Throws std::invalid_argument where P does not divide kept.resolution. The base and the store check all
+  // else.
+  static const kept_guide_options& checked(const kept_guide_options& options) {
+    detail::require_product_resolution(scene::product_resolution(options), "kept.resolution",
+                                       options.kept.resolution);
+    return options;
+  }
+  // What the store needs of a wave. Draws the wave's points for products.
+  //
+  // Kept fields have one fraction of guided directions, for bins of every size.
+  template <class Surfaces, class Random>
+  kept_field_wave<Surfaces> kept_wave(const sample_context<Exec>& at, const wave<Surfaces, Random>& w) {
+    return {w.ray_count,
+            w.surfaces,
+            scene::cache(),
+            options_.field,
+            options_.mode,
+            scene::fraction().with_enough_rays,
+            hash(at.seed, w.depth),
+            scene::draw_points(at, w.depth),
+            scene::depth_counts(w.depth)};
+  }
+  // `FieldSampler`: sample_field or sample_product, over `Sampler`.
+  template <class FieldSampler, class Surfaces, class Random, class Caster, class Sampler>
+  void sample_fields(const sample_context<Exec>& at, const wave<Surfaces, Random>& w, const Caster& caster,
+                     const Sampler& sampler);
+
+  // As given to the constructor; the base has the part that both guides share.
+  kept_guide_options options_;
+  // Refers to the octree in the base class.
+  field_store<Exec> store_;
+};
+
+}  // namespace wfpg
+
+#include <wfpg/guides/octree/detail/kept_guide_impl.hpp>

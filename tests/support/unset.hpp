@@ -1,0 +1,14 @@
+// Options of loops over values, of which 0 stands for an option that is unset.
+#pragma once
+
+#include <optional>
+
+namespace wfpg_test {
+
+/// The value, or none where it is 0.
+template <class T>
+std::optional<T> unless_zero(T value) {
+  return value != T(0) ? std::optional<T>(value) : std::nullopt;
+}
+
+}  // namespace wfpg_test

@@ -1,0 +1,120 @@
+// The schedule of kept fields' builds, by itself: which waves build, which fields are due, which rays are
+// counted.
+#include "support/catch.hpp"
+
+#include <wfpg/guides/octree/build_schedule.hpp>
+
+#include <cstdint>
+#include <set>
+#include <vector>
+
+namespace {
+
+using wfpg::build_schedule;
+using constants = wfpg::build_schedule_constants;
+
+/// Begins samples until `sample` has begun.
+build_schedule schedule_in(std::uint32_t sample, std::size_t max_rays = 1000, std::uint32_t leaves = 1000) {
+  build_schedule schedule(max_rays, leaves);
+  for (std::uint32_t s = 1; s <= sample; ++s) {
+    schedule.begin_sample(s);
+    schedule.count_sample();
+  }
+  return schedule;
+}
+
+/// The waves of a sample that build, of the first 24.
+std::vector<std::uint32_t> building_waves(build_schedule schedule) {
+  std::vector<std::uint32_t> waves;
+  for (std::uint32_t wave = 0; wave < 24; ++wave) {
+    CHECK(schedule.wave() == wave);
+    if (schedule.builds_in_wave()) waves.push_back(wave);
+    schedule.end_wave();
+  }
+  return waves;
+}
+
+}  // namespace
+
+TEST_CASE("build schedule: every wave builds during warm-up, then one in eight", "[build_schedule]") {
+  CHECK(building_waves(schedule_in(1)).size() == 24);
+  CHECK(building_waves(schedule_in(32)).size() == 24);
+  CHECK((building_waves(schedule_in(33)) == std::vector<std::uint32_t>{7, 15, 23}));
+  CHECK((building_waves(schedule_in(40)) == std::vector<std::uint32_t>{0, 8, 16}));
+}
+
+TEST_CASE("build schedule: waves build for some samples after bins changed or geometry moved",
+          "[build_schedule]") {
+  build_schedule schedule = schedule_in(64);
+  schedule.expect_builds(constants::busy_samples);
+  for (std::uint32_t s = 65; s <= 68; ++s) {
+    schedule.begin_sample(s);
+    CHECK(building_waves(schedule).size() == 24);
+  }
+  schedule.begin_sample(69);
+  CHECK(building_waves(schedule).size() == 3);
+  schedule.expect_builds(constants::invalidated_samples);
+  schedule.expect_builds(1);  // never shortens
+  CHECK(schedule.busy_until() == 69 + 32);
+}
+
+TEST_CASE("build schedule: bins are chosen anew after samples that are powers of two", "[build_schedule]") {
+  CHECK_FALSE(build_schedule().chooses_bins());
+  std::set<std::uint32_t> chosen;
+  for (std::uint32_t s = 1; s <= 100; ++s)
+    if (schedule_in(s).chooses_bins()) chosen.insert(s);
+  CHECK((chosen == std::set<std::uint32_t>{1, 2, 4, 8, 16, 32, 64}));
+}
+
+TEST_CASE("build schedule: rays are counted in all samples first, then in one of four, then of sixteen",
+          "[build_schedule]") {
+  std::set<std::uint32_t> counted;
+  for (std::uint32_t s = 1; s <= 64; ++s)
+    if (schedule_in(s).counts_rays()) counted.insert(s);
+  CHECK((counted == std::set<std::uint32_t>{1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 28, 32, 48, 64}));
+  CHECK(schedule_in(64).counted_samples() == 16);
+  CHECK(schedule_in(63).counted().stride == 0);
+  CHECK_FALSE(schedule_in(63).counted().includes(0));
+}
+
+TEST_CASE("build schedule: large waves count one ray in a stride, others in each sample",
+          "[build_schedule]") {
+  CHECK(schedule_in(1, 8000, 1000).counted().stride == 1);
+  CHECK(schedule_in(1, 8001, 1000).counted().stride == 2);
+  CHECK(schedule_in(1, 32001, 1000).counted().stride == 8);
+  CHECK(schedule_in(1, 100000000, 1000).counted().stride == 32);
+  std::set<std::size_t> first;
+  for (std::uint32_t s = 1; s <= 4; ++s) {
+    const wfpg::counted_rays rays = schedule_in(s, 16001, 1000).counted();
+    CHECK(rays.stride == 4);
+    int n = 0;
+    for (std::size_t ray = 0; ray < 400; ++ray) n += rays.includes(ray) ? 1 : 0;
+    CHECK(n == 100);
+    first.insert(rays.first);
+  }
+  CHECK(first.size() == 4);
+}
+
+TEST_CASE("build schedule: a field is due at first, and once a part of the samples passed",
+          "[build_schedule]") {
+  CHECK(build_schedule::is_due(5, 0, 5));
+  CHECK_FALSE(build_schedule::is_due(5, 1, 5));
+  CHECK(build_schedule::is_due(8, 1, 7));  // an eighth
+  CHECK_FALSE(build_schedule::is_due(16, 1, 15));
+  CHECK(build_schedule::is_due(16, 1, 14));
+  CHECK(build_schedule::is_due(32, 3, 28));
+  CHECK_FALSE(build_schedule::is_due(33, 3, 28));  // a quarter after warm-up
+  CHECK(build_schedule::is_due(36, 3, 27));
+  CHECK_FALSE(build_schedule::is_due(100, 3, 76));
+  CHECK(build_schedule::is_due(100, 3, 75));
+}
+
+TEST_CASE("build schedule: a saved state is taken, or told from one that cannot be", "[build_schedule]") {
+  build_schedule schedule(1000, 1000);
+  CHECK(schedule.restore(64, 16, 68));
+  CHECK(schedule.sample() == 64);
+  CHECK(schedule.counted_samples() == 16);
+  CHECK(schedule.busy_until() == 68);
+  CHECK_FALSE(build_schedule().restore(10, 11, 12));
+  CHECK_FALSE(build_schedule().restore(10, 5, 43));
+}
