@@ -10,7 +10,7 @@ std::uint32_t nodes_of_second_unit();
 template <class Exec>
 std::uint32_t nodes() {
   const Exec exec;
-  return wfpg::path_guider<Exec>(exec, wfpg::triangle_mesh_view{}).octree().node_count();
+  return wfpg::path_guider<Exec>(exec, wfpg::triangle_mesh_view{}).guide().octree().node_count();
 }
 
 int main() {

@@ -5,6 +5,7 @@
 
 std::uint32_t nodes_of_second_unit() {
   return wfpg::path_guider<wfpg::exec::seq>(wfpg::exec::seq(), wfpg::triangle_mesh_view{})
+      .guide()
       .octree()
       .node_count();
 }

@@ -7,7 +7,7 @@
 int main() try {
   const wfpg::exec::cuda exec;
   const std::uint32_t n =
-      wfpg::path_guider<wfpg::exec::cuda>(exec, wfpg::triangle_mesh_view{}).octree().node_count();
+      wfpg::path_guider<wfpg::exec::cuda>(exec, wfpg::triangle_mesh_view{}).guide().octree().node_count();
   std::printf("wfpg %d.%d.%d: %u nodes in an empty scene\n", WFPG_VERSION_MAJOR, WFPG_VERSION_MINOR,
               WFPG_VERSION_PATCH, n);
   return n == 0 ? 0 : 1;
