@@ -1,7 +1,7 @@
 // Files of sections with their checksums put right, so that what is behind them is reached.
 #pragma once
 
-#include <wfpg/guides/octree/detail/guide_state.hpp>
+#include <wfpg/guide_file.hpp>
 #include <wfpg/state/section_file.hpp>
 
 #include <algorithm>
