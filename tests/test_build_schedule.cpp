@@ -81,11 +81,11 @@ TEST_CASE("build schedule: large waves count one ray in a stride, others in each
           "[build_schedule]") {
   CHECK(schedule_in(1, 8000, 1000).counted().stride == 1);
   CHECK(schedule_in(1, 8001, 1000).counted().stride == 2);
-  CHECK(schedule_in(1, 32001, 1000).counted().stride == 8);
+  CHECK(schedule_in(1, 32004, 1000).counted().stride == 8);
   CHECK(schedule_in(1, 100000000, 1000).counted().stride == 32);
   std::set<std::size_t> first;
   for (std::uint32_t s = 1; s <= 4; ++s) {
-    const wfpg::counted_rays rays = schedule_in(s, 16001, 1000).counted();
+    const wfpg::counted_rays rays = schedule_in(s, 16002, 1000).counted();
     CHECK(rays.stride == 4);
     int n = 0;
     for (std::size_t ray = 0; ray < 400; ++ray) n += rays.includes(ray) ? 1 : 0;
