@@ -209,7 +209,7 @@ TEST_CASE("inspect: pixels without a field say so and have the octree's pictures
   CHECK(look(render::material_kind::mirror, 12)["hit"] == "a smooth mirror or glass");
   CHECK(contains(content_of((asked.output / "index.html").string()), "sampled by its BSDF alone"));
   // Without room for a field there is still what the BSDF draws.
-  asked.learning.field_budget = 0;
+  asked.learning.kept.budget_bytes = 0;
   const nlohmann::json bare = look(render::material_kind::lambert, 12);
   CHECK(bare["hit"] == "a surface");
   CHECK(bare["mixture_fraction"] == 0.0);

@@ -253,7 +253,7 @@ TEST_CASE("single samples add up to what the renderer combines itself", "[qualit
   render::render_options options;
   options.width = options.height = 8;
   options.octree_resolution = 16;
-  options.slot_resolution = 8;
+  options.kept.resolution = 8;
   options.spp = 6;
   render::render_options reference_options = options;
   reference_options.seed = 9;

@@ -46,8 +46,8 @@ TEST_CASE("options: presets hold where nothing is given", "[quality]") {
   CHECK(quality::title_of(own.budgets[2]) == "0.5 s");
   const quality::settings paper = parsed({"--preset", "paper"});
   const render::render_options options = quality::options_of(paper.scenes[0], paper.methods[1]);
-  CHECK(options.min_bin_level == 5);
-  CHECK(options.rays_per_bin == 512);
+  CHECK(options.binning.min_level == 5);
+  CHECK(options.binning.rays_per_bin == 512);
   CHECK(options.octree_resolution == 128);
   CHECK(options.field_resolution == 128);
   CHECK(options.lifetime == render::fields::transient);
@@ -63,7 +63,7 @@ TEST_CASE("options: methods are known, one's own, or wfpg-render's", "[quality]"
   CHECK(given.methods[1].name == "small");
   CHECK(given.methods[3].name == "more");
   const render::render_options small = quality::options_of(given.scenes[1], given.methods[1]);
-  CHECK(small.slot_resolution == 16);
+  CHECK(small.kept.resolution == 16);
   CHECK_FALSE(small.nee);
   CHECK(small.where == render::device::seq);
   CHECK(quality::options_of(given.scenes[0], given.methods[2]).mode == render::guiding::plain);

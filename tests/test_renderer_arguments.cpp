@@ -156,7 +156,7 @@ TEST_CASE("numbers are decimal, and at the ends of their ranges accepted", "[ren
                                                         {"5MiB", 5u << 20},
                                                         {"2g", 2u << 30},
                                                         {"1TiB", std::size_t(1) << 40}})
-    CHECK(parsed_options("--field-budget " + text).field_budget == size);
+    CHECK(parsed_options("--field-budget " + text).kept.budget_bytes == size);
 }
 
 TEST_CASE("options without effect are refused by a line that says what they need", "[renderer][arguments]") {

@@ -155,7 +155,7 @@ TEST_CASE("a guided rendering finds the furnace's radiance", "[renderer][guided]
   options.spp = 20;
   options.octree_resolution = 32;
   options.field_resolution = 16;
-  options.slot_resolution = 16;
+  options.kept.resolution = 16;
   for (const fields lifetime : {fields::kept, fields::transient})
     for (const bool nee : {false, true})
       for (const guiding mode : {guiding::oriented, guiding::plain}) {

@@ -36,7 +36,7 @@ render_options small(const rendering& what, int spp) {
   options.width = 24;
   options.height = 16;
   options.spp = spp;
-  options.field_budget = std::size_t(1) << 18;
+  options.kept.budget_bytes = std::size_t(1) << 18;
   return options;
 }
 
@@ -173,15 +173,15 @@ TEST_CASE("a rendering does not go on as another one", "[renderer][state]") {
   refused("--guiding oriented, not plain", [](render_options& o) { o.mode = guiding::plain; });
   refused("--fields kept, not transient", [](render_options& o) { o.lifetime = fields::transient; });
   refused("--octree-resolution 32, not 64", [](render_options& o) { o.octree_resolution = 64; });
-  refused("--rays-per-bin 128, not 64", [](render_options& o) { o.rays_per_bin = 64; });
-  refused("--min-bin-level 2, not 3", [](render_options& o) { o.min_bin_level = 3; });
+  refused("--rays-per-bin 128, not 64", [](render_options& o) { o.binning.rays_per_bin = 64; });
+  refused("--min-bin-level 2, not 3", [](render_options& o) { o.binning.min_level = 3; });
   refused("--deposits-per-leaf 16, not 8", [](render_options& o) { o.deposits_per_leaf = 8; });
   refused("--guide-fraction 0, not 0.25", [](render_options& o) { o.guide_fraction = 0.25f; });
   refused("--guided-depths 4294967295, not 2", [](render_options& o) { o.guided_depths = 2; });
-  refused("--slot-resolution 8, not 16", [](render_options& o) { o.slot_resolution = 16; });
-  refused("--recast 4, not 8", [](render_options& o) { o.recast = 8; });
-  refused("--learn on, not off", [](render_options& o) { o.learn = false; });
-  refused("--field-budget 262144, not 1048576", [](render_options& o) { o.field_budget = 1 << 20; });
+  refused("--slot-resolution 8, not 16", [](render_options& o) { o.kept.resolution = 16; });
+  refused("--recast 4, not 8", [](render_options& o) { o.kept.recast = 8; });
+  refused("--learn on, not off", [](render_options& o) { o.kept.learn = false; });
+  refused("--field-budget 262144, not 1048576", [](render_options& o) { o.kept.budget_bytes = 1 << 20; });
 
   render_options same = options;
   same.resume = path;

@@ -165,7 +165,7 @@ void show_directions(const learnt_scene& learnt, const inspection& asked, std::u
   finding_options options;
   options.reference_spp = asked.reference_spp;
   options.histogram = asked.histogram;
-  options.field_resolution = int(asked.learning.slot_resolution);
+  options.field_resolution = int(asked.learning.kept.resolution);
   shown_progress progress;
   const findings found = find(learnt, pixel, options, progress.callback());
   const picture_folder folder(asked.output);

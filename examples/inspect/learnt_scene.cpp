@@ -124,7 +124,8 @@ struct learnt_scene::state {
       const std::uint32_t number = fields.mixture(pixel).number;
       bins.push_back(number < keys.size() ? keys[number] : no_bin);
     }
-    field_bytes = wfpg::field_store<exec_policy>::bytes_a_slot(g.options().kept.resolution, options.learn);
+    field_bytes =
+        wfpg::field_store<exec_policy>::bytes_a_slot(g.options().kept.resolution, options.kept.learn);
   }
 
   /// The guider's own are those of Algorithm 2, too.

@@ -54,8 +54,8 @@ render_options options_of(const std::string& bytes) {
   options.max_depth = 3;
   options.spp = 5;
   options.octree_resolution = 4;
-  options.field_resolution = options.slot_resolution = options.product_resolution = 4;
-  options.field_budget = 2048;
+  options.field_resolution = options.kept.resolution = options.product_resolution = 4;
+  options.kept.budget_bytes = 2048;
   options.binning.min_level = 1;
   options.binning.rays_per_bin = 2;
   options.light_groups = 2;

@@ -36,9 +36,9 @@ inline render::render_options small(int side, int spp) {
   options.max_depth = 4;
   options.spp = spp;
   options.octree_resolution = 32;
-  options.slot_resolution = 8;
+  options.kept.resolution = 8;
   options.field_resolution = 8;
-  options.rays_per_bin = 32;
+  options.binning.rays_per_bin = 32;
   return options;
 }
 

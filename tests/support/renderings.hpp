@@ -67,11 +67,11 @@ struct rendering {
       options.sarsa.values_per_direction = 1;
     }
     options.field_resolution = 8;
-    options.slot_resolution = 8;
+    options.kept.resolution = 8;
     options.product_resolution = 4;
-    options.recast = 4;
-    options.rays_per_bin = 128;
-    options.min_bin_level = 2;
+    options.kept.recast = 4;
+    options.binning.rays_per_bin = 128;
+    options.binning.min_level = 2;
     options.samples_per_leaf = 500;
     options.sarsa.update = update;
     options.sarsa.sampler = sampler;

@@ -53,8 +53,8 @@ render_options completed(const scene& scene, render_options options) {
           "product_resolution", options.product_resolution, "4, 8 or 16 for wfpg-product");
   require(!is_openpgl(options.method) || options.where == device::cpu, "device",
           name_of(device_names(), options.where), "cpu for Open PGL's methods, which run on TBB");
-  require(options.guide_fraction >= 0.0f && options.guide_fraction <= 1.0f, "guide_fraction",
-          options.guide_fraction, "0 to 1");
+  const float fraction = options.guide_fraction.value_or(1.0f);
+  require(fraction > 0.0f && fraction <= 1.0f, "guide_fraction", fraction, "above 0, at most 1");
   require(options.samples_per_leaf >= 8 && options.samples_per_leaf <= 1u << 30, "samples_per_leaf",
           options.samples_per_leaf, "8 to 2^30");
   require(options.seconds >= 0.0, "seconds", options.seconds, "0 or more");

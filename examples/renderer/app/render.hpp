@@ -54,18 +54,15 @@ struct render_options {
   std::uint32_t field_resolution =
       wfpg::transient_guide_options()
           .field_resolution;  ///< cells a side of transient fields at the first vertex
-  std::uint32_t slot_resolution = wfpg::kept_field_options().resolution;  ///< cells a side of kept fields
-  std::uint32_t recast = wfpg::kept_field_options().recast;  ///< a refresh casts one cone in so many again
-  bool learn = wfpg::kept_field_options().learn;             ///< kept fields learn from paths
-  std::size_t field_budget = wfpg::kept_field_options().budget_bytes;  ///< bytes of kept fields
+  wfpg::kept_field_options kept;
   std::size_t caster_buffer =
       wfpg::kept_guide_options().caster_buffer_bytes;  ///< bytes of cones in flight to OptiX
   std::uint32_t product_resolution = 8;                ///< blocks a side of products, 4, 8 or 16
-  std::uint32_t rays_per_bin = wfpg::binning_options().rays_per_bin;  ///< c_ray
-  std::uint32_t min_bin_level = wfpg::binning_options().min_level;    ///< l_min, from the root
-  std::uint32_t deposits_per_leaf =
-      *wfpg::kept_guide_options().deposits_per_leaf;  ///< of a sample that is recorded; 0: all
-  float guide_fraction = 0.0f;                        ///< in [0, 1]; 0: the mode's own, 0.5 of Open PGL's
+  wfpg::binning_options binning;
+  /// Target deposits per leaf in a sample that is recorded. Unset: all paths of all samples are recorded.
+  std::optional<std::uint32_t> deposits_per_leaf = wfpg::kept_guide_options().deposits_per_leaf;
+  /// Fraction of directions drawn from the guide, in (0, 1]. Unset: the method's own default.
+  std::optional<float> guide_fraction;
   /// Of a path, from its first vertex on, at least 1; with next-event estimation never the last of several.
   std::uint32_t guided_depths = wfpg::sampling_options().guided_depths;
   std::uint32_t light_groups = 32;           ///< that guided paths learn to choose lights from, in [1, 255]

@@ -12,6 +12,8 @@
 #include <cstdint>
 #include <cstdio>
 #include <limits>
+#include <map>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -37,6 +39,14 @@ CLI::Option* add_choice(CLI::App& app, const std::string& name, Value& value,
           name, [&value, choices](const std::string& chosen) { value = choices.at(chosen); }, help)
       ->check(CLI::IsMember(names))
       ->type_name("NAME");
+}
+
+/// An option that a value of 0 unsets.
+template <class T>
+CLI::Option* add_unless_zero(CLI::App& app, const std::string& name, std::optional<T>& to,
+                             const std::string& help) {
+  const auto assign = [&to](const T& value) { to = value != T(0) ? std::optional<T>(value) : std::nullopt; };
+  return app.add_option_function<T>(name, assign, help);
 }
 
 /// A help text with the option's default: the value that it has before the command line is read. Bytes in
@@ -228,20 +238,20 @@ void add_guider_options(CLI::App& app, render_options& options) {
          "--field-resolution", options.field_resolution,
          with_default("cells a side of transient fields at the first vertex", options.field_resolution))
       ->transform(whole_number(2, 128));
-  app.add_option("--slot-resolution", options.slot_resolution,
-                 with_default("cells a side of kept fields", options.slot_resolution))
+  app.add_option("--slot-resolution", options.kept.resolution,
+                 with_default("cells a side of kept fields", options.kept.resolution))
       ->transform(whole_number(2, 128));
-  app.add_option("--recast", options.recast,
-                 with_default("a refresh casts one cone in so many again", options.recast))
+  app.add_option("--recast", options.kept.recast,
+                 with_default("a refresh casts one cone in so many again", options.kept.recast))
       ->transform(whole_number(1, 1 << 20));
-  add_choice<bool>(app, "--learn", options.learn, {{"on", true}, {"off", false}},
+  add_choice<bool>(app, "--learn", options.kept.learn, {{"on", true}, {"off", false}},
                    "kept fields learn from paths, beside their cones (default: on)");
   app.add_option("--light-groups", options.light_groups,
                  with_default("lights are chosen from so many groups as is learnt; 1: by power",
                               options.light_groups))
       ->transform(whole_number(1, 255));
-  app.add_option("--field-budget", options.field_budget,
-                 with_default("memory of kept fields", options.field_budget))
+  app.add_option("--field-budget", options.kept.budget_bytes,
+                 with_default("memory of kept fields", options.kept.budget_bytes))
       ->transform(byte_count());
   app.add_option("--caster-buffer", options.caster_buffer,
                  with_default("memory of cones in flight to OptiX", options.caster_buffer))
@@ -251,18 +261,18 @@ void add_guider_options(CLI::App& app, render_options& options) {
          with_default("blocks a side of wfpg-product's products: 4, 8 or 16", options.product_resolution))
       ->transform(whole_number(4, 16))
       ->check(CLI::IsMember({4, 8, 16}));
-  app.add_option("--rays-per-bin", options.rays_per_bin,
-                 with_default("rays that a bin should have", options.rays_per_bin))
+  app.add_option("--rays-per-bin", options.binning.rays_per_bin,
+                 with_default("rays that a bin should have", options.binning.rays_per_bin))
       ->transform(whole_number(1, largest_count));
-  app.add_option("--min-bin-level", options.min_bin_level,
-                 with_default("octree level of the largest bins", options.min_bin_level))
+  app.add_option("--min-bin-level", options.binning.min_level,
+                 with_default("octree level of the largest bins", options.binning.min_level))
       ->transform(whole_number(0, largest_level));
-  app.add_option("--deposits-per-leaf", options.deposits_per_leaf,
-                 with_default("deposits a leaf of the octree in a sample that is recorded; 0: all, in each",
-                              options.deposits_per_leaf))
+  add_unless_zero(app, "--deposits-per-leaf", options.deposits_per_leaf,
+                  with_default("deposits a leaf of the octree in a sample that is recorded; 0: all, in each",
+                               *options.deposits_per_leaf))
       ->transform(whole_number(0, largest_count));
-  app.add_option("--guide-fraction", options.guide_fraction,
-                 "samples drawn from the guide (default: the mode's, as 0)")
+  add_unless_zero(app, "--guide-fraction", options.guide_fraction,
+                  "fraction of directions drawn from the guide (default: the mode's, as 0)")
       ->transform(number(0.0, 1.0));
   app.add_option(
          "--guided-depths", options.guided_depths,

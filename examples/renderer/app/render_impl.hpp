@@ -107,7 +107,7 @@ inline std::uint32_t guided_depths(const render_options& options) {
 /// What every guide is told.
 inline wfpg::sampling_options sampling_options_of(const render_options& options) {
   wfpg::sampling_options guided;
-  if (options.guide_fraction > 0.0f) guided.guide_fraction = options.guide_fraction;
+  guided.guide_fraction = options.guide_fraction;
   guided.guided_depths = guided_depths(options);
   guided.unguided_samples = wfpg::unguided_samples(combination_of(options));
   guided.seed = options.seed;
@@ -140,10 +140,8 @@ inline wfpg::octree_guide_options octree_options_of(const render_options& option
   guided.caster_buffer_bytes = options.caster_buffer;
   if (options.nee && shares.size() > 1) guided.lights.weights = shares;
   if (options.method == sampling_method::wfpg_product) guided.product_resolution = options.product_resolution;
-  guided.binning.rays_per_bin = options.rays_per_bin;
-  guided.binning.min_level = options.min_bin_level;
+  guided.binning = options.binning;
   guided.deposits_per_leaf = options.deposits_per_leaf;
-  if (options.deposits_per_leaf == 0) guided.deposits_per_leaf.reset();
   guided.mode = options.mode == guiding::plain ? wfpg::guiding_mode::plain : wfpg::guiding_mode::oriented;
   return guided;
 }
@@ -153,12 +151,9 @@ inline wfpg::kept_guide_options kept_options_of(const render_options& options,
                                                 const std::vector<float>& shares) {
   wfpg::kept_guide_options guided;
   static_cast<wfpg::octree_guide_options&>(guided) = octree_options_of(options, shares);
-  guided.kept.resolution = options.slot_resolution;
-  guided.kept.recast = options.recast;
-  guided.kept.budget_bytes = options.field_budget;
-  guided.kept.learn = options.learn;
+  guided.kept = options.kept;
   // With next-event estimation emission is worth its MIS weight, which fields that learn find out.
-  guided.include_emission = !options.nee || options.learn;
+  guided.include_emission = !options.nee || options.kept.learn;
   return guided;
 }
 

@@ -24,7 +24,7 @@ openpgl_options openpgl_options_of(const scene& scene, const render_options& opt
   if (options.method == sampling_method::openpgl_dqt)
     guided.directional = PGL_DIRECTIONAL_DISTRIBUTION_QUADTREE;
   guided.samples_per_leaf = options.samples_per_leaf;
-  if (options.guide_fraction > 0.0f) guided.guide_fraction = options.guide_fraction;
+  if (options.guide_fraction) guided.guide_fraction = *options.guide_fraction;
   guided.paths = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
   guided.guided_depths = guided_depths(options);
   guided.max_depth = static_cast<std::size_t>(options.max_depth);

@@ -31,21 +31,21 @@ std::string hexadecimal(std::uint64_t value) {
 void add_guider_values(const render_options& o, named_values& values) {
   using std::to_string;
   char fraction[32];
-  std::snprintf(fraction, sizeof fraction, "%.9g", static_cast<double>(o.guide_fraction));
+  std::snprintf(fraction, sizeof fraction, "%.9g", static_cast<double>(o.guide_fraction.value_or(0.0f)));
   values.insert(values.end(), {{"--guiding", o.mode == guiding::plain ? "plain" : "oriented"},
                                {"--fields", o.lifetime == fields::kept ? "kept" : "transient"},
                                {"--cones", name_of(cones_names(), o.through)},
                                {"--octree-resolution", to_string(o.octree_resolution)},
-                               {"--rays-per-bin", to_string(o.rays_per_bin)},
-                               {"--min-bin-level", to_string(o.min_bin_level)},
-                               {"--deposits-per-leaf", to_string(o.deposits_per_leaf)},
+                               {"--rays-per-bin", to_string(o.binning.rays_per_bin)},
+                               {"--min-bin-level", to_string(o.binning.min_level)},
+                               {"--deposits-per-leaf", to_string(o.deposits_per_leaf.value_or(0))},
                                {"--guide-fraction", fraction},
                                {"--guided-depths", to_string(o.guided_depths)}});
   if (o.lifetime == fields::kept)
-    values.insert(values.end(), {{"--slot-resolution", to_string(o.slot_resolution)},
-                                 {"--recast", to_string(o.recast)},
-                                 {"--learn", o.learn ? "on" : "off"},
-                                 {"--field-budget", to_string(o.field_budget)}});
+    values.insert(values.end(), {{"--slot-resolution", to_string(o.kept.resolution)},
+                                 {"--recast", to_string(o.kept.recast)},
+                                 {"--learn", o.kept.learn ? "on" : "off"},
+                                 {"--field-budget", to_string(o.kept.budget_bytes)}});
   else
     values.emplace_back("--field-resolution", to_string(o.field_resolution));
   if (o.method == sampling_method::wfpg_product)

@@ -92,8 +92,8 @@ struct bvh_ray {
         one(one) {
     inverse = {inverse_of(direction.x), inverse_of(direction.y), inverse_of(direction.z)};
     const frame axes(direction);
-    tangent = axes.tangent;
-    bitangent = axes.bitangent;
+    tangent = axes.x;
+    bitangent = axes.y;
   }
 
  private:

@@ -93,8 +93,7 @@ struct ggx {
     const frame view(stretched);
     // The frame's first axis has to lie in the surface for the two half disks below to be what they are.
     const float planar2 = stretched.x * stretched.x + stretched.y * stretched.y;
-    const vec3 first =
-        planar2 > 1e-12f ? vec3(-stretched.y, stretched.x, 0.0f) / std::sqrt(planar2) : view.tangent;
+    const vec3 first = planar2 > 1e-12f ? vec3(-stretched.y, stretched.x, 0.0f) / std::sqrt(planar2) : view.x;
     const vec3 second = glm::cross(stretched, first);
     const vec2 disk = uniform_disk(u);
     const float side = 0.5f * (1.0f + stretched.z);

@@ -1,7 +1,7 @@
-// Orthonormal frames, and the directions on a sphere that are drawn in them.
+// Directions that are drawn in an orthonormal frame.
 #pragma once
 
-#include <wfpg/base/types.hpp>
+#include <wfpg/base/math.hpp>
 
 #include <glm/common.hpp>
 
@@ -9,33 +9,11 @@
 
 namespace render {
 
+using wfpg::frame;
+using wfpg::pi;
 using wfpg::uvec3;
 using wfpg::vec2;
 using wfpg::vec3;
-
-inline constexpr float pi = 3.14159265358979f;
-
-/// A right-handed frame whose third axis is a given unit vector.
-struct frame {
-  vec3 tangent{1.0f, 0.0f, 0.0f};
-  vec3 bitangent{0.0f, 1.0f, 0.0f};
-  vec3 normal{0.0f, 0.0f, 1.0f};
-
-  frame() = default;
-  // Duff et al. 2017, "Building an orthonormal basis, revisited": no branch, no singularity.
-  WFPG_HD explicit frame(vec3 n) : normal(n) {
-    const float sign = n.z < 0.0f ? -1.0f : 1.0f;
-    const float a = -1.0f / (sign + n.z);
-    const float b = n.x * n.y * a;
-    tangent = {1.0f + sign * n.x * n.x * a, sign * b, -sign * n.x};
-    bitangent = {b, sign + n.y * n.y * a, -n.y};
-  }
-
-  WFPG_HD vec3 to_local(vec3 w) const {
-    return {glm::dot(w, tangent), glm::dot(w, bitangent), glm::dot(w, normal)};
-  }
-  WFPG_HD vec3 to_world(vec3 w) const { return w.x * tangent + w.y * bitangent + w.z * normal; }
-};
 
 /// A point of the unit disk, uniform by area.
 WFPG_HD inline vec2 uniform_disk(vec2 u) {

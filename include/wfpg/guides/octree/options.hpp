@@ -64,8 +64,7 @@ struct kept_field_options {
 /// binning.rays_per_bin rays has 0.5.
 struct octree_guide_options : sampling_options {
   /// Voxels along the scene's longest side; a power of two in [1, 4096].
-  std::uint32_t octree_resolution =
-      128;  ///< voxels along the scene's longest side; a power of two in [1, 4096]
+  std::uint32_t octree_resolution = 128;
   /// How rays form bins, and whether fields cover hemispheres or spheres.
   guiding_mode mode = guiding_mode::oriented;
   binning_options binning;     ///< size of bins
@@ -96,8 +95,7 @@ struct kept_guide_options : octree_guide_options {
 /// Options of transient_guide: those of both guides, and the fields' resolution.
 struct transient_guide_options : octree_guide_options {
   /// F at depth 0: cells along a field's side, in [2, 128]. It halves at each depth.
-  std::uint32_t field_resolution =
-      32;  ///< cells along a field's side at depth 0, in [2, 128]; halves at each depth
+  std::uint32_t field_resolution = 32;
   /// F does not become smaller than this, in [2, 128].
   std::uint32_t min_field_resolution = 16;
 };
