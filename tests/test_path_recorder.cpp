@@ -396,6 +396,50 @@ WFPG_TEST_CASE("fields learn what leaves the next vertex, and no more than the p
   CHECK(r.dropped() == 0);
 }
 
+/// Two vertices of which the first one's light is told as the path's sum so far, twice, and the second one's
+/// emission by itself.
+template <class Light>
+struct write_totals {
+  wfpg::path_recorder_view paths;
+  WFPG_HD void operator()(std::size_t path) const {
+    paths.vertex(path, 0, place(0), vec3(0.0f, 0.0f, 1.0f), Light(1.0f));
+    paths.total(path, 0, Light(2.0f));
+    paths.total(path, 0, Light(5.0f));
+    paths.vertex(path, 1, place(1), vec3(0.0f, 0.0f, 1.0f), Light(0.5f));
+    paths.emission(path, 1, Light(1.0f));
+    paths.total(path, 1, Light(7.0f));
+    paths.total(path, 1, Light(6.5f));  // rounding: less than before is nothing new
+    paths.radiance(path, 1, Light(0.25f));
+  }
+};
+
+template <class Light, class Exec>
+void check_totals() {
+  recording<Exec> r(1, 4, true);
+  r.scene.exec.for_each(1, write_totals<Light>{r.view()});
+  r.finish();
+  CHECK(r.leaving(1) == Approx((1.0f + 1.0f + 0.25f) / 0.5f));
+  CHECK(r.leaving(0) == Approx(5.0f + 1.0f + 1.0f + 0.25f));
+  CHECK(r.dropped() == 0);
+}
+
+WFPG_TEST_CASE("a path's total gives a vertex what is new, as colours or as numbers", "[path_recorder]") {
+  check_totals<vec3, Exec>();
+  check_totals<float, Exec>();
+  learning<Exec> r;
+  write_vertices(r, 0, {vec3(1.0f)});
+  const wfpg::path_recorder_view paths = r.view();
+  r.scene.exec.for_each(1, [=] WFPG_HD(std::size_t) {
+    paths.scatter(0, 0, vec3(0.0f, 0.0f, 1.0f), 2);
+    paths.escape(0, 1, 0.5f);
+    paths.emission(0, 1, 3.0f);
+    paths.total(0, 5, 9.0f);  // there is no such vertex
+  });
+  CHECK(r.dropped() == 1);
+  r.finish();
+  CHECK(r.learnt(2) == values{6.0, 1});
+}
+
 WFPG_TEST_CASE("fields learn the environment, dark or not", "[path_recorder]") {
   learning<Exec> r;
   write_vertices(r, 0, {vec3(1.0f)});

@@ -128,7 +128,7 @@ struct parted_bsdf {
     return {d, pdf(outgoing, d)};
   }
   WFPG_HD wfpg::glossy_part glossy(vec3) const {
-    return {fault == part_fault::share ? 1.3f : 0.3f, fault == part_fault::alpha ? 0.0f : 0.7f};
+    return {fault == part_fault::share ? 1.3f : 0.3f, fault == part_fault::alpha ? 1.5f : 0.7f};
   }
   WFPG_HD bsdf_sample sample_part(bool glossy, vec3 outgoing, vec2 u) const {
     const bool drawn = fault == part_fault::sample_shape ? !glossy : glossy;
@@ -151,6 +151,31 @@ struct parted_bsdf {
   }
 };
 static_assert(wfpg::has_separate_parts_v<parted_bsdf>);
+
+enum class coat_fault { none, large_pdf, probability, silent };
+
+/// A mirror that draws 0.3 of the samples, over a diffuse lobe; but for a fault.
+struct coated_bsdf {
+  coat_fault fault = coat_fault::none;
+  WFPG_HD bool is_delta() const { return false; }
+  WFPG_HD bool transmits() const { return false; }
+  WFPG_HD float eval(vec3 outgoing, vec3 incident) const {
+    return outgoing.z > 0.0f && incident.z > 0.0f ? 0.5f * incident.z / pi : 0.0f;
+  }
+  WFPG_HD float pdf(vec3 outgoing, vec3 incident) const {
+    const float fraction = fault == coat_fault::large_pdf ? 1.0f : 0.7f;
+    return outgoing.z > 0.0f && incident.z > 0.0f ? fraction * incident.z / pi : 0.0f;
+  }
+  WFPG_HD bsdf_sample sample(vec3 outgoing, vec2 u) const {
+    if (outgoing.z <= 0.0f) return {};
+    if (u.x < 0.3f)
+      return {vec3(-outgoing.x, -outgoing.y, outgoing.z), fault == coat_fault::probability ? 1.3f : 0.3f,
+              fault != coat_fault::silent};
+    const float x = (u.x - 0.3f) / 0.7f, r = std::sqrt(x), turn = 2.0f * pi * u.y;
+    const vec3 d = glm::normalize(vec3(r * std::cos(turn), r * std::sin(turn), std::sqrt(1.0f - x)));
+    return {d, pdf(outgoing, d)};
+  }
+};
 
 /// A rough boundary that scatters evenly to both sides, as Lambert's law has it: half reflected, half
 /// transmitted, radiance times the square of the ratio of indices. The index is `ior` below.
@@ -195,7 +220,7 @@ WFPG_TEST_CASE("check_bsdf: correct BSDFs pass", "[testing]") {
 TEST_CASE("check_bsdf: each fault is found and named", "[testing]") {
   check_passes(check_faulty<one_policy>(bsdf_fault::none));
   check_names(check_faulty<one_policy>(bsdf_fault::large_pdf),
-              {"the integral of pdf()", "is 1.02, but the share", "is 1 of"});
+              {"the integral of pdf()", "is 1.02, but the fraction", "is 1 of"});
   check_names(check_faulty<one_policy>(bsdf_fault::no_jacobian),
               {"pdf() disagrees with sample(): seen from (", "has pdf", "pdf() says"});
   check_names(check_faulty<one_policy>(bsdf_fault::uniform_pdf),
@@ -229,11 +254,20 @@ TEST_CASE("check_bsdf: faults of parts", "[testing]") {
   const one_policy exec;
   const auto check = [&](part_fault fault) { return check_bsdf(exec, parted_bsdf{fault}); };
   check_passes(check(part_fault::none));
-  check_names(check(part_fault::share), {"glossy() seen from", "gives share 1.3, expected in [0, 1]"});
-  check_names(check(part_fault::alpha), {"glossy() seen from", "gives alpha 0, expected in (0, 1]"});
+  check_names(check(part_fault::share), {"glossy() seen from", "gives fraction 1.3, expected in [0, 1]"});
+  check_names(check(part_fault::alpha), {"glossy() seen from", "gives alpha 1.5, expected in [0, 1]"});
   check_names(check(part_fault::sum), {"pdf_part() does not add up to pdf()", "pdf() says"});
   check_names(check(part_fault::sample_pdf), {"pdf_part(true) disagrees with sample_part(true)"});
   check_names(check(part_fault::sample_shape), {"sample_part(true) draws too"});
+}
+
+TEST_CASE("check_bsdf: faults of delta lobes beside others", "[testing]") {
+  const one_policy exec;
+  const auto check = [&](coat_fault fault) { return check_bsdf(exec, coated_bsdf{fault}); };
+  check_passes(check(coat_fault::none));
+  check_names(check(coat_fault::large_pdf), {"the integral of pdf()", "delta lobes aside, is 0.7"});
+  check_names(check(coat_fault::probability), {"sample() of a delta lobe", "gives pdf 1.3"});
+  check_names(check(coat_fault::silent), {"pdf() disagrees with sample()"});
 }
 
 TEST_CASE("check_bsdf: radiance through a boundary of indices", "[testing]") {

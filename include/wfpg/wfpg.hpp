@@ -22,6 +22,7 @@
 #include <wfpg/guide/guide.hpp>
 #include <wfpg/guide/path_recorder.hpp>
 #include <wfpg/guide/recorded_fraction.hpp>
+#include <wfpg/guide/recorded_path.hpp>
 #include <wfpg/guide/recorded_runs.hpp>
 #include <wfpg/guide/sample_rays.hpp>
 #include <wfpg/guide/sampling_options.hpp>
@@ -67,6 +68,7 @@
 #include <wfpg/sampling/mis.hpp>
 #include <wfpg/sampling/mixture.hpp>
 #include <wfpg/sampling/product_sampler.hpp>
+#include <wfpg/sampling/roulette.hpp>
 #include <wfpg/sampling/sample_combiner.hpp>
 #include <wfpg/sampling/sampled_direction.hpp>
 #include <wfpg/state/section_file.hpp>

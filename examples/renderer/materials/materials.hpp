@@ -73,7 +73,7 @@ struct bsdf {
 
   /// Density of sample(), per steradian; 0 for delta lobes.
   WFPG_HD float pdf(vec3 outgoing, vec3 incident) const {
-    const float coat = glossy(outgoing).share;
+    const float coat = glossy(outgoing).fraction;
     return (coat > 0.0f ? coat * pdf_part(true, outgoing, incident) : 0.0f) +
            (coat < 1.0f ? (1.0f - coat) * pdf_part(false, outgoing, incident) : 0.0f);
   }
@@ -98,7 +98,7 @@ struct bsdf {
       const vec3 incident = mirrored(outgoing, normal);
       return {incident, reflects(outgoing, incident) ? 1.0f : 0.0f};
     }
-    const float coat = glossy(outgoing).share;
+    const float coat = glossy(outgoing).fraction;
     const bool from_coat = chosen(u.x, coat);
     wfpg::bsdf_sample drawn = sample_part(from_coat, outgoing, u);
     if (drawn.pdf > 0.0f && coat > 0.0f) drawn.pdf = pdf(outgoing, drawn.direction);

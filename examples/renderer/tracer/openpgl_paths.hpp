@@ -87,7 +87,7 @@ class openpgl_recorder {
     here.scatteringWeight = to_pgl(delta ? s.bsdf.delta_weight_rgb(s.outgoing, next.direction)
                                          : s.bsdf.eval_rgb(s.outgoing, next.direction) / next.pdf);
     here.eta = s.bsdf.ior_beyond(s.outgoing, next.direction);
-    here.roughness = 1.0f + glossy.share * (glossy.alpha - 1.0f);
+    here.roughness = 1.0f + glossy.fraction * (glossy.alpha - 1.0f);
   }
 
  private:

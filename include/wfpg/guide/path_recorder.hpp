@@ -55,6 +55,9 @@ struct alignas(8) recorded_direction {
 /// - The direction is zero or not finite.
 ///
 /// Calls for paths that this sample does not record are ignored. They do not count as dropped. O(1) a call.
+///
+/// Throughput and radiance are linear RGB, or a number: the guide only uses luminance. A spectral host gives
+/// the mean of its wavelengths' values, or the luminance. One path uses one of the two forms throughout.
 class path_recorder_view {
  public:
   /// Capacity in paths: valid path indices are [0, paths()), recorded or not.
@@ -77,14 +80,26 @@ class path_recorder_view {
     lengths_[place] = depth + 1;
   }
 
-  /// Records the direction in which the path leaves vertex `depth`, which must be its last so far. The guide
-  /// learns from it what the direction finds. Ignored where directions are not recorded, and for technique
-  /// `none`.
-  WFPG_HD void scatter(std::size_t path, std::uint32_t depth, const sampled_direction& drawn) const {
+  /// Records a vertex whose throughput is a number.
+  /// As luminance, each channel of the colour is that number.
+  WFPG_HD void vertex(std::size_t path, std::uint32_t depth, vec3 position, vec3 outgoing,
+                      float throughput) const {
+    vertex(path, depth, position, outgoing, vec3(throughput));
+  }
+
+  /// Records the unit direction in which the path leaves vertex `depth`, which must be its last so far. The
+  /// guide learns from it what the direction finds. `field`: number of the field in the mixture that drew it,
+  /// or no_field, as for delta lobes. Ignored where directions are not recorded.
+  WFPG_HD void scatter(std::size_t path, std::uint32_t depth, vec3 direction, std::uint32_t field) const {
     std::uint32_t place;
-    if (!learns() || drawn.technique == sampling_technique::none || !find(path, place)) return;
-    if (depth >= max_depth_ || depth + 1 != lengths_[place] || !is_direction(drawn.direction)) return drop();
-    directions_[depth * recorded_ + place] = {drawn.field, pack_direction(drawn.direction)};
+    if (!learns() || !find(path, place)) return;
+    if (depth >= max_depth_ || depth + 1 != lengths_[place] || !is_direction(direction)) return drop();
+    directions_[depth * recorded_ + place] = {field, pack_direction(direction)};
+  }
+  /// Records a direction that the guider sampled, with its field.
+  /// Ignored for technique `none`: the path ends there.
+  WFPG_HD void scatter(std::size_t path, std::uint32_t depth, const sampled_direction& drawn) const {
+    if (drawn.technique != sampling_technique::none) scatter(path, depth, drawn.direction, drawn.field);
   }
 
   /// Records that the path left the scene: the environment becomes its vertex `depth`, the last one. Call it
@@ -100,12 +115,39 @@ class path_recorder_view {
     lengths_[place] = (depth + 1) | escaped;
   }
 
+  /// Records that the path left the scene, with a throughput that is a number.
+  WFPG_HD void escape(std::size_t path, std::uint32_t depth, float throughput) const {
+    escape(path, depth, vec3(throughput));
+  }
+
   /// Adds radiance that vertex `depth` scatters toward the path's origin. Next-event estimation reports its
   /// result with it. `contribution` is the radiance as it arrives at the origin, linear RGB: it includes
   /// throughput, BSDF and MIS weight. May be called several times a vertex.
   WFPG_HD void radiance(std::size_t path, std::uint32_t depth, vec3 contribution) const {
     std::uint32_t place;
     if (find(path, place)) add(place, depth, contribution);
+  }
+  /// Adds scattered radiance that is a number.
+  /// It is a luminance, or the mean of a spectrum.
+  WFPG_HD void radiance(std::size_t path, std::uint32_t depth, float contribution) const {
+    radiance(path, depth, vec3(contribution));
+  }
+
+  /// Adds what the path's radiance has grown by since what is recorded of it, as scattered by vertex `depth`.
+  /// For hosts that add light to their paths in other kernels. `sum` is all radiance that the path has
+  /// brought to its origin so far. O(depth): it adds up what the path's vertices have. The sum may shrink by
+  /// rounding, and a difference below 0 counts as 0.
+  WFPG_HD void total(std::size_t path, std::uint32_t depth, vec3 sum) const {
+    std::uint32_t place;
+    if (!find(path, place)) return;
+    vec3 known(0.0f);
+    for (std::uint32_t i = 0; i < (lengths_[place] & ~escaped); ++i)
+      known += light_[i * recorded_ + place].contribution;
+    add(place, depth, glm::max(sum - known, vec3(0.0f)));
+  }
+  /// Adds the growth of a path's radiance that is a number.
+  WFPG_HD void total(std::size_t path, std::uint32_t depth, float sum) const {
+    total(path, depth, vec3(sum));
   }
 
   /// Adds the radiance of an emitter that the path hit as vertex `depth`. Also that of the environment, where
@@ -121,6 +163,11 @@ class path_recorder_view {
       add(place, depth, contribution);
     else if (depth > 0)
       add(place, depth - 1, contribution);
+  }
+  /// Adds an emitter's radiance that is a number.
+  /// A number and the same number in all channels record alike.
+  WFPG_HD void emission(std::size_t path, std::uint32_t depth, float contribution) const {
+    emission(path, depth, vec3(contribution));
   }
 
  private:
@@ -167,100 +214,37 @@ class path_recorder_view {
   std::uint32_t* dropped_ = nullptr;
 };
 
-/// Stands in for path_recorder_view where a guide reads no paths. An empty class with empty members, so that
-/// kernels compile for both and the compiler removes the calls.
+/// Stands in for path_recorder_view where a guide reads no paths.
+/// An empty class with empty members, so that kernels compile for both and the compiler removes the calls.
+/// Takes colours and numbers alike.
 struct no_path_recorder {
   /// Returns 0: there is room for no path.
   WFPG_HD std::size_t paths() const { return 0; }
   /// Returns 0: a path has no vertices.
   WFPG_HD std::uint32_t max_depth() const { return 0; }
   /// Does nothing; see path_recorder_view::vertex().
-  WFPG_HD void vertex(std::size_t, std::uint32_t, vec3, vec3, vec3) const {}
+  template <class Throughput>
+  WFPG_HD void vertex(std::size_t, std::uint32_t, vec3, vec3, Throughput) const {}
   /// Does nothing; see path_recorder_view::scatter().
   WFPG_HD void scatter(std::size_t, std::uint32_t, const sampled_direction&) const {}
+  /// Does nothing; see path_recorder_view::scatter().
+  WFPG_HD void scatter(std::size_t, std::uint32_t, vec3, std::uint32_t) const {}
   /// Does nothing; see path_recorder_view::escape().
-  WFPG_HD void escape(std::size_t, std::uint32_t, vec3) const {}
+  template <class Light>
+  WFPG_HD void escape(std::size_t, std::uint32_t, Light) const {}
   /// Does nothing; see path_recorder_view::radiance().
-  WFPG_HD void radiance(std::size_t, std::uint32_t, vec3) const {}
+  template <class Light>
+  WFPG_HD void radiance(std::size_t, std::uint32_t, Light) const {}
+  /// Does nothing; see path_recorder_view::total().
+  template <class Light>
+  WFPG_HD void total(std::size_t, std::uint32_t, Light) const {}
   /// Does nothing; see path_recorder_view::emission().
-  WFPG_HD void emission(std::size_t, std::uint32_t, vec3) const {}
+  template <class Light>
+  WFPG_HD void emission(std::size_t, std::uint32_t, Light) const {}
 
   /// Returns a default view, which ignores all calls, for kernels that take that type.
   WFPG_HD operator path_recorder_view() const { return {}; }
 };
-
-/// One recorded path, for guides to read. Its vertices are the surfaces that it met, in order. The
-/// environment is the last vertex if escape() recorded it. Valid until the recorder's begin_sample() or
-/// clear(). Precondition of members with a `depth`: it is below vertices(), or surfaces() where they say
-/// "surface".
-class recorded_path {
- public:
-  /// Reads path `place` of the recorded ones, in [0, path_recorder::recorded()).
-  WFPG_HD recorded_path(const path_recorder_view& paths, std::size_t place)
-      : paths_(paths),
-        place_(place),
-        surfaces_(paths.lengths_[place] & ~path_recorder_view::escaped),
-        vertices_(surfaces_) {
-    if (paths.lengths_[place] & path_recorder_view::escaped) --surfaces_;
-  }
-
-  /// Number of vertices, including the environment; 0 for a path that recorded none.
-  WFPG_HD std::uint32_t vertices() const { return vertices_; }
-  /// Number of vertices that are surfaces: depths [0, surfaces()).
-  WFPG_HD std::uint32_t surfaces() const { return surfaces_; }
-
-  /// Position of a surface, world space. It is what the renderer recorded, so it may be not finite.
-  WFPG_HD vec3 position(std::uint32_t depth) const { return paths_.places_[slot(depth)].position; }
-  /// Unit direction from a surface toward the previous vertex, as pack_direction() rounds it.
-  WFPG_HD vec3 outgoing(std::uint32_t depth) const {
-    return unpack_direction(paths_.places_[slot(depth)].outgoing);
-  }
-  /// Throughput of the path before a vertex scatters, linear RGB.
-  WFPG_HD vec3 throughput(std::uint32_t depth) const { return paths_.light_[slot(depth)].throughput; }
-  /// What a vertex itself brought to the path's origin, linear RGB: its emission, and the light that
-  /// next-event estimation sampled there. Sum the vertices from `depth` on for all that arrives from there.
-  WFPG_HD vec3 contribution(std::uint32_t depth) const { return paths_.light_[slot(depth)].contribution; }
-  /// sampled_direction::field of the direction that scatter() recorded, or no_field. Precondition: the
-  /// recorder records directions.
-  WFPG_HD std::uint32_t field(std::uint32_t depth) const { return paths_.directions_[slot(depth)].field; }
-  /// Writes the unit direction in which the path left a surface. It is the direction toward the next surface,
-  /// or else that of scatter(). False where neither is known. Precondition: the recorder records directions.
-  WFPG_HD bool has_direction(std::uint32_t depth, vec3& direction) const {
-    if (depth + 1 < surfaces_) {
-      direction = -outgoing(depth + 1);
-      return true;
-    }
-    direction = this->direction(depth);
-    return paths_.directions_[slot(depth)].direction != 0;
-  }
-  /// Unit direction that scatter() recorded. Precondition: directions are recorded, and scatter() was called.
-  WFPG_HD vec3 direction(std::uint32_t depth) const {
-    return unpack_direction(paths_.directions_[slot(depth)].direction);
-  }
-
- private:
-  /// Index of a vertex in the recorder's arrays.
-  WFPG_HD std::size_t slot(std::uint32_t depth) const { return depth * paths_.recorded_ + place_; }
-
-  path_recorder_view paths_;
-  std::size_t place_;
-  // These differ by one where the last vertex is the environment.
-  std::uint32_t surfaces_, vertices_;
-};
-
-/// Returns the luminance that left a vertex: `arriving` divided by `throughput`, both linear RGB (Eq. 5).
-/// `arriving` is what came to the path's origin, `throughput` the path's up to the vertex. A channel without
-/// throughput counts as 0, since nothing can arrive through it. A throughput that is not finite gives a
-/// result that is not finite, for the caller to drop.
-WFPG_HD inline float leaving_luminance(vec3 arriving, vec3 throughput) {
-  // A NaN in `t` fails t > 0, too, and is handed on.
-  const auto divided = [](float a, float t) {
-    if (t > 0.0f) return a / t;
-    return is_finite(t) ? 0.0f : t;
-  };
-  return luminance({divided(arriving.x, throughput.x), divided(arriving.y, throughput.y),
-                    divided(arriving.z, throughput.z)});
-}
 
 /// Owns the memory of recorded paths. Movable, not copyable; the policy's memory must outlive it.
 template <class Exec>

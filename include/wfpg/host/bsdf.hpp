@@ -9,6 +9,7 @@
 #include <wfpg/base/math.hpp>
 #include <wfpg/base/types.hpp>
 
+#include <cmath>
 #include <cstdint>
 #include <type_traits>
 #include <utility>
@@ -23,15 +24,34 @@ struct bsdf_sample {
   /// Density per unit solid angle, or the probability of a delta lobe.
   /// 0: sampling failed.
   float pdf = 0.0f;
+  /// A delta lobe drew the direction.
+  /// eval() and pdf() do not know that lobe. A BSDF may have delta lobes beside others.
+  bool is_delta = false;
 };
 
-/// The narrow part of a BSDF: a lobe that reflects about the mirrored direction.
+/// The narrow part of a BSDF: a lobe that reflects about the mirrored direction, or delta lobes.
 struct glossy_part {
   /// Fraction of sample()'s directions that the narrow part draws, in [0, 1].
   /// 0: there is no narrow part, and the rest is a cosine lobe.
-  float share = 0.0f;
-  /// GGX roughness of the narrow part, or of a lobe of that width, in (0, 1].
+  float fraction = 0.0f;
+  /// GGX roughness of the narrow part, or of a lobe of that width, in [0, 1].
+  /// 0: delta lobes, which are not guided.
   float alpha = 1.0f;
+
+  /// Returns the part of a BSDF without narrow lobes. The guide has its full fraction.
+  WFPG_HD static constexpr glossy_part none() { return {}; }
+  /// Returns the part of a BSDF whose roughness the host does not know.
+  ///
+  /// `pdf_at_mirror`: density of sample() at the mirrored direction, per steradian, of all lobes that are not
+  /// delta. The part is all of the BSDF, with the GGX roughness that has this density at normal incidence:
+  /// pdf = 1 / (4 pi alpha^2). A cosine lobe has at most 1/pi there, and alpha is then at least 1/2, so it
+  /// keeps its guide. A diffuse BSDF under a thin coat is guided less than by its true part.
+  /// A density that is not positive gives none(). Source: Heitz 2018, "Sampling the GGX Distribution of
+  /// Visible Normals".
+  WFPG_HD static glossy_part unknown(float pdf_at_mirror) {
+    if (!(pdf_at_mirror > 0.0f)) return none();
+    return {1.0f, min(0.28209479f / std::sqrt(pdf_at_mirror), 1.0f)};
+  }
 };
 
 /// A point where a path goes on, as the host describes it.
@@ -105,7 +125,8 @@ struct surface_bsdf<surface<B>> {
 ///   float eval(vec3 outgoing, vec3 incident) const;     f |cos|, luminance, per steradian; 0 for delta lobes
 ///   float pdf(vec3 outgoing, vec3 incident) const;      of sample(), per steradian; 0 for delta lobes
 ///   bsdf_sample sample(vec3 outgoing, vec2 u) const;    u in [0,1)²
-///   bool is_delta() const;                              all of it is delta lobes: sampled alone, not guided
+///   bool is_delta() const;                              all of it is delta lobes: sampled alone, not guided.
+///                                                       Lobes of other BSDFs say it in bsdf_sample
 ///   bool transmits() const;                             light can come from below the normal
 /// eval and pdf are zero, and sample fails, where the BSDF is black.
 /// Wherever eval is positive, pdf is too.
@@ -120,7 +141,7 @@ inline constexpr bool has_glossy_part_v = detail::has_glossy_part<B>::value;
 /// True where B can also draw the narrow part and the rest separately:
 ///   bsdf_sample sample_part(bool glossy, vec3 outgoing, vec2 u) const;
 ///   float pdf_part(bool glossy, vec3 outgoing, vec3 incident) const;      of sample_part(), per steradian
-/// share · pdf_part(true, ...) + (1 - share) · pdf_part(false, ...) is pdf(...).
+/// With the part's fraction p, p · pdf_part(true, ...) + (1 - p) · pdf_part(false, ...) is pdf(...).
 // clang-format on
 template <class B>
 inline constexpr bool has_separate_parts_v = detail::has_separate_parts<B>::value;

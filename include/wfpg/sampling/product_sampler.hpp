@@ -191,7 +191,7 @@ WFPG_HD bool has_product(const directional_field& field, const surface<Bsdf>& s,
     return false;
   else
     return field.hemisphere() && glm::dot(field.normal(), up) > 0.99f && !s.bsdf.transmits() &&
-           s.bsdf.glossy(s.outgoing).share == 0.0f;
+           s.bsdf.glossy(s.outgoing).fraction == 0.0f;
 }
 
 }  // namespace detail

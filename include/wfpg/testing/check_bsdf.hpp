@@ -44,14 +44,15 @@ struct bsdf_check_options {
 ///   values       eval(), pdf() and sample() give nothing that is NaN, infinite or negative; sampled
 ///                directions have unit length; a sample's pdf is pdf() of it; where eval() is positive pdf()
 ///                is too; nothing comes from below the normal unless transmits(). Where is_delta(): eval()
-///                and pdf() are 0, a sample's pdf is at most 1, and nothing else is asked.
+///                and pdf() are 0, a sample's pdf is at most 1, and nothing else is asked. A sample that
+///                says is_delta: its pdf is at most 1, and it does not count below
 ///   frequencies  of sample()'s directions are integrals of pdf() (chi² on adaptive bins)
 ///   integral     of pdf() is the fraction of samples that succeed
 ///   energy       the integral of eval() over incident directions is at most `albedo_limit`, and the mean of
 ///                eval() / pdf over the samples
 ///   reciprocity  eval(a, b) / |cos b| / n_a² is eval(b, a) / |cos a| / n_b²
-///   parts        glossy() gives a share in [0, 1] and an alpha in (0, 1]; the parts' densities, in their
-///                shares, add up to pdf(); each part's samples, frequencies and integral, as of the whole
+///   parts        glossy() gives a fraction and an alpha in [0, 1]; the parts' densities, in their
+///                fractions, add up to pdf(); each part's samples, frequencies and integral, as of the whole
 ///
 /// n is the index of refraction on a direction's side of the normal: 1 above and `ior` below.
 /// A BSDF carries radiance from incident to outgoing.

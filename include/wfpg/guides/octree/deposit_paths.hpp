@@ -7,6 +7,7 @@
 #pragma once
 
 #include <wfpg/guide/path_recorder.hpp>
+#include <wfpg/guide/recorded_path.hpp>
 #include <wfpg/guides/octree/learnt_radiance.hpp>
 #include <wfpg/octree/exitance_cache.hpp>
 

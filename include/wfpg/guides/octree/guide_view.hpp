@@ -88,6 +88,12 @@ class guide_view {
 
   /// Mixture of a ray's field and BSDF, without products. A ray without a field samples its BSDF alone.
   WFPG_HD guide_mixture mixture(std::uint32_t ray) const { return fields_.mixture(number(ray)); }
+  /// Mixture of a ray's field with the BSDF of the caller's kernel; see basic_kernel_mixture. `part`: the
+  /// BSDF's narrow lobes, which are guided less. glossy_part::unknown() takes a density where their roughness
+  /// is not known. Without products. A ray without a field leaves all directions to the BSDF.
+  WFPG_HD kernel_mixture mixture(std::uint32_t ray, const glossy_part& part) const {
+    return mixture(ray).with(part);
+  }
   /// Mixture of a ray's BSDF and product. Evaluates the BSDF P² to 2 P² times. A caller that samples and
   /// evaluates keeps it, instead of making it twice.
   ///

@@ -114,7 +114,7 @@ class bsdf_check {
   }
 
   /// A sample by itself, and against pdf() of it.
-  std::string drawn(bsdf_part part, vec3 outgoing, const bsdf_sample& s, float pdf) const {
+  std::string drawn(bsdf_part part, vec3 outgoing, const stored_sample& s, float pdf) const {
     const char* const sample = name_of_sample(part);
     if (!is_value(s.pdf))
       return sentence(sample, " ", seen_from(outgoing), "gives pdf ", s.pdf,
@@ -127,9 +127,9 @@ class bsdf_check {
     if (std::fabs(length - 1.0f) > 1.0e-4f)
       return sentence(sample, " ", seen_from(outgoing), "gives direction ", in_words{s.direction},
                       " of length ", length, ", expected unit length");
-    if (bsdf_.is_delta()) {
+    if (bsdf_.is_delta() || s.is_delta != 0) {
       if (s.pdf <= 1.0f + 1.0e-5f) return {};
-      return sentence("sample() of a delta BSDF ", seen_from(outgoing), "gives pdf ", s.pdf,
+      return sentence(sample, " of a delta lobe ", seen_from(outgoing), "gives pdf ", s.pdf,
                       ", expected a probability, at most 1");
     }
     if (is_value(pdf) && agree(pdf, s.pdf)) return {};
@@ -168,7 +168,7 @@ class bsdf_check {
   static std::vector<vec3> directions_of(const std::vector<bsdf_draw>& draws_made) {
     std::vector<vec3> directions;
     for (const bsdf_draw& d : draws_made)
-      if (d.drawn.pdf > 0.0f) directions.push_back(d.drawn.direction);
+      if (d.drawn.pdf > 0.0f && d.drawn.is_delta == 0) directions.push_back(d.drawn.direction);
     return directions;
   }
   /// Returns directions that guide a quadrature. They are independent of those that are counted.
@@ -212,8 +212,8 @@ class bsdf_check {
     return message.empty() ? energy(outgoing, numbers, made) : message;
   }
 
-  /// Frequencies against the integrals of the density, and the share of samples that succeed against that of
-  /// the whole sphere.
+  /// Compares frequencies with integrals of the density, and the fraction of samples that succeed with the
+  /// integral over the sphere. Samples of delta lobes do not count as successes: pdf() does not know them.
   std::string frequencies(bsdf_part part, vec3 outgoing, std::uint64_t numbers,
                           const std::vector<bsdf_draw>& made) const {
     if (made.front().asked == 0) return {};
@@ -229,14 +229,15 @@ class bsdf_check {
     if (!directions.empty() && bins.integral() > 0.0) message = shape(part, outgoing, bins, directions);
     if (!message.empty()) return message;
 
-    const double n = double(made.size()), share = double(directions.size()) / n;
+    const double n = double(made.size()), succeed = double(directions.size()) / n;
     const double integral = bins.integral(), chance = std::min(integral, 1.0);
-    const double p = testing::two_sided_tail(share - integral, 5.0e-4 * integral + bins.integral_error(),
+    const double p = testing::two_sided_tail(succeed - integral, 5.0e-4 * integral + bins.integral_error(),
                                              std::sqrt(chance * (1.0 - chance) / n));
     if (p >= least_p_) return {};
     return sentence("the integral of ", name_of_pdf(part), " over the sphere ", seen_from(outgoing), "is ",
-                    integral, ", but the share of ", name_of_sample(part), "'s samples that succeed is ",
-                    share, " of ", made.size(), ", p = ", p);
+                    integral, ", but the fraction of ", name_of_sample(part),
+                    "'s samples that succeed, delta lobes aside, is ", succeed, " of ", made.size(),
+                    ", p = ", p);
   }
 
   std::string shape(bsdf_part part, vec3 outgoing, const testing::sphere_bins& bins,
@@ -263,7 +264,7 @@ class bsdf_check {
                       options_.albedo_limit);
     testing::sample_mean by_samples;
     for (const bsdf_draw& d : made)
-      by_samples.add(d.drawn.pdf > 0.0f
+      by_samples.add(d.drawn.pdf > 0.0f && d.drawn.is_delta == 0
                          ? double(d.eval) / double(d.drawn.pdf) * energy_factor(outgoing, d.drawn.direction)
                          : 0.0);
     const double p = testing::two_sided_tail(by_samples.mean() - albedo, allowance, by_samples.error());
@@ -300,15 +301,16 @@ class bsdf_check {
   }
 
   std::string parts(const bsdf_pair& p) const {
-    const float share = p.glossy.share, alpha = p.glossy.alpha;
-    if (!(is_value(share) && share <= 1.0f))
-      return sentence("glossy() ", seen_from(p.outgoing), "gives share ", share, ", expected in [0, 1]");
-    if (!(is_value(alpha) && alpha > 0.0f && alpha <= 1.0f))
-      return sentence("glossy() ", seen_from(p.outgoing), "gives alpha ", alpha, ", expected in (0, 1]");
-    const float sum = share * p.pdf_glossy + (1.0f - share) * p.pdf_rest;
+    const float fraction = p.glossy.fraction, alpha = p.glossy.alpha;
+    if (!(is_value(fraction) && fraction <= 1.0f))
+      return sentence("glossy() ", seen_from(p.outgoing), "gives fraction ", fraction,
+                      ", expected in [0, 1]");
+    if (!(is_value(alpha) && alpha <= 1.0f))
+      return sentence("glossy() ", seen_from(p.outgoing), "gives alpha ", alpha, ", expected in [0, 1]");
+    const float sum = fraction * p.pdf_glossy + (1.0f - fraction) * p.pdf_rest;
     if (!has_separate_parts_v<Bsdf> || (is_value(sum) && agree(sum, p.pdf))) return {};
     return sentence("pdf_part() does not add up to pdf(): ", seen_from(p.outgoing), "toward ",
-                    in_words{p.incident}, " share ", share, " of ", p.pdf_glossy, " and the rest of ",
+                    in_words{p.incident}, " a fraction ", fraction, " of ", p.pdf_glossy, " and the rest of ",
                     p.pdf_rest, " make ", sum, ", pdf() says ", p.pdf);
   }
 

@@ -24,8 +24,8 @@ WFPG_HD glossy_part glossy_of(const Bsdf& bsdf, vec3 outgoing) {
 /// Returns whether sample() ever draws from a part. Other parts are not checked.
 template <class Bsdf>
 WFPG_HD bool draws(const Bsdf& bsdf, bsdf_part part, vec3 outgoing) {
-  if (part == bsdf_part::glossy) return glossy_of(bsdf, outgoing).share > 0.0f;
-  return part == bsdf_part::whole || glossy_of(bsdf, outgoing).share < 1.0f;
+  if (part == bsdf_part::glossy) return glossy_of(bsdf, outgoing).fraction > 0.0f;
+  return part == bsdf_part::whole || glossy_of(bsdf, outgoing).fraction < 1.0f;
 }
 template <class Bsdf>
 WFPG_HD bsdf_sample sample_of(const Bsdf& bsdf, bsdf_part part, vec3 outgoing, vec2 u) {
@@ -65,10 +65,24 @@ WFPG_HD inline vec2 numbers_with_corners(std::size_t i, std::uint64_t random) {
   return {i & 2u ? last : 0.0f, i & 4u ? last : 0.0f};
 }
 
+/// A bsdf_sample without padding: all its bytes are written, as tools that look for unwritten memory expect.
+struct stored_sample {
+  vec3 direction;
+  float pdf;
+  std::uint32_t is_delta;
+
+  WFPG_HD stored_sample& operator=(const bsdf_sample& drawn) {
+    direction = drawn.direction;
+    pdf = drawn.pdf;
+    is_delta = drawn.is_delta ? 1 : 0;
+    return *this;
+  }
+};
+
 /// A BSDF at a uniform direction and at one that it drew.
 struct bsdf_probe {
   vec3 outgoing, uniform;
-  bsdf_sample drawn;
+  stored_sample drawn;
   float eval_uniform, pdf_uniform;
   float eval_drawn, pdf_drawn;  // 0 where sampling failed
 };
@@ -98,7 +112,7 @@ struct probe_bsdf {
 
 /// A sample, for counting.
 struct bsdf_draw {
-  bsdf_sample drawn;
+  stored_sample drawn;
   float eval, pdf;      // 0 where sampling failed
   std::uint32_t asked;  // 0 where the part is never drawn; no bool, whose padding nobody would write
 };
@@ -167,8 +181,8 @@ struct pair_bsdf {
     p.glossy = glossy_of(bsdf, p.outgoing);
     if constexpr (has_separate_parts_v<Bsdf>) {
       p.pdf = bsdf.pdf(p.outgoing, p.incident);
-      if (p.glossy.share > 0.0f) p.pdf_glossy = bsdf.pdf_part(true, p.outgoing, p.incident);
-      if (p.glossy.share < 1.0f) p.pdf_rest = bsdf.pdf_part(false, p.outgoing, p.incident);
+      if (p.glossy.fraction > 0.0f) p.pdf_glossy = bsdf.pdf_part(true, p.outgoing, p.incident);
+      if (p.glossy.fraction < 1.0f) p.pdf_rest = bsdf.pdf_part(false, p.outgoing, p.incident);
     }
     pairs[i] = p;
   }

@@ -5,6 +5,7 @@
 
 #include <wfpg/exec/support/value_queue.hpp>
 #include <wfpg/guide/path_recorder.hpp>
+#include <wfpg/guide/recorded_path.hpp>
 #include <wfpg/guides/sarsa/detail/sarsa_distribution.hpp>
 #include <wfpg/host/bsdf.hpp>
 
