@@ -7,7 +7,7 @@
 namespace bench {
 namespace {
 
-/// The rays of a wave, as the binner wants them.
+/// The rays of a wave as the binner reads them.
 struct stored_rays {
   wfpg::array_view<const room_point> points;
   WFPG_HD wfpg::ray_to_bin operator()(std::size_t i) const {
@@ -22,7 +22,7 @@ struct random_keys {
   }
 };
 
-/// A wave's rays after some bounces; the floor sorts as many 21-bit keys.
+/// A wave's rays after some bounces. The floor sorts as many 21-bit keys.
 template <class Exec>
 void binning(benchmark::State& state) {
   const Exec exec;

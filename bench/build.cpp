@@ -16,7 +16,7 @@ int levels_of(std::uint32_t resolution) {
   return levels;
 }
 
-/// The room's triangles, on a GPU a million at 512³; the floor writes the fragments and sorts them.
+/// Voxelizes the room's triangles, a million at 512³ on a GPU. The floor writes the fragments and sorts them.
 template <class Exec>
 void voxelization(benchmark::State& state) {
   const Exec exec;
@@ -35,7 +35,7 @@ void voxelization(benchmark::State& state) {
       });
 }
 
-/// Points on a sphere, in no order.
+/// Points on a sphere, unordered.
 struct scatter {
   wfpg::array_view<wfpg::surface_fragment> samples;
   WFPG_HD void operator()(std::size_t i) const {
@@ -44,7 +44,7 @@ struct scatter {
   }
 };
 
-/// Fragments, on a GPU ten million at 1024³, from the sort to the finished cache; the floor is the sort.
+/// Builds octree and cache from unsorted fragments, ten million at 1024³ on a GPU. The floor is the sort.
 template <class Exec>
 void octree_and_cache(benchmark::State& state) {
   const Exec exec;

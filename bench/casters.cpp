@@ -1,7 +1,7 @@
-// Rays a second of the renderer's own hierarchy: the cones of bins, each a whole sphere of directions from
-// one point in the order in which fields cast them, and the same rays shuffled; among small triangles that
-// fill the unit cube, and in an empty box. Their floor is OptiX's caster of the same rays in the same run,
-// where it was built; else a copy of rays and hits.
+// Rays a second of the renderer's own BVH. The rays are cones of bins, a whole sphere of directions from each
+// point. They are in the order of fields, or shuffled. The scene is small triangles that fill the unit cube,
+// or an empty box. The floor is OptiX's caster of the same rays in the same run if it was built, otherwise a
+// copy of rays and hits.
 #include "casters/bvh_scene.hpp"
 #include "floors.hpp"
 #if defined(WFPG_BENCH_OPTIX)
@@ -34,8 +34,8 @@ WFPG_HD vec3 random_direction(std::uint64_t stream, std::uint64_t i) {
   return wfpg::square_to_sphere(unit_vec2(hash(hash(stream, 2), i)));
 }
 
-/// Equilateral triangles in the unit cube, of edge 0.02 where there are 100,000 and as much area in all where
-/// there are more; or the cube's faces.
+/// Equilateral triangles in the unit cube, or the cube's faces. 100,000 triangles have edge 0.02; more have
+/// the same total area.
 template <class Exec>
 class triangles_of {
  public:
@@ -102,7 +102,7 @@ struct cast_inline {
   WFPG_HD void operator()(std::size_t i) const { hits[i] = caster(rays[i]); }
 };
 
-/// Casting one ray after the other; the floor is OptiX's caster or a copy.
+/// Casts one ray after the other. The floor is OptiX's caster or a copy.
 template <class Exec>
 void casting(benchmark::State& state) {
   const Exec exec;

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Measures what compiling with wfpg takes, and writes what bench/table.py prints.
+"""Measures compile times with wfpg, and writes results for bench/table.py.
 
 usage: bench/compile_time.py OUT.json [RUNS [COMPILER ...]]
 
-Sources are compiled and linked one after the other, RUNS (10) times in turn, by each COMPILER (g++ and clang++) as a
-release build does. Times are the processor's, medians over the runs; sizes are of stripped programs. What wfpg is beside
-is a source that includes the same headers of Thrust and GLM and nothing else.
+Each COMPILER (g++ and clang++) compiles and links the sources one after the other as a release build does, RUNS (10)
+times in turn. Times are processor times, medians over the runs. Sizes are of stripped programs. The baseline is a source
+that includes only the same headers of Thrust and GLM.
 """
 import json
 import os

@@ -1,4 +1,4 @@
-// What the paths of a sample found, into the cache: Eq. 5's back-propagation, the leaves' means, the averages
+// Deposits of a sample's paths in the cache: back-propagation (Eq. 5), means of the leaves, averages
 // bottom-up.
 #include "floors.hpp"
 #include "guide.hpp"
@@ -24,7 +24,8 @@ struct record_vertex {
   }
 };
 
-/// A wave's paths of four vertices, of some of which one leaf has all; the floor reads the vertices.
+/// A wave's paths of four vertices. One leaf may have all vertices of some paths. The floor reads the
+/// vertices.
 template <class Exec>
 void depositing(benchmark::State& state) {
   const Exec exec;

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Compares methods on the GPU at equal time, and writes what bench/table.py prints.
+"""Compares methods on the GPU at equal time, and writes results for bench/table.py.
 
 usage: bench/equal_time.py DIRECTORY_OF_PROGRAMS OUT.json [SECONDS [REFERENCE_SECONDS [SIZE]]]
 
-Renders each scene with each method for SECONDS (10), and two references for REFERENCE_SECONDS (60) each with other
-seeds, one by path tracing and one guided, so that neither flatters itself. An error is the mean against both, less half
-the difference between the references, which is their own noise.
+Renders each scene with each method for SECONDS (10). Two references take REFERENCE_SECONDS (60) each and have other
+seeds. One is path traced and one guided, so that neither method is favoured. An error is the mean against both, less
+half the difference between the references, which is their own noise.
 """
 import sys
 import tempfile
@@ -49,7 +49,7 @@ def measure(programs, scene, seconds, reference_seconds):
         stats = render(name, arguments, seconds, 1)
         methods[name] = summary(stats, [programs.compare(name, reference) for reference in REFERENCES], noise)
     for line in methods.values():
-        # None where the references' noise hides what the method leaves.
+        # None if the references' noise hides the method's error.
         line["ratios"] = {
             e: methods["pt"][e] / line[e] if line[e] > noise[e] / 20 else None for e in ERRORS
         }

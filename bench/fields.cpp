@@ -1,4 +1,5 @@
-// Transient fields of a wave's bins: making them from what their cones hit, and drawing directions from them.
+// Transient fields of a wave's bins: building them from the hits of their cones, and sampling directions from
+// them.
 #include "floors.hpp"
 #include "guide.hpp"
 
@@ -17,9 +18,9 @@ constexpr std::uint32_t field_count = sizes::field_count, field_size = sizes::fi
 constexpr std::uint32_t cells = field_size * field_size;
 
 using fields_type = wfpg::bin_fields<stored_surfaces>;
-using serve_type = wfpg::sample_ray<stored_surfaces, hashed_numbers, wfpg::no_queries>;
+using sampler_type = wfpg::sample_ray<stored_surfaces, hashed_numbers, wfpg::no_queries>;
 
-/// Rays in runs of equal length, a run a bin of the wave: the rays of one bin lie together.
+/// Rays in runs of equal length. Each run is a bin, so the rays of a bin are contiguous.
 struct equal_bins {
   wfpg::array_view<std::uint32_t> permutation, offsets, keys;
   std::uint32_t* count;
@@ -45,7 +46,7 @@ struct cast_cones {
   }
 };
 
-/// Leaves finished fields in scratch memory, and says that they are there.
+/// Leaves finished fields in scratch memory and only marks them as done.
 struct keep_nothing {
   std::uint32_t* totals;
   template <class Block>
@@ -61,7 +62,7 @@ struct keep_nothing {
   }
 };
 
-/// Fields over a wave, on a GPU 2,048 of 128², their cones already cast.
+/// Fields over a wave, 2,048 of 128² on a GPU. Their cones are cast already.
 template <class Exec>
 class workload {
  public:
@@ -92,11 +93,11 @@ class workload {
     wfpg::product_point* const hemisphere = product_points.data();
     exec.for_each(std::size_t(p) * p, wfpg::measure_product_blocks{hemisphere, hemisphere + p * p, p});
     exec.for_each(std::size_t(p) * p, wfpg::draw_product_points{hemisphere, hemisphere + p * p, p, 1});
-    serve = serve_type{surfaces, hashed_numbers{}, {}, directions.view()};
-    sink = {bins, serve, {0.7f, 0.5f, 64}, field_size, {hemisphere, hemisphere + p * p, p}};
+    sampler = sampler_type{surfaces, hashed_numbers{}, {}, directions.view()};
+    sink = {bins, sampler, {0.7f, 0.5f, 64}, field_size, {hemisphere, hemisphere + p * p, p}};
   }
 
-  /// Every field through a sink.
+  /// Passes every field to a sink.
   template <class Sink>
   void make(const Sink& into) const {
     const std::size_t making = wfpg::field_scratch_bytes(field_size, Exec::warps_per_block);
@@ -114,11 +115,11 @@ class workload {
   wfpg::buffer<wfpg::sampled_direction, Exec> directions;
   wfpg::buffer<wfpg::product_point, Exec> product_points;
   fields_type fields;
-  serve_type serve;
-  wfpg::transient_sink<serve_type> sink;
+  sampler_type sampler;
+  wfpg::transient_sink<sampler_type> sink;
 };
 
-/// From hits to distributions in scratch memory; the floor reads the hits.
+/// From hits to distributions in scratch memory. The floor reads the hits.
 template <class Exec>
 void making_fields(benchmark::State& state) {
   const Exec exec;
@@ -127,37 +128,37 @@ void making_fields(benchmark::State& state) {
       state, exec, [&] { w.make(keep_nothing{w.totals.data()}); }, copy_of(exec, w.hits.bytes()));
 }
 
-/// What serving every ray of the wave adds to making the fields; the floor reads the surfaces and writes the
-/// directions.
+/// The time that sampling a direction for every ray adds to building the fields. The floor reads the surfaces
+/// and writes the directions.
 template <class Exec>
 void serving_rays(benchmark::State& state) {
   const Exec exec;
   const auto kind = static_cast<render::material_kind>(state.range(1));
   const workload<Exec> w(exec, kind, static_cast<std::uint32_t>(state.range(0)));
   const copy_of floor(exec, w.points.bytes() + w.directions.bytes());
-  std::vector<double> served, made, floors;
+  std::vector<double> sampled, made, floors;
   const auto make = [&] { w.make(keep_nothing{w.totals.data()}); };
-  const auto make_and_serve = [&] { w.make(w.sink); };
+  const auto make_and_sample = [&] { w.make(w.sink); };
   for (int i = 0; i < warm_up; ++i) {
     seconds_of(exec, make);
-    seconds_of(exec, make_and_serve);
+    seconds_of(exec, make_and_sample);
     seconds_of(exec, floor);
   }
   for (auto _ : state) {
     made.push_back(seconds_of(exec, make));
-    served.push_back(seconds_of_stage(exec, make_and_serve));
+    sampled.push_back(seconds_of_stage(exec, make_and_sample));
     floors.push_back(seconds_of(exec, floor));
-    state.SetIterationTime(served.back());
+    state.SetIterationTime(sampled.back());
   }
-  report(state, median(served) - median(made), median(floors));
+  report(state, median(sampled) - median(made), median(floors));
 }
 
 /// P, the material.
-constexpr argument served_with[][2] = {{0, static_cast<int>(render::material_kind::plastic)},
-                                       {8, static_cast<int>(render::material_kind::plastic)}};
+constexpr argument sampled_with[][2] = {{0, static_cast<int>(render::material_kind::plastic)},
+                                        {8, static_cast<int>(render::material_kind::plastic)}};
 
 WFPG_BENCH_STAGE(making_fields, no_arguments{});
-WFPG_BENCH_STAGE(serving_rays, {"P", "material"}, served_with);
+WFPG_BENCH_STAGE(serving_rays, {"P", "material"}, sampled_with);
 
 }  // namespace
 }  // namespace bench

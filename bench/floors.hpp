@@ -1,4 +1,4 @@
-// What stages are measured beside: copies of memory, and sorts of as many keys.
+// Floors of stages: copies of memory, and sorts of as many keys.
 #pragma once
 
 #include "timing.hpp"
@@ -43,12 +43,12 @@ void copy(const Exec& exec, const wfpg::buffer<T, Exec>& from, const wfpg::buffe
   copy_bytes(exec, from.data(), to.data(), from.bytes());
 }
 
-/// A copy that reads and writes `bytes` in all.
+/// A copy that reads and writes `bytes` in total.
 template <class Exec>
 class copy_of {
  public:
   copy_of(const Exec& exec, std::size_t bytes) : exec_(exec), from_(exec, bytes / 2), to_(exec, bytes / 2) {
-    exec.fill_bytes(from_.data(), 0, from_.bytes());  // pages that nobody wrote are not read from memory
+    exec.fill_bytes(from_.data(), 0, from_.bytes());  // the system does not read unwritten pages from memory
   }
   void operator()() const { copy(exec_, from_, to_); }
 
@@ -57,7 +57,7 @@ class copy_of {
   wfpg::buffer<unsigned char, Exec> from_, to_;
 };
 
-/// A sort of n keys with an index each by their low bits: CUB's radix sort on a GPU, the policy's on CPUs.
+/// Sorts n keys by their low bits, with an index each: CUB's radix sort on a GPU, the policy's sort on CPUs.
 template <class Exec, class Key, class Count>
 class sort_of {
  public:

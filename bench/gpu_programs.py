@@ -1,4 +1,4 @@
-"""The renderer's programs on the GPU, and the results that bench/table.py prints, for the scripts beside this one."""
+"""Runs the renderer's programs on the GPU, and writes results for bench/table.py. Shared by the scripts beside it."""
 import json
 import os
 import subprocess
@@ -6,7 +6,7 @@ import sys
 
 
 class Programs:
-    """Those in `directory`; their pictures and statistics lie in `folder`."""
+    """Programs in `directory`. They write pictures and statistics to `folder`."""
 
     def __init__(self, directory, size, folder):
         self.directory, self.size, self.folder = directory, size, folder

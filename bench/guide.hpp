@@ -1,4 +1,4 @@
-// An octree and a cache of the room, with light in it, and a wave of surfaces.
+// An octree and a cache of the room with light, and a wave of surfaces.
 #pragma once
 
 #include "materials/materials.hpp"
@@ -20,7 +20,7 @@ struct light_room {
   }
 };
 
-/// The guide of the room: an octree and a cache that has its light.
+/// The guide of the room: an octree and a cache with its light.
 template <class Exec>
 struct guide_of_room {
   wfpg::sparse_voxel_octree<Exec> octree;
@@ -39,7 +39,7 @@ struct guide_of_room {
   }
 };
 
-/// A wave's surfaces, of one of the renderer's materials.
+/// A wave's surfaces with one of the renderer's materials.
 struct stored_surfaces {
   wfpg::array_view<const room_point> points;
   render::material_kind kind = render::material_kind::lambert;

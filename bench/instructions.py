@@ -4,9 +4,9 @@
 usage: bench/instructions.py PROGRAM OUT.json [COMMIT]
        bench/instructions.py BEFORE.json AFTER.json
 
-PROGRAM is bench_cpu, which runs each stage once under valgrind's callgrind; only what bench::run_stage calls is counted.
-Counts do not depend on what else the machine does: the same program and libraries give the same ones. COMMIT is what
-PROGRAM was built from (default: what is checked out here). Takes half a minute; needs valgrind.
+PROGRAM is bench_cpu, which runs each stage once under valgrind's callgrind. Only calls of bench::run_stage count. The
+same program and libraries give the same counts, whatever else the machine does. COMMIT is what PROGRAM was built from
+(default: what is checked out here). Takes half a minute and needs valgrind.
 """
 import json
 import os
@@ -16,7 +16,7 @@ import sys
 import tempfile
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-STAGES = {  # a benchmark each
+STAGES = {  # one benchmark each
     "octree and cache": "octree_and_cache/seq/thousands:200/resolution:128",
     "binning": "binning/seq/resolution:64/bounces:2",
     "transient fields of a wave": "serving_rays/seq/P:0/material:1",

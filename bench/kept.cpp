@@ -7,8 +7,8 @@
 namespace bench {
 namespace {
 
-/// A wave's rays to their slots, a direction and a density each, where fields would be built, but none is
-/// due; the floor reads the surfaces and writes the directions.
+/// Finds the slots of a wave's rays, and samples a direction with its density for each. The wave may build
+/// fields, but none is due. The floor reads the surfaces and writes the directions.
 template <class Exec>
 void serving_kept(benchmark::State& state) {
   const Exec exec;
@@ -36,10 +36,10 @@ void serving_kept(benchmark::State& state) {
 }
 
 /// P, the material.
-constexpr argument served_with[][2] = {{0, static_cast<int>(render::material_kind::lambert)},
-                                       {8, static_cast<int>(render::material_kind::plastic)}};
+constexpr argument sampled_with[][2] = {{0, static_cast<int>(render::material_kind::lambert)},
+                                        {8, static_cast<int>(render::material_kind::plastic)}};
 
-WFPG_BENCH_STAGE(serving_kept, {"P", "material"}, served_with);
+WFPG_BENCH_STAGE(serving_kept, {"P", "material"}, sampled_with);
 
 }  // namespace
 }  // namespace bench

@@ -1,4 +1,4 @@
-// bench_cpu and bench_cuda: runs the stages' benchmarks, and notes in their results what they ran on.
+// bench_cpu and bench_cuda: run the stages' benchmarks, and write the machine into their results.
 //
 // usage: bench_cpu [--once] [--benchmark_filter=STAGE/POLICY ...]
 //   --once   runs each stage once, without warm-up, for tools that count what it executes
@@ -15,7 +15,7 @@ namespace bench {
 
 void run_stage(void (*call)(const void*), const void* work) {
   call(work);
-  benchmark::ClobberMemory();  // so that it is a call, not a jump
+  benchmark::ClobberMemory();  // makes this a call, not a jump
 }
 
 }  // namespace bench
@@ -23,7 +23,7 @@ void run_stage(void (*call)(const void*), const void* work) {
 namespace {
 
 #if defined(__CUDACC__)
-/// Notes the GPU; false where there is none.
+/// Writes the GPU's name into the results. False if there is none.
 bool add_machine() {
   cudaDeviceProp gpu{};
   const cudaError_t found = cudaGetDeviceProperties(&gpu, 0);
@@ -40,7 +40,7 @@ bool add_machine() {
   return true;
 }
 #else
-/// Notes how many threads work.
+/// Writes the number of threads into the results.
 bool add_machine() {
   benchmark::AddCustomContext("omp_threads", std::to_string(wfpg::exec::omp().concurrency()));
   benchmark::AddCustomContext("tbb_threads", std::to_string(wfpg::exec::tbb().concurrency()));
@@ -48,7 +48,7 @@ bool add_machine() {
 }
 #endif
 
-/// Takes --once from the arguments, and says whether it was there.
+/// Removes --once from the arguments. Returns whether it was there.
 bool take_once(int& argc, char** argv) {
   char** const end =
       std::remove_if(argv + 1, argv + argc, [](const char* a) { return !std::strcmp(a, "--once"); });

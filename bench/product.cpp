@@ -1,5 +1,5 @@
-// One ray's product of a field and the renderer's BSDF on one core: its weights, a direction drawn from it,
-// and the density of another direction; P = 8 over F = 64. And what evaluating the BSDF takes of that.
+// One ray's product of a field and the renderer's BSDF on one core, with P = 8 and F = 64. Times its weights,
+// a direction sampled from it, and the density of another direction. Also times the BSDF's evaluations alone.
 #include "materials/materials.hpp"
 
 #include <wfpg/exec/support/cpu_block.hpp>
@@ -23,8 +23,8 @@ const vec3 up = glm::normalize(vec3(0.3f, 0.2f, 0.9f));
 
 struct ray {
   surface hit;
-  vec2 u;      // of the direction to draw
-  vec3 other;  // whose density is asked
+  vec2 u;      // random numbers of the direction
+  vec3 other;  // whose density is queried
 };
 
 struct drawn_direction {
@@ -36,8 +36,8 @@ vec2 random_vec2(std::uint64_t stream, std::uint64_t i) {
   return wfpg::unit_vec2(wfpg::hash(wfpg::hash(1, stream), i));
 }
 
-// A field over the hemisphere above `up`, bright in a few places, and rays that meet surfaces of one material
-// and many normals: branches taken for one ray say little about the next.
+// A field over the hemisphere above `up`, bright in a few places. Rays hit surfaces of one material with many
+// normals, so that branches are hard to predict.
 struct workload {
   std::vector<std::uint32_t> sums =
       std::vector<std::uint32_t>(wfpg::grid_distribution::words(field_resolution));
@@ -96,7 +96,7 @@ void product(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations());  // rays
 }
 
-/// What the BSDF alone takes of that.
+/// The time of the BSDF's evaluations alone.
 template <render::material_kind kind>
 void evaluations(benchmark::State& state) {
   const workload w(kind);

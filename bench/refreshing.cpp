@@ -1,4 +1,4 @@
-// Kept fields: refreshing slots, their casts apart.
+// Kept fields: refreshing slots, without casting their cones.
 #include "floors.hpp"
 #include "guide.hpp"
 
@@ -12,7 +12,7 @@ namespace {
 constexpr std::uint32_t slot_count = sizes::slot_count, slot_size = sizes::slot_size;
 constexpr std::uint32_t cells = slot_size * slot_size, recast = 8;
 
-/// Slots with a history, each with a ray of the wave as origin.
+/// Slots with learnt data, each with a ray of the wave as origin.
 struct make_slots {
   wfpg::array_view<wfpg::field_slot> slots;
   wfpg::resident_field* fields;
@@ -42,8 +42,8 @@ struct cast_all {
   }
 };
 
-/// Due slots, on a GPU 4,096 of 24² cells, a cone in eight cast again, four times the default's; the floor
-/// reads what cells have hit and writes their distributions.
+/// Refreshes due slots, 4,096 of 24² cells on a GPU. One cone in eight is cast again, four times the
+/// default's. The floor reads the cells' hits and writes their distributions.
 template <class Exec>
 void refreshing_slots(benchmark::State& state) {
   const Exec exec;
@@ -62,12 +62,12 @@ void refreshing_slots(benchmark::State& state) {
 
   const wfpg::kept_field_wave<stored_surfaces> wave{
       pixels, {given}, guide.cache.view(), {}, wfpg::guiding_mode::oriented, 0.7f, 1, {}};
-  const wfpg::buffer<std::uint8_t, Exec> settled(exec, slot_count);
+  const wfpg::buffer<std::uint8_t, Exec> noted(exec, slot_count);
   const wfpg::buffer<std::uint64_t, Exec> refreshed(exec, 1);
   exec.fill_bytes(slots.data(), 0, slots.bytes());
   exec.fill_bytes(learnt.data(), 0, learnt.bytes());
-  exec.fill_bytes(settled.data(), 0, settled.bytes());
-  const wfpg::kept_fields_view kept{{slots.view(), nullptr, 0, settled.data()},
+  exec.fill_bytes(noted.data(), 0, noted.bytes());
+  const wfpg::kept_fields_view kept{{slots.view(), nullptr, 0, noted.data()},
                                     fields.data(),
                                     words.data(),
                                     found.data(),

@@ -1,5 +1,5 @@
-// What the benchmarks guide in: the unit box from inside with a ball in its middle, whose hits are known
-// without a ray caster, and a camera that looks at both.
+// The scene of the benchmarks: the unit box from inside with a ball in its centre, and a camera that looks at
+// both. Hits are known without a ray caster.
 #pragma once
 
 #include "timing.hpp"
@@ -57,7 +57,7 @@ class room_mesh {
   wfpg::buffer<wfpg::uvec3, Exec> triangles_;
 };
 
-/// The first hit inside the room, of ball or walls.
+/// The first hit inside the room, on ball or walls.
 struct room_caster {
   WFPG_HD wfpg::ray_hit operator()(const wfpg::ray& r) const {
     float nearest = 3.0e38f;
@@ -77,12 +77,12 @@ struct room_caster {
   }
 };
 
-/// A point of the room's surfaces, and which way it faces.
+/// A point on the room's surfaces, and its normal.
 struct room_point {
   vec3 position, normal, outgoing;
 };
 
-/// Where the camera's ray through a pixel meets the room.
+/// The hit of the camera's ray through a pixel.
 struct camera_hits {
   WFPG_HD room_point operator()(std::uint32_t pixel) const {
     const vec2 jitter = wfpg::unit_vec2(wfpg::hash(7, pixel));
@@ -108,7 +108,7 @@ struct camera_hits {
   }
 };
 
-/// The point where a path through a pixel is after `bounces` diffuse bounces.
+/// The point of a path through a pixel after `bounces` diffuse bounces.
 struct bounced_hits {
   int bounces = 1;
   WFPG_HD room_point operator()(std::uint32_t pixel) const {
@@ -125,14 +125,14 @@ struct bounced_hits {
   }
 };
 
-/// Hits stored, so that stages do not pay for finding them.
+/// Stores hits, so that stages do not spend time on finding them.
 struct store_points {
   bounced_hits hits;
   wfpg::array_view<room_point> points;
   WFPG_HD void operator()(std::size_t i) const { points[i] = hits(static_cast<std::uint32_t>(i)); }
 };
 
-/// Where the paths of a wave are after `bounces` bounces.
+/// The points of a wave's paths after `bounces` bounces.
 template <class Exec>
 wfpg::buffer<room_point, Exec> points_after(const Exec& exec, int bounces) {
   wfpg::buffer<room_point, Exec> points(exec, pixels);

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Times a guided sample beside a path-traced one on the GPU, and writes what bench/table.py prints.
+"""Times a guided sample beside a path-traced one on the GPU, and writes results for bench/table.py.
 
 usage: bench/sample_times.py DIRECTORY_OF_PROGRAMS OUT.json [RUNS [SIZE]]
 
-A run renders each scene with each method twice, 32 and 128 samples: what lies between is samples whose fields have
-settled. Ratios are of one run, and medians over RUNS (20) of them.
+A run renders each scene with each method twice, with 32 and 128 samples. The difference is the time of samples after
+warm-up. Ratios are taken within one run, and are medians over RUNS (20) runs.
 """
 import statistics
 import sys
@@ -15,12 +15,12 @@ from gpu_programs import Programs, write_results
 SCENES = ("ajar",)
 METHODS = {"pt": ["--method", "pt"], "wfpg": []}
 FIRST, LAST = 32, 128
-# Of a rendering, those that every sample has.
+# The stages of a rendering that every sample has.
 STAGES = ("camera", "update", "trace", "sort", "lights", "directions", "shade", "film")
 
 
-def settled(programs, scene, arguments):
-    """Milliseconds by stage and segments of one settled sample."""
+def warmed_up(programs, scene, arguments):
+    """Milliseconds by stage and segments of one sample after warm-up."""
     first, last = (programs.render(scene, "x", ["--spp", str(n), *arguments]) for n in (FIRST, LAST))
     samples = LAST - FIRST
     line = {s: 1e3 * (last["seconds"].get(s, 0.0) - first["seconds"].get(s, 0.0)) / samples for s in STAGES}
@@ -31,7 +31,7 @@ def measure(programs, scene, runs):
     methods = {name: [] for name in METHODS}
     for _ in range(runs + 1):  # the first warms up
         for name, arguments in METHODS.items():
-            methods[name].append(settled(programs, scene, arguments))
+            methods[name].append(warmed_up(programs, scene, arguments))
     pairs = list(zip(methods["pt"], methods["wfpg"]))[1:]
     by_sample = [w["total"] / p["total"] for p, w in pairs]
     by_segment = [w["total"] / w["segments"] / (p["total"] / p["segments"]) for p, w in pairs]

@@ -1,41 +1,41 @@
-// How large the benchmarks' problems are on each kind of machine.
+// The sizes of the benchmarks' problems on each kind of machine.
 #pragma once
 
 #include <cstdint>
 
 namespace bench {
 
-/// What a stage is run with: two arguments a row.
+/// An argument of a stage. Each row has two.
 using argument = std::int64_t;
 
-/// GPUs. Results in bench/results/ are of these sizes.
+/// GPUs. Results in bench/results/ have these sizes.
 struct gpu_sizes {
   static constexpr int warm_up = 3, iterations = 20;
 
-  // The room and the rays that a wave has in it.
+  // The room, and the rays of a wave in it.
   static constexpr std::uint32_t width = 1920, height = 1080;
   static constexpr int room_triangles = 100000;
 
   static constexpr argument voxelization[][2] = {{1000, 512}};        // thousands of triangles, resolution
   static constexpr argument octree_and_cache[][2] = {{10000, 1024}};  // thousands of fragments, resolution
   static constexpr argument binning[][2] = {{256, 0}, {256, 2}};      // resolution, bounces
-  // Resolution, percent of the paths that one leaf has.
+  // Resolution, percentage of the paths in one leaf.
   static constexpr argument depositing[][2] = {{128, 0}, {256, 0}, {128, 10}};
 
   // Transient fields: bins, cells along an edge, the octree's resolution.
   static constexpr std::uint32_t field_count = 2048, field_size = 128, field_octree = 256;
 
-  // Kept fields: slots that are due, cells along an edge, the octree's resolution.
+  // Kept fields: due slots, cells along an edge, the octree's resolution.
   static constexpr std::uint32_t slot_count = 4096, slot_size = 24, slot_octree = 128;
-  static constexpr int kept_samples = 17;  // that fields learn from before a wave is measured
+  static constexpr int kept_samples = 17;  // fields learn from them before a wave is measured
 
-  // Casting: points, cells along an edge of their directions; thousands of triangles, whether rays are in
-  // order.
+  // Casting: points, cells along an edge of their directions. Then thousands of triangles, and whether rays
+  // are in order.
   static constexpr std::uint32_t cast_points = 2048, cast_size = 128;
   static constexpr argument casting[][2] = {{100, 1}, {100, 0}, {1000, 1}, {1000, 0}, {0, 1}};
 };
 
-/// CPUs: a stage takes about two seconds on one core, all of its iterations together.
+/// CPUs. All iterations of a stage take about two seconds on one core.
 struct cpu_sizes {
   static constexpr int warm_up = 1, iterations = 5;
 

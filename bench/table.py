@@ -3,13 +3,13 @@
 
 usage: bench/table.py bench/results/NAME.json [...]
 
-Several are of wfpg-quality, with the same methods in other scenes.
+Several files must be results of wfpg-quality with the same methods in other scenes.
 """
 import json
 import re
 import sys
 
-# What a stage's floor is: see the sources beside this one. Where CPUs have another, its label says so.
+# The floor of each stage; its source explains it. On CPUs a label names another floor.
 FLOORS = {
     "voxelization": "writing the fragments and sorting them",
     "octree_and_cache": "CUB's sort of the codes",
@@ -31,7 +31,7 @@ def print_stages(benchmarks):
     for b in benchmarks:
         stage, *arguments = b["name"].split("/iterations")[0].split("/")
         name = f"`{stage}` {', '.join(a.replace(':', ' ') for a in arguments)}".strip()
-        floor = b.get("label", FLOORS[stage])  # where it is another
+        floor = b.get("label", FLOORS[stage])  # if the floor is another
         print(f"| {name} | {floor} | {b['floor_ms']:.3g} | {b['median_ms']:.3g} | {b['ratio']:.2f} |")
 
 
@@ -78,7 +78,7 @@ def errors_at(scene, budget):
         for point in run.get("points", []):
             if f"{point['samples']} samples" == budget:
                 sums.setdefault(run["method"], []).append(point)
-    if not sums:  # some results keep what is below alone
+    if not sums:  # some results have only what follows
         return {
             m["method"]: {**{e: m["errors"][e]["mean"] for e in MEASURES}, "seconds": m["seconds"]["mean"]}
             for summary in scene["summary"] if summary["budget"] == budget for m in summary["methods"]

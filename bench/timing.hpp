@@ -1,7 +1,7 @@
-// How stages are timed: by events on a GPU, by the clock on CPUs. Times are medians over the iterations, and
-// beside each stage is its floor, measured in turn with it: the least that the hardware would need for the
-// same. Each stage is a function template over an execution policy, which WFPG_BENCH_STAGE registers: as NAME
-// on CUDA, as NAME/seq, NAME/omp and NAME/tbb on CPUs.
+// Timing of stages: by events on a GPU, by the clock on CPUs. Times are medians over the iterations. Beside
+// each stage is its floor, the least time that the hardware needs for the same work. Both are measured
+// alternately. Each stage is a function template over an execution policy. WFPG_BENCH_STAGE registers it: as
+// NAME on CUDA, as NAME/seq, NAME/omp and NAME/tbb on CPUs.
 #pragma once
 
 #include "sizes.hpp"
@@ -25,20 +25,21 @@
 
 namespace bench {
 
-/// How often stages run before they are measured; main.cpp sets it to zero for --once.
+/// How often stages run before they are measured. main.cpp sets it to zero for --once.
 inline int warm_up = sizes::warm_up;
 
-/// Every registered stage, for main.cpp.
+/// All registered stages, for main.cpp.
 inline std::vector<benchmark::internal::Benchmark*>& registered_stages() {
   static std::vector<benchmark::internal::Benchmark*> all;
   return all;
 }
 
-/// Calls call(work), and is never inlined: bench/instructions.py counts what runs in it. In main.cpp.
+/// Calls call(work). Never inlined, since bench/instructions.py counts the instructions in it. Defined in
+/// main.cpp.
 void run_stage(void (*call)(const void*), const void* work);
 
 #if defined(__CUDACC__)
-/// Seconds of GPU time that `work` takes on the policy's stream.
+/// Seconds of GPU time of `work` on the policy's stream.
 template <class Work>
 double seconds_of(const wfpg::exec::cuda& exec, const Work& work) {
   using wfpg::check_cuda;
@@ -56,7 +57,7 @@ double seconds_of(const wfpg::exec::cuda& exec, const Work& work) {
   return 1.0e-3 * static_cast<double>(milliseconds);
 }
 #else
-/// Seconds that `work` takes by the clock.
+/// Seconds of `work` by the clock.
 template <class Exec, class Work>
 double seconds_of(const Exec&, const Work& work) {
   using clock = std::chrono::steady_clock;
@@ -66,7 +67,7 @@ double seconds_of(const Exec&, const Work& work) {
 }
 #endif
 
-/// Seconds that `stage` takes, called by run_stage.
+/// Seconds of `stage`, called through run_stage.
 template <class Exec, class Stage>
 double seconds_of_stage(const Exec& exec, const Stage& stage) {
   return seconds_of(
@@ -79,19 +80,19 @@ inline double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Counters of a stage: its time and its floor's in milliseconds, and their ratio.
+/// Sets a stage's counters: its time and its floor's in milliseconds, and their ratio.
 inline void report(benchmark::State& state, double stage_seconds, double floor_seconds) {
   state.counters["median_ms"] = 1.0e3 * stage_seconds;
   state.counters["floor_ms"] = 1.0e3 * floor_seconds;
   state.counters["ratio"] = stage_seconds / floor_seconds;
 }
 
-/// Nothing to do before a stage or a floor.
+/// Does nothing before a stage or a floor.
 struct nothing {
   void operator()() const {}
 };
 
-/// Times stage and floor in turn, `prepare` untimed before each stage, and reports their medians.
+/// Times stage and floor alternately, and reports their medians. `prepare` runs untimed before each stage.
 template <class Exec, class Stage, class Floor, class Prepare = nothing>
 void compare(benchmark::State& state, const Exec& exec, const Stage& stage, const Floor& floor,
              const Prepare& prepare = {}) {
@@ -110,17 +111,17 @@ void compare(benchmark::State& state, const Exec& exec, const Stage& stage, cons
   report(state, median(stages), median(floors));
 }
 
-/// Says what a stage's floor is where it is another on CPUs than on a GPU.
+/// Names a stage's floor if it is another on CPUs than on a GPU.
 inline void set_cpu_floor([[maybe_unused]] benchmark::State& state, [[maybe_unused]] const char* floor) {
 #if !defined(__CUDACC__)
   state.SetLabel(floor);
 #endif
 }
 
-/// In place of a stage's arguments.
+/// Stands for the arguments of a stage without any.
 struct no_arguments {};
 
-/// Registers a stage, which sets its times itself.
+/// Registers a stage that sets its times itself.
 inline auto* add_stage(const char* name, benchmark::internal::Function* stage, no_arguments) {
   auto* const added = benchmark::RegisterBenchmark(name, stage);
   registered_stages().push_back(added);
@@ -136,8 +137,8 @@ auto* add_stage(const char* name, benchmark::internal::Function* stage, const st
   return added;
 }
 
-/// WFPG_BENCH_STAGE(stage, {"name", "name"}, rows) or WFPG_BENCH_STAGE(stage, no_arguments{}) in namespace
-/// bench.
+/// WFPG_BENCH_STAGE(stage, {"name", "name"}, rows) or WFPG_BENCH_STAGE(stage, no_arguments{}). For use in
+/// namespace bench.
 #if defined(__CUDACC__)
 #define WFPG_BENCH_STAGE(stage, ...) \
   [[maybe_unused]] const auto* const stage##_on_cuda = add_stage(#stage, stage<wfpg::exec::cuda>, __VA_ARGS__)

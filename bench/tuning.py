@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Measures what single options do, each at some values with all others at their defaults, by wfpg-quality, for
-bench/tuning_plot.py.
+"""Measures the effect of single options with wfpg-quality, for bench/tuning_plot.py. Each option has several values,
+and all others their defaults.
 
 usage: bench/tuning.py DIRECTORY_OF_PROGRAMS OUT.json FOLDER [DEVICE]
 
-Pictures, references and what else wfpg-quality writes go to FOLDER; interrupted, it goes on where it was. DEVICE is
-cpu or cuda, of which the errors are the same but for noise.
+wfpg-quality writes pictures, references and its other files to FOLDER. An interrupted run resumes. DEVICE is cpu or
+cuda. Their errors differ only by noise.
 """
 import json
 import os
@@ -16,7 +16,7 @@ SCENES = ("ajar", "cornell-enclosed --nee off")
 SETTINGS = "--size 96x96 --spp 64 --seeds 2 --reference-spp 2048".split()
 DEFAULT = "wfpg"
 
-# What stands in plots, wfpg-render's arguments for a value, the values, the default, and arguments that go with all.
+# Title of the plot, wfpg-render's arguments for a value, the values, the default, and arguments of all runs.
 OPTIONS = (
     ("kept.budget_bytes, MiB", "--field-budget {}MiB", (1, 4, 16, 24, 32, 64), 24, ""),
     ("kept.resolution", "--slot-resolution {}", (12, 16, 24, 32), 24, ""),
@@ -25,7 +25,7 @@ OPTIONS = (
     ("kept.recast", "--recast {}", (1, 4, 8, 16, 32, 64), 32, ""),
     ("guide_fraction", "--guide-fraction {}", (0.3, 0.5, 0.7, 0.9), 0.7, ""),
     ("product_resolution", "--method wfpg-product --product-resolution {}", (0, 4, 8), 0, ""),
-    # Pictures as small as these have no more deposits than 16 a leaf where the octree is fine.
+    # Such small pictures have at most 16 deposits a leaf if the octree is fine.
     ("deposits_per_leaf, octree 32", "--deposits-per-leaf {}", (1, 4, 16), 16, "--octree-resolution 32"),
     ("kept.recast, learn off", "--recast {}", (8, 32), 32, "--learn off"),
     ("kept.learn", "--learn {}", ("off", "on"), "on", ""),

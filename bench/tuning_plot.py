@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws what bench/tuning.py measured: the error against each option, a plot an option.
+"""Draws the results of bench/tuning.py: the error over each option, one plot per option.
 
 usage: bench/tuning_plot.py bench/results/tuning.json OUT.svg
 """

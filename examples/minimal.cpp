@@ -1,5 +1,5 @@
-// The least that guiding takes, with no renderer around it: a white floor, lit by a small lamp in the
-// ceiling. Prints how much smaller the variance of the floor's light becomes.
+// The smallest program that guides, without a renderer: a white floor, lit by a small lamp in the ceiling.
+// Prints how much guiding reduces the variance of the floor's light.
 #include <wfpg/exec/seq.hpp>
 #include <wfpg/octree/svo_ray_caster.hpp>
 #include <wfpg/path_guider.hpp>

@@ -1,4 +1,4 @@
-// Owning storage: moves, transfers, what happens when memory runs out, and the resource that keeps blocks.
+// Owning storage: moves, transfers, failing allocations, and the retaining resource.
 #define WFPG_TEST_EACH_WIDTH
 
 #include "support/catch.hpp"
@@ -26,7 +26,7 @@ namespace {
 
 using namespace wfpg_test;
 
-/// Counts what is allocated, fails above a limit, and notices calls from another thread than its own.
+/// Counts allocations, fails above a limit, and detects calls from other threads.
 class counting_resource : public wfpg::memory_resource {
  public:
   explicit counting_resource(wfpg::memory_resource* upstream, std::size_t limit = ~std::size_t(0))
@@ -96,7 +96,7 @@ struct no_work {
   WFPG_HD void operator()(Block&, std::size_t) const {}
 };
 
-WFPG_TEST_CASE("a resource that fails makes out_of_memory", "[buffer]") {
+WFPG_TEST_CASE("a failing resource throws out_of_memory", "[buffer]") {
   counting_resource resource(default_resource(), 1000);
   const Exec exec = Exec().with_resource(&resource);
   const wfpg::buffer<char, Exec> kept(exec, 900);
@@ -113,8 +113,8 @@ WFPG_TEST_CASE("a resource that fails makes out_of_memory", "[buffer]") {
   if constexpr (loops_on_host) CHECK_THROWS_AS(exec.for_each_block(4, 4096, no_work{}), wfpg::out_of_memory);
 }
 
-/// Allocates temporaries where the policy has any: OpenMP's sorts take theirs from the heap, serial
-/// reductions need none.
+/// Allocates temporaries where the policy uses any. OpenMP sorts allocate from the heap; serial reductions
+/// need no memory.
 template <class Exec>
 std::uint32_t sort_and_reduce(const Exec& exec, const wfpg::buffer<std::uint32_t, Exec>& keys,
                               const wfpg::buffer<std::uint32_t, Exec>& values) {
@@ -122,7 +122,7 @@ std::uint32_t sort_and_reduce(const Exec& exec, const wfpg::buffer<std::uint32_t
   return thrust::reduce(exec.thrust(), values.data(), values.data() + values.size());
 }
 
-WFPG_TEST_CASE("Thrust's temporaries come from the calling thread and fail as out_of_memory", "[buffer]") {
+WFPG_TEST_CASE("Thrust allocates temporaries in the calling thread and throws out_of_memory", "[buffer]") {
   counting_resource resource(default_resource());
   const Exec exec = Exec().with_resource(&resource);
   const std::size_t n = 100000;
@@ -153,7 +153,7 @@ void fill(const Exec& exec, const wfpg::buffer<int, Exec>& buffer, int value) {
   exec.for_each(buffer.size(), [=] WFPG_HD(std::size_t i) { view[i] = value; });
 }
 
-WFPG_TEST_CASE("a retaining resource allocates once for work that repeats", "[buffer]") {
+WFPG_TEST_CASE("a retaining resource allocates once for repeated work", "[buffer]") {
   counting_resource upstream(default_resource());
   {
     wfpg::retaining_resource arena(&upstream);
@@ -186,7 +186,7 @@ WFPG_TEST_CASE("a retaining resource allocates once for work that repeats", "[bu
   CHECK(upstream.live == 0);
 }
 
-TEST_CASE("a retaining resource gives blocks large enough", "[buffer]") {
+TEST_CASE("a retaining resource returns blocks that are large enough", "[buffer]") {
   counting_resource upstream(std::pmr::get_default_resource());
   wfpg::retaining_resource arena(&upstream);
   for (std::size_t bytes = 1; bytes < 3000; ++bytes) {
@@ -199,7 +199,7 @@ TEST_CASE("a retaining resource gives blocks large enough", "[buffer]") {
   CHECK(upstream.live < 20000);
 }
 
-/// Makes a resource the default one.
+/// Sets the default resource while it lives.
 class default_resource_scope {
  public:
   explicit default_resource_scope(wfpg::memory_resource* resource)
@@ -212,7 +212,7 @@ class default_resource_scope {
   wfpg::memory_resource* before_;
 };
 
-/// Blocks of some sizes, given back in another order, twice, and all released.
+/// Allocates blocks of several sizes, frees them in another order, repeats this, and releases all.
 template <class Exec>
 void use_blocks(const Exec& exec) {
   for (int round = 0; round < 2; ++round) {
@@ -222,8 +222,7 @@ void use_blocks(const Exec& exec) {
   }
 }
 
-WFPG_TEST_CASE("a retaining resource fails where blocks are asked for, never where they are given back",
-               "[buffer]") {
+WFPG_TEST_CASE("a retaining resource throws from allocate, never from deallocate", "[buffer]") {
   failing_resource upstream, entries(std::pmr::new_delete_resource());
   const default_resource_scope scope(&entries);
   const auto use = [&] {

@@ -1,5 +1,4 @@
-// The schedule of kept fields' builds, by itself: which waves build, which fields are due, which rays are
-// counted.
+// The schedule of kept fields' builds: which waves build, which fields are due, which rays are counted.
 #include "support/catch.hpp"
 
 #include <wfpg/guides/octree/build_schedule.hpp>
@@ -23,7 +22,7 @@ build_schedule schedule_in(std::uint32_t sample, std::size_t max_rays = 1000, st
   return schedule;
 }
 
-/// The waves of a sample that build, of the first 24.
+/// Indices of the first 24 waves that build in a sample.
 std::vector<std::uint32_t> building_waves(build_schedule schedule) {
   std::vector<std::uint32_t> waves;
   for (std::uint32_t wave = 0; wave < 24; ++wave) {
@@ -43,8 +42,7 @@ TEST_CASE("build schedule: every wave builds during warm-up, then one in eight",
   CHECK((building_waves(schedule_in(40)) == std::vector<std::uint32_t>{0, 8, 16}));
 }
 
-TEST_CASE("build schedule: waves build for some samples after bins changed or geometry moved",
-          "[build_schedule]") {
+TEST_CASE("build schedule: waves build for four samples after bins or geometry change", "[build_schedule]") {
   build_schedule schedule = schedule_in(64);
   schedule.expect_builds(constants::busy_samples);
   for (std::uint32_t s = 65; s <= 68; ++s) {
@@ -54,11 +52,11 @@ TEST_CASE("build schedule: waves build for some samples after bins changed or ge
   schedule.begin_sample(69);
   CHECK(building_waves(schedule).size() == 3);
   schedule.expect_builds(constants::invalidated_samples);
-  schedule.expect_builds(1);  // never shortens
+  schedule.expect_builds(1);  // never shortens the period
   CHECK(schedule.busy_until() == 69 + 32);
 }
 
-TEST_CASE("build schedule: bins are chosen anew after samples that are powers of two", "[build_schedule]") {
+TEST_CASE("build schedule: bin sizes are adapted after samples 1, 2, 4, 8, ...", "[build_schedule]") {
   CHECK_FALSE(build_schedule().chooses_bins());
   std::set<std::uint32_t> chosen;
   for (std::uint32_t s = 1; s <= 100; ++s)
@@ -66,7 +64,7 @@ TEST_CASE("build schedule: bins are chosen anew after samples that are powers of
   CHECK((chosen == std::set<std::uint32_t>{1, 2, 4, 8, 16, 32, 64}));
 }
 
-TEST_CASE("build schedule: rays are counted in all samples first, then in one of four, then of sixteen",
+TEST_CASE("build schedule: rays are counted in all samples, then every 4th, then every 16th",
           "[build_schedule]") {
   std::set<std::uint32_t> counted;
   for (std::uint32_t s = 1; s <= 64; ++s)
@@ -77,8 +75,7 @@ TEST_CASE("build schedule: rays are counted in all samples first, then in one of
   CHECK_FALSE(schedule_in(63).counted().includes(0));
 }
 
-TEST_CASE("build schedule: large waves count one ray in a stride, others in each sample",
-          "[build_schedule]") {
+TEST_CASE("build schedule: large waves count one ray per stride, others in each sample", "[build_schedule]") {
   CHECK(schedule_in(1, 8000, 1000).counted().stride == 1);
   CHECK(schedule_in(1, 8001, 1000).counted().stride == 2);
   CHECK(schedule_in(1, 32004, 1000).counted().stride == 8);
@@ -95,21 +92,21 @@ TEST_CASE("build schedule: large waves count one ray in a stride, others in each
   CHECK(first.size() == 4);
 }
 
-TEST_CASE("build schedule: a field is due at first, and once a part of the samples passed",
+TEST_CASE("build schedule: a new field is due, and again after a fraction of the samples",
           "[build_schedule]") {
   CHECK(build_schedule::is_due(5, 0, 5));
   CHECK_FALSE(build_schedule::is_due(5, 1, 5));
-  CHECK(build_schedule::is_due(8, 1, 7));  // an eighth
+  CHECK(build_schedule::is_due(8, 1, 7));  // after an eighth of the samples
   CHECK_FALSE(build_schedule::is_due(16, 1, 15));
   CHECK(build_schedule::is_due(16, 1, 14));
   CHECK(build_schedule::is_due(32, 3, 28));
-  CHECK_FALSE(build_schedule::is_due(33, 3, 28));  // a quarter after warm-up
+  CHECK_FALSE(build_schedule::is_due(33, 3, 28));  // after a quarter, once warmed up
   CHECK(build_schedule::is_due(36, 3, 27));
   CHECK_FALSE(build_schedule::is_due(100, 3, 76));
   CHECK(build_schedule::is_due(100, 3, 75));
 }
 
-TEST_CASE("build schedule: a saved state is taken, or told from one that cannot be", "[build_schedule]") {
+TEST_CASE("build schedule: a valid saved state is accepted, an invalid one is refused", "[build_schedule]") {
   build_schedule schedule(1000, 1000);
   CHECK(schedule.restore(64, 16, 68));
   CHECK(schedule.sample() == 64);

@@ -1,5 +1,5 @@
-// Cones through the exitance cache: what they gather where the answer is known. Fields made of that are
-// test_cone_caster_fields.cpp's.
+// Cones through the exitance cache, compared with known answers. test_cone_caster_fields.cpp tests fields
+// made of cones.
 #include "support/cached_scene.hpp"
 #include "support/catch.hpp"
 #include "support/octree_nodes.hpp"
@@ -31,7 +31,7 @@ static_assert(wfpg::is_inline_caster_v<svo_cone_caster>);
 static_assert(!wfpg::is_cone_caster_v<wfpg::svo_ray_caster>);
 static_assert(std::is_trivially_copyable_v<svo_cone_caster>);
 
-/// Solid angles of a field's cells, from 64² a sphere to 8² of a hemisphere; and thinner than a voxel.
+/// Solid angles of cells: from 64² on a sphere to 8² on a hemisphere. The first is thinner than a voxel.
 constexpr float widths[] = {0.0f, 12.57f / 4096, 12.57f / 1024, 12.57f / 256, 6.28f / 64};
 
 ray make_ray(vec3 origin, vec3 direction) {
@@ -48,7 +48,7 @@ std::vector<ray> rays_from(float low, float high, int n, std::uint64_t seed) {
   return rays;
 }
 
-/// The unit box with light on its walls: `radiance(place)`.
+/// The unit box. Its walls emit `radiance(place)`.
 template <class Exec>
 struct shining_box : cached_scene<Exec> {
   wfpg::voxel_opacity<Exec> opacity;
@@ -77,7 +77,7 @@ struct cast_cone {
   float solid_angle;
   WFPG_HD ray_hit operator()(const ray& r) const { return caster(r, solid_angle); }
 };
-/// What cones gather that are all as wide; none of them has a distance.
+/// Radiance of cones of one width. Checks that no cone returns a distance.
 template <class Exec>
 std::vector<float> cast(const Exec& exec, const svo_cone_caster& caster, const std::vector<ray>& rays,
                         float solid_angle) {
@@ -102,7 +102,7 @@ WFPG_TEST_CASE("cone caster: in a furnace all cones see its radiance", "[cone_ca
     INFO(solid_angle << " sr");
     const auto seen = cast(box.exec, caster, rays_from(0.1f, 0.9f, 4000, 1), solid_angle);
     CHECK(mean_of(seen) == Approx(3.0).epsilon(0.006));
-    // Some that graze a wall, near an edge, see past it: a quarter of them at the most.
+    // Cones that graze a wall near an edge see past it. At most a quarter do.
     const auto leaks = std::count_if(seen.begin(), seen.end(), [](float r) { return r < 3.0f * 0.99f; });
     CHECK(leaks < (solid_angle < 0.01f ? 4 : 300));
     CHECK(*std::min_element(seen.begin(), seen.end()) > 3.0f * (solid_angle < 0.01f ? 0.9f : 0.7f));
@@ -110,7 +110,7 @@ WFPG_TEST_CASE("cone caster: in a furnace all cones see its radiance", "[cone_ca
   }
 }
 
-/// A square in front of another one, which is bright; they face `toward`.
+/// Two squares that face `toward`. The rear one is bright and hidden by the front one.
 struct two_walls {
   vec3 ahead, u, v;
 
@@ -132,13 +132,13 @@ struct two_walls {
       const float x = (float(i % n) + 0.5f) / n - 0.5f, y = (float(i / n) + 0.5f) / n - 0.5f;
       result.push_back({at(0.8f, x, y), -ahead, 1.0f});
       result.push_back({at(0.4f, x, y), -ahead, 0.0f});
-      result.push_back({at(0.4f, x, y), ahead, 1.0f});  // which the bright one lights
+      result.push_back({at(0.4f, x, y), ahead, 1.0f});  // lit by the bright square
     }
     return result;
   }
 };
 
-WFPG_TEST_CASE("cone caster: behind a wall it is dark, however wide a cone is", "[cone_caster]") {
+WFPG_TEST_CASE("cone caster: a wall hides light from cones of any width", "[cone_caster]") {
   for (const vec3 toward : {vec3(0, 0, 1), vec3(1, 0, 1), vec3(0.3f, -0.2f, 1.0f), vec3(1, 1, 1)}) {
     const two_walls walls(toward);
     cached_scene<Exec> scene(walls.mesh(), 64, 3 * 96 * 96);
@@ -159,9 +159,9 @@ WFPG_TEST_CASE("cone caster: behind a wall it is dark, however wide a cone is", 
       INFO("wall toward " << toward.x << ' ' << toward.y << ", " << solid_angle << " sr");
       const double hidden = mean_of(cast(scene.exec, caster, before, solid_angle));
       CHECK(mean_of(cast(scene.exec, caster, between, solid_angle)) > 0.95);
-      // A wall along no axis covers nodes in part, some a corner of which the next one does not make up for.
+      // A wall along no axis covers nodes partly, so light leaks at their corners.
       CHECK(hidden < (along_axis ? 0.001 : 0.03));
-      // Thin cones read leaves alone, the next ones a few larger nodes, where they are 25 voxels away.
+      // Thin cones read leaves only. The next widths read a few larger nodes, 25 voxels away.
       if (solid_angle < 0.001f) CHECK(hidden == 0.0);
       if (solid_angle < 0.004f) CHECK(hidden < 1.0e-4);
     }
@@ -175,7 +175,7 @@ test_mesh open_box() {
   return mesh;
 }
 
-/// All cells of a field over the sphere.
+/// Rays through all cells of a field over the sphere.
 std::vector<ray> cells_of_sphere(vec3 from, int resolution) {
   std::vector<ray> rays;
   for (int i = 0; i < resolution * resolution; ++i) {
@@ -185,11 +185,11 @@ std::vector<ray> cells_of_sphere(vec3 from, int resolution) {
   return rays;
 }
 
-WFPG_TEST_CASE("cone caster: the environment is seen through an opening in its share", "[cone_caster]") {
+WFPG_TEST_CASE("cone caster: an opening shows its fraction of the environment", "[cone_caster]") {
   const cached_scene<Exec> scene(open_box(), 64, 0);
   const wfpg::voxel_opacity<Exec> opacity(scene.exec, scene.tree);
   const svo_cone_caster caster(scene.view(), opacity.view(), 6.0f);
-  // A face of six, without a rim of walls of voxels; where cones are wide, of nodes as wide as they are.
+  // One face of six, less a rim of wall voxels. Wide cones lose a wider rim of larger nodes.
   const struct {
     int resolution;
     double least;
@@ -204,7 +204,7 @@ WFPG_TEST_CASE("cone caster: the environment is seen through an opening in its s
   }
 }
 
-WFPG_TEST_CASE("cone caster: an environment without bounds counts as 1e30, and as nothing behind walls",
+WFPG_TEST_CASE("cone caster: infinite environment radiance is clamped to 1e30 and hidden by walls",
                "[cone_caster]") {
   const cached_scene<Exec> scene(open_box(), 32, 0);
   const wfpg::voxel_opacity<Exec> opacity(scene.exec, scene.tree);
@@ -220,7 +220,7 @@ WFPG_TEST_CASE("cone caster: an environment without bounds counts as 1e30, and a
   CHECK(dark > 100);
 }
 
-/// A thin cone, and the voxel that a ray meets.
+/// Difference between a thin cone's radiance and that of the voxel that a ray hits.
 struct thin_cone {
   svo_cone_caster cones;
   wfpg::svo_ray_caster rays;
@@ -234,13 +234,13 @@ struct thin_cone {
   }
 };
 
-/// Different from voxel to voxel.
+/// Radiance that differs from voxel to voxel.
 float speckles(vec3 p) {
   const float x = 37.3f * p.x + 53.7f * p.y + 71.1f * p.z;
   return 0.1f + x - std::floor(x);
 }
 
-WFPG_TEST_CASE("cone caster: a cone as narrow as a voxel sees the one that a ray meets", "[cone_caster]") {
+WFPG_TEST_CASE("cone caster: a cone of a voxel's width sees the voxel that a ray hits", "[cone_caster]") {
   const shining_box<Exec> box(speckles);
   for (const float clearance : {0.0f, 2.0f}) {
     const svo_cone_caster cones(box.view(), box.opacity.view(), 0.0f, clearance);
@@ -249,11 +249,11 @@ WFPG_TEST_CASE("cone caster: a cone as narrow as a voxel sees the one that a ray
     for (const float error :
          evaluate(box.exec, rays_from(0.1f, 0.9f, 4000, 3), thin_cone{cones, rays, box.view()}))
       wrong += error > 1.0e-5f ? 1 : 0;
-    CHECK(wrong < 20);  // that a voxel's edge parts
+    CHECK(wrong < 20);  // cones split by a voxel's edge
   }
 }
 
-WFPG_TEST_CASE("cone caster: a wide cone sees about the mean of what rays in it see", "[cone_caster]") {
+WFPG_TEST_CASE("cone caster: a wide cone sees about the mean of the rays inside it", "[cone_caster]") {
   const shining_box<Exec> box([](vec3 p) { return 0.2f + p.x * p.y + 0.5f * p.z * p.z; });
   const svo_cone_caster caster(box.view(), box.opacity.view());
   random_numbers random(4);
@@ -275,7 +275,7 @@ WFPG_TEST_CASE("cone caster: a wide cone sees about the mean of what rays in it 
   CHECK(std::fabs(bias) < 0.03 * known);
 }
 
-WFPG_TEST_CASE("cone caster: t_min, t_max and the clearance bound what a cone meets", "[cone_caster]") {
+WFPG_TEST_CASE("cone caster: t_min, t_max and the clearance bound what a cone hits", "[cone_caster]") {
   const shining_box<Exec> box([](vec3) { return 3.0f; });
   const auto gathered = [&](float t_min, float t_max, float clearance) {
     ray r = make_ray(vec3(0.5f), {1, 0, 0});
@@ -287,11 +287,10 @@ WFPG_TEST_CASE("cone caster: t_min, t_max and the clearance bound what a cone me
   CHECK(gathered(0.0f, 3.0e38f, 0.0f) == Approx(3.0f));
   CHECK(gathered(0.0f, 0.4f, 0.0f) == 7.0f);
   CHECK(gathered(0.6f, 3.0e38f, 0.0f) == 7.0f);
-  CHECK(gathered(0.0f, 3.0e38f, 20.0f) == 7.0f);  // voxels
+  CHECK(gathered(0.0f, 3.0e38f, 20.0f) == 7.0f);  // in voxels
 }
 
-WFPG_TEST_CASE("cone caster: a ray that leads nowhere ends at once, and so do all in an empty octree",
-               "[cone_caster]") {
+WFPG_TEST_CASE("cone caster: degenerate rays and an empty octree end the loop at once", "[cone_caster]") {
   const shining_box<Exec> box([](vec3) { return 3.0f; });
   const float nan = std::nanf(""), far = 3.0e38f;
   const vec3 centre(0.5f);
@@ -307,7 +306,7 @@ WFPG_TEST_CASE("cone caster: a ray that leads nowhere ends at once, and so do al
   const svo_cone_caster caster(box.view(), box.opacity.view(), 4.0f);
   for (const float solid_angle : widths)
     for (const float radiance : cast(box.exec, caster, rays, solid_angle)) CHECK(radiance == 4.0f);
-  // Widths that are none: an answer is all that can be asked.
+  // Invalid widths: the call only has to return.
   for (const float solid_angle : {nan, -1.0f, far, 2.0f * far})
     for (const float radiance : cast(box.exec, caster, rays_from(0.2f, 0.8f, 50, 5), solid_angle))
       CHECK(std::isfinite(radiance));
@@ -320,7 +319,7 @@ WFPG_TEST_CASE("cone caster: a ray that leads nowhere ends at once, and so do al
     CHECK(radiance == 4.0f);
 }
 
-WFPG_TEST_CASE("cone caster: opacities are shares of columns that are occupied", "[cone_caster]") {
+WFPG_TEST_CASE("cone caster: opacities are the occupied fractions of columns", "[cone_caster]") {
   const cached_scene<Exec> scene(mixed_triangles(60, 0.02f, 0.3f, 6), 32, 0);
   const wfpg::voxel_opacity<Exec> opacity(scene.exec, scene.tree);
   CHECK(opacity.bytes() == 3u * (scene.octree().node_count() - scene.octree().leaf_count()));

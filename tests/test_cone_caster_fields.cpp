@@ -1,5 +1,5 @@
-// Fields made by cones through the exitance cache: how wide they are, that directions are drawn with their
-// density and find the light, and what kept fields keep.
+// Fields made by cones through the exitance cache. Tests cone widths, densities of directions, and what kept
+// fields store.
 #include "support/catch.hpp"
 #include "support/guiding.hpp"
 #include "support/statistics.hpp"
@@ -13,7 +13,7 @@
 
 namespace wfpg_test {
 
-/// Counts cones that are not as wide as they should be.
+/// Counts cones that do not have the expected width.
 struct width_caster {
   float expected;
   std::uint32_t* wrong;
@@ -36,7 +36,7 @@ using wfpg::svo_cone_caster;
 static_assert(!wfpg::is_cone_caster_v<box_caster>);
 static_assert(!wfpg::is_cone_caster_v<batch_box_caster>);
 
-WFPG_TEST_CASE("cone caster: fields say how wide their cones are", "[cone_caster]") {
+WFPG_TEST_CASE("cone caster: fields pass the widths of their cones", "[cone_caster]") {
   for (const guiding_mode mode : {guiding_mode::plain, guiding_mode::oriented})
     for (const field_lifetime lifetime : lifetimes)
       for (const std::uint32_t depth : {0u, 1u}) {
@@ -51,7 +51,7 @@ WFPG_TEST_CASE("cone caster: fields say how wide their cones are", "[cone_caster
       }
 }
 
-/// What a wave's rays draw from, all at one place.
+/// Samples a direction for each ray of a wave; all rays start at one place.
 struct draw_of_view {
   wfpg::guide_view view;
   test_surface surface;
@@ -68,7 +68,7 @@ struct density_of_view {
   WFPG_HD float operator()(vec3 d) const { return view.pdf(0, surface, d); }
 };
 
-WFPG_TEST_CASE("cone caster: fields of cones are drawn from with their density, and find the light",
+WFPG_TEST_CASE("cone caster: directions of cone fields have their density and find the light",
                "[cone_caster]") {
   chi_square_family family;
   for (const guiding_mode mode : {guiding_mode::plain, guiding_mode::oriented})
@@ -80,7 +80,7 @@ WFPG_TEST_CASE("cone caster: fields of cones are drawn from with their density, 
       const test_surface at = make_surface({0.4f, 0, 0.3f}, {0, 1, 0}, {0, 1, 0});
       const std::vector<test_surface> surfaces(400, at);
       const wave_of_surfaces<Exec> wave(box.exec, surfaces);
-      for (int settle = 0; settle < 3; ++settle) box.guider.prepare(wave.get(), caster);
+      for (int warm_up = 0; warm_up < 3; ++warm_up) box.guider.prepare(wave.get(), caster);
       const wfpg::guide_view view = box.guider.prepare(wave.get(), caster);
       REQUIRE(guides(box.exec, view, 0));
       const auto drawn = evaluate(box.exec, 40000, draw_of_view{view, at});
@@ -92,14 +92,14 @@ WFPG_TEST_CASE("cone caster: fields of cones are drawn from with their density, 
       const auto meets_patch = [&](const drawn_direction& d) {
         return d.direction.y > 0.0f && emitted(at.position + d.direction / d.direction.y) > 0.0f;
       };
-      // Of uniform directions 0.3%, of cosine-distributed ones 0.7%.
+      // Uniform directions hit it with 0.3%, cosine-distributed ones with 0.7%.
       CHECK(std::count_if(drawn.begin(), drawn.end(), meets_patch) > 0.012 * 40000);
     }
   INFO(family.message());
   CHECK(family.accepted());
 }
 
-WFPG_TEST_CASE("cone caster: kept fields keep what cones gathered until they are cast again",
+WFPG_TEST_CASE("cone caster: kept fields keep the cones' radiance until they are cast again",
                "[cone_caster]") {
   guided_box<Exec> box(field_lifetime::kept);
   box.learn();
@@ -116,7 +116,7 @@ WFPG_TEST_CASE("cone caster: kept fields keep what cones gathered until they are
     const wfpg::guide_view view = box.guider.prepare(wave.get(), caster);
     return evaluate(box.exec, [=] WFPG_HD() { return view.pdf(0, to_patch); });
   };
-  for (int settle = 0; settle < 4; ++settle, next_sample()) density();
+  for (int warm_up = 0; warm_up < 4; ++warm_up, next_sample()) density();
   const float known = density();
   box.guider.forget_light();
   next_sample();

@@ -1,4 +1,4 @@
-// The execution policies: loops, blocks, scratch memory and warps, against plain loops.
+// The execution policies: loops, blocks, scratch memory and warps, compared with plain loops.
 #define WFPG_TEST_EACH_WIDTH
 
 #include "support/catch.hpp"
@@ -29,7 +29,7 @@ struct count_visits {
   std::uint32_t* visits;
   WFPG_HD void operator()(std::size_t i) const { wfpg::atomic_add(visits + i, 1u); }
 };
-/// One visit of each block.
+/// Counts one visit of each block.
 struct count_blocks {
   count_visits visit;
   template <class Block>
@@ -42,7 +42,7 @@ struct no_work {
   WFPG_HD void operator()(Block&, std::size_t) const {}
 };
 
-/// A policy that lacks one member: the derived class hides it.
+/// A policy that lacks one member, because the derived class hides it.
 template <class Exec>
 struct complete : Exec {};
 template <class Exec>
@@ -70,7 +70,7 @@ struct without_blocks : Exec {
   void for_each_block() = delete;
 };
 
-WFPG_TEST_CASE("a policy that lacks a member is none", "[exec]") {
+WFPG_TEST_CASE("a policy without a required member is not a policy", "[exec]") {
   CHECK(wfpg::exec::is_execution_policy_v<complete<Exec>>);
   CHECK_FALSE(wfpg::exec::is_execution_policy_v<without_fill<Exec>>);
   CHECK_FALSE(wfpg::exec::is_execution_policy_v<without_copy<Exec>>);
@@ -80,12 +80,12 @@ WFPG_TEST_CASE("a policy that lacks a member is none", "[exec]") {
   CHECK_FALSE(wfpg::exec::is_execution_policy_v<without_blocks<Exec>>);
 }
 
-WFPG_TEST_CASE("a policy is one", "[exec]") {
+WFPG_TEST_CASE("every tested policy satisfies is_execution_policy_v", "[exec]") {
   const Exec exec;
   CHECK(wfpg::exec::is_execution_policy_v<Exec>);
   CHECK_FALSE(wfpg::exec::is_execution_policy_v<int>);
   CHECK(Exec::warp_width == warp_of<Exec>::width);
-  // A device's policy makes a pool of its own.
+  // A device's policy makes its own pool.
   CHECK((exec.resource() == default_resource()) == loops_on_host);
   if constexpr (loops_on_host) CHECK(exec.concurrency() >= 1);
   wfpg::retaining_resource arena(nullptr);
@@ -104,7 +104,7 @@ WFPG_TEST_CASE("for_each visits each index once", "[exec]") {
   }
 }
 
-/// Two steps: the second needs what the first left for the same index. Adds up what the first returned.
+/// Two steps. The second needs the first's result for its index. Adds up the first step's return values.
 struct take_steps {
   count_visits visit;
   std::uint64_t* sum;
@@ -142,7 +142,7 @@ WFPG_TEST_CASE("runs take every index through all steps once", "[exec]") {
   }
 }
 
-WFPG_TEST_CASE("loops take a count from the device", "[exec]") {
+WFPG_TEST_CASE("loops read their count from device memory", "[exec]") {
   const Exec exec;
   const auto visited = [&](std::uint32_t value, std::size_t capacity, bool blocks) {
     const wfpg::buffer<std::uint32_t, Exec> count(exec, words{value});
@@ -166,7 +166,7 @@ WFPG_TEST_CASE("loops take a count from the device", "[exec]") {
   }
 }
 
-/// A block's work: each has to see its own scratch memory only, aligned, and as much as it asked for.
+/// A block's work. Checks that its scratch memory is its own, aligned, and of the requested size.
 struct use_scratch {
   std::uint32_t* results;
   template <class Block>
@@ -186,7 +186,7 @@ struct use_scratch {
   }
 };
 
-WFPG_TEST_CASE("blocks have scratch memory of their own", "[exec]") {
+WFPG_TEST_CASE("blocks have their own scratch memory", "[exec]") {
   const Exec exec;
   const std::size_t n = 500;
   const wfpg::buffer<std::uint32_t, Exec> results(exec, words(n, 0));
@@ -196,7 +196,7 @@ WFPG_TEST_CASE("blocks have scratch memory of their own", "[exec]") {
   exec.for_each_block(3, 0, no_work{});
 }
 
-/// Sums that a block makes of n numbers; each of its threads adds the one that it is given.
+/// Sums of n numbers over a block; each thread adds one.
 struct block_sums {
   int n;
   int* integers;
@@ -212,7 +212,7 @@ struct block_sums {
   }
 };
 
-WFPG_TEST_CASE("sums of a block", "[exec]") {
+WFPG_TEST_CASE("blocks sum over their threads", "[exec]") {
   const Exec exec;
   for (const int n : {0, 1, 7, 8, 9, 31, 32, 33, 100, 511, 512, 513, 1000}) {
     const wfpg::buffer<int, Exec> integers(exec, 1000);
@@ -242,7 +242,7 @@ WFPG_TEST_CASE("for_each_warp gives every index a whole warp", "[exec]") {
   CHECK((visits.to_host(exec) == expected));
 }
 
-/// What a warp makes of the bits of one number: a bit a lane.
+/// Results of warp operations on the bits of one number, a bit per lane.
 struct lane_flags {
   wfpg::array_view<const std::uint32_t> bits;
   wfpg::array_view<std::uint32_t> ballots;
@@ -264,7 +264,7 @@ struct lane_flags {
   }
 };
 
-WFPG_TEST_CASE("lanes: map, ballot and find_first", "[exec]") {
+WFPG_TEST_CASE("lanes: map, ballot and find_first agree with plain loops", "[exec]") {
   constexpr int width = Exec::warp_width;
   const Exec exec;
   random_numbers random(1);
@@ -287,7 +287,7 @@ WFPG_TEST_CASE("lanes: map, ballot and find_first", "[exec]") {
   }
 }
 
-/// A number and the name of another lane, of each lane; and what a warp makes of them.
+/// Results of warp operations on a number and another lane's index, from each lane.
 struct lane_exchange {
   std::int64_t value = 0;
   int source = 0;
@@ -322,7 +322,7 @@ struct exchange_lanes {
   }
 };
 
-WFPG_TEST_CASE("lanes: shuffle and reduce", "[exec]") {
+WFPG_TEST_CASE("lanes: shuffle and reduce agree with plain loops", "[exec]") {
   constexpr int width = Exec::warp_width, rounds = 50;
   const Exec exec;
   random_numbers random(2);
@@ -379,9 +379,9 @@ WFPG_TEST_CASE("a warp visits and scans any number of elements", "[exec]") {
   }
 }
 
-// A kernel throws nothing.
+// Kernels cannot throw.
 #if !defined(__CUDACC__)
-WFPG_TEST_CASE("what a loop throws arrives at the caller", "[exec]") {
+WFPG_TEST_CASE("an exception in a loop reaches the caller", "[exec]") {
   const Exec exec;
   const auto failing = [](std::size_t i) {
     if (i % 1000 == 999) throw std::runtime_error("from the loop");
@@ -418,7 +418,7 @@ WFPG_TEST_CASE("Thrust runs on the policy", "[exec]") {
   CHECK((device_values.to_host(exec) == values));
 }
 
-/// n pairs whose keys have so many bits.
+/// n pairs with keys of that many bits.
 template <class Key, class Exec>
 void check_sort(const Exec& exec, std::size_t n, int bits) {
   random_numbers random(n);
@@ -426,7 +426,7 @@ void check_sort(const Exec& exec, std::size_t n, int bits) {
   words values(n);
   for (std::size_t i = 0; i < n; ++i) {
     keys[i] = static_cast<Key>(random.bits() >> (64 - bits));
-    if (i % 3 == 0) keys[i] = keys[i / 2];  // many alike
+    if (i % 3 == 0) keys[i] = keys[i / 2];  // many equal keys
     values[i] = static_cast<std::uint32_t>(i);
   }
   const wfpg::buffer<Key, Exec> device_keys(exec, keys), sorted_keys(exec, n);
@@ -463,7 +463,7 @@ std::vector<std::uint32_t> squares_sorted_down(const Exec& exec) {
   return data.to_host(exec);
 }
 
-TEST_CASE("three policies in one program", "[exec]") {
+TEST_CASE("three policies work in one program", "[exec]") {
   const words serial = squares_sorted_down(wfpg::exec::seq());
   CHECK(serial.front() == 2999u * 2999u);
   CHECK((squares_sorted_down(wfpg::exec::omp()) == serial));

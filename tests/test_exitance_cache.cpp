@@ -1,4 +1,4 @@
-// The exitance cache: deposits, averages bottom-up, reads, what is dropped, determinism.
+// The exitance cache: deposits, averages bottom-up, reads, dropped deposits, determinism.
 #include "support/cached_scene.hpp"
 #include "support/catch.hpp"
 #include "support/octree_nodes.hpp"
@@ -38,7 +38,7 @@ void deposit_colour(const cached_scene<Exec>& scene, vec3 position, vec3 directi
   scene.exec.for_each(1, [=] WFPG_HD(std::size_t) { cache.deposit(position, direction, rgb); });
 }
 
-WFPG_TEST_CASE("what is deposited on a side is read from it", "[exitance_cache]") {
+WFPG_TEST_CASE("a deposit on one side is read from that side", "[exitance_cache]") {
   const vec3 z(0, 0, 1), slanted = glm::normalize(vec3(0.9f, 0, 0.1f));
   cached_scene<Exec> scene(fragments_in_grid<Exec>({{{1, 1, 1}, z, 1.0f}}), 100);
   const vec3 p(1.5f);
@@ -47,10 +47,10 @@ WFPG_TEST_CASE("what is deposited on a side is read from it", "[exitance_cache]"
   CHECK(scene.radiance(leaf, 0) < 0.0f);
 
   deposit_all(scene, {{p, z, 1.0f}, {p, slanted, 2.0f}, {p, z, 6.0f}, {p, -z, 8.0f}});
-  CHECK(scene.read(leaf, z) == 0.0f);  // not before update
+  CHECK(scene.read(leaf, z) == 0.0f);  // not before update()
   scene.cache.update(scene.exec);
   CHECK(scene.read(leaf, z) == 3.0f);
-  CHECK(scene.read(leaf, slanted) == 3.0f);  // no cosine
+  CHECK(scene.read(leaf, slanted) == 3.0f);  // the cosine does not count
   CHECK(scene.read(leaf, -slanted) == 8.0f);
   CHECK(scene.radiance(leaf, 0) == 3.0f);
   CHECK(scene.radiance(leaf, 1) == 8.0f);
@@ -58,7 +58,7 @@ WFPG_TEST_CASE("what is deposited on a side is read from it", "[exitance_cache]"
   deposit_all(scene, {{p, z, 7.0f}, {p, -z, 0.0f}, {p, -z, -0.0f}, {{1.5f, 1.5f, 2.4f}, -z, 0.0f}});
   scene.cache.update(scene.exec);
   CHECK(scene.read(leaf, z) == 4.0f);
-  CHECK(scene.read(leaf, -z) == 2.0f);  // four deposits, one from the voxel next door
+  CHECK(scene.read(leaf, -z) == 2.0f);  // four deposits, one of them from the next voxel
   scene.cache.update(scene.exec);
   CHECK(scene.read(leaf, z) == 4.0f);
   CHECK(scene.cache.dropped(scene.exec).total() == 0);
@@ -86,7 +86,7 @@ std::vector<deposit> random_deposits(const test_mesh& mesh, std::size_t n, std::
   return deposits;
 }
 
-/// What the cache says of a node's sides, and which sides of its children face as they do.
+/// A node's sides in the cache, and the sides of its children that face the same way.
 struct sides_record {
   float radiance[2];
   std::uint32_t matching[2][8];
@@ -111,7 +111,7 @@ struct describe_sides {
   }
 };
 
-/// All sides of all nodes.
+/// The sides of all nodes.
 template <class Exec>
 std::vector<sides_record> all_sides(const cached_scene<Exec>& scene) {
   return evaluate(scene.exec, scene.octree().node_count(), describe_sides{scene.view()});
@@ -123,7 +123,7 @@ std::vector<float> all_radiance(const cached_scene<Exec>& scene) {
   return values;
 }
 
-/// A node's side, from its leaves upward, by recursion; negative without data.
+/// Mean of a node's side, by recursion from its leaves. Negative without data.
 float averaged(const std::vector<node_record>& nodes, const std::vector<sides_record>& sides, node_id node,
                std::uint32_t side) {
   if (nodes[node].is_leaf) return sides[node].radiance[side];
@@ -139,7 +139,7 @@ float averaged(const std::vector<node_record>& nodes, const std::vector<sides_re
   return n > 0.0f ? sum / n : -1.0f;
 }
 
-WFPG_TEST_CASE("averages are those of a naive recursion", "[exitance_cache]") {
+WFPG_TEST_CASE("averages equal a naive recursion's", "[exitance_cache]") {
   const test_mesh mesh = sphere_mesh(10);
   cached_scene<Exec> scene(mesh, 16, 1000);
   const std::vector<node_record> nodes = nodes_of(scene.exec, scene.octree());
@@ -160,7 +160,7 @@ WFPG_TEST_CASE("averages are those of a naive recursion", "[exitance_cache]") {
   }
 }
 
-/// The leaf and side that a deposit belongs to, as one number.
+/// The leaf and side of a deposit, as one number.
 struct slot_of_deposit {
   exitance_cache_view cache;
   WFPG_HD std::uint32_t operator()(const deposit& d) const {
@@ -169,7 +169,7 @@ struct slot_of_deposit {
   }
 };
 
-WFPG_TEST_CASE("leaf means are those of the deposits", "[exitance_cache]") {
+WFPG_TEST_CASE("leaf means equal the means of the deposits", "[exitance_cache]") {
   const test_mesh mesh = box_mesh();
   cached_scene<Exec> scene(mesh, 8, 20000);
   std::vector<double> sums(2 * scene.octree().node_count(), 0.0), counts = sums;
@@ -195,13 +195,13 @@ WFPG_TEST_CASE("leaf means are those of the deposits", "[exitance_cache]") {
   CHECK(worst < 1.0e-6);
 }
 
-WFPG_TEST_CASE("every deposit of a leaf counts alike, however many there are", "[exitance_cache]") {
+WFPG_TEST_CASE("all deposits of a leaf have equal weight, in any number", "[exitance_cache]") {
   const vec3 z(0, 0, 1), p(1.5f);
   cached_scene<Exec> scene(fragments_in_grid<Exec>({{{1, 1, 1}, z, 1.0f}}), 70000);
   const node_id leaf = scene.leaf_at(p);
   double sum = 0.0, count = 0.0;
   for (const std::size_t deposits : {5000, 300, 70000, 5000, 1}) {
-    const double value = 1.0 + count;  // later ones are larger: none is to count for less or more
+    const double value = 1.0 + count;  // values grow, so a wrong weight changes the mean
     deposit_all(scene, std::vector<deposit>(deposits, {p, z, static_cast<float>(value)}));
     scene.cache.update(scene.exec);
     sum += static_cast<double>(deposits) * value;
@@ -212,7 +212,7 @@ WFPG_TEST_CASE("every deposit of a leaf counts alike, however many there are", "
   CHECK(scene.cache.dropped(scene.exec).total() == 0);
 }
 
-WFPG_TEST_CASE("sides match between parent and child by direction", "[exitance_cache]") {
+WFPG_TEST_CASE("sides of parent and child match by direction", "[exitance_cache]") {
   const vec3 z(0, 0, 1);
   cached_scene<Exec> scene(fragments_in_grid<Exec>({{{0, 0, 0}, z, 10.0f}, {{1, 0, 0}, -z, 1.0f}}), 10);
   const node_id up = scene.leaf_at(uvec3(0, 0, 0)), down = scene.leaf_at(uvec3(1, 0, 0));
@@ -228,12 +228,12 @@ WFPG_TEST_CASE("sides match between parent and child by direction", "[exitance_c
   CHECK(scene.read(0, -z) == 0.0f);
 }
 
-WFPG_TEST_CASE("a side without data reads its first ancestor that has some", "[exitance_cache]") {
+WFPG_TEST_CASE("a side without data reads its nearest ancestor with data", "[exitance_cache]") {
   const vec3 z(0, 0, 1);
   cached_scene<Exec> scene(fragments_in_grid<Exec>({{{0, 0, 0}, z, 10.0f},
-                                                    {{1, 0, 0}, -z, 1.0f},    // a sibling turned over
+                                                    {{1, 0, 0}, -z, 1.0f},    // a sibling, turned over
                                                     {{2, 0, 0}, z, 1.0f},     // a cousin
-                                                    {{7, 7, 7}, -z, 0.5f}}),  // shares the root only
+                                                    {{7, 7, 7}, -z, 0.5f}}),  // shares only the root
                            10);
   deposit_all(scene, {{{0.5f, 0.5f, 0.5f}, z, 2.0f}, {{2.5f, 0.5f, 0.5f}, z, 6.0f}});
   scene.cache.update(scene.exec);
@@ -258,7 +258,7 @@ WFPG_TEST_CASE("an ancestor is read on the node's side, not on the reader's", "[
   CHECK(scene.read(leaf, -grazing) == 7.0f);
 }
 
-WFPG_TEST_CASE("deposits that cannot be are dropped and counted", "[exitance_cache]") {
+WFPG_TEST_CASE("invalid deposits are dropped and counted", "[exitance_cache]") {
   const vec3 z(0, 0, 1), p(1.5f);
   cached_scene<Exec> scene(fragments_in_grid<Exec>({{{1, 1, 1}, z, 1.0f}}), 100);
   deposit_all(scene, {
@@ -313,7 +313,7 @@ WFPG_TEST_CASE("a full queue drops and counts, and works again after an update",
                   std::invalid_argument);
 }
 
-WFPG_TEST_CASE("an empty scene's cache takes deposits and gives nothing", "[exitance_cache]") {
+WFPG_TEST_CASE("an empty scene's cache accepts deposits and returns zero", "[exitance_cache]") {
   cached_scene<Exec> scene(test_mesh(), 64, 10);
   deposit_all(scene, std::vector<deposit>(5));
   scene.cache.update(scene.exec);
@@ -322,7 +322,7 @@ WFPG_TEST_CASE("an empty scene's cache takes deposits and gives nothing", "[exit
   CHECK(scene.read(invalid_node, vec3(0, 0, 1)) == 0.0f);
 }
 
-/// What the first policy of this program found.
+/// Returns the values that the first policy of this program got.
 const std::vector<float>& of_first_policy(const std::vector<float>& values) {
   static const std::vector<float> first = values;
   return first;
@@ -345,8 +345,7 @@ WFPG_TEST_CASE("the order of deposits does not change a bit", "[exitance_cache]"
   CHECK((first == of_first_policy(first)));
 }
 
-/// A voxel whose upper side has received `count` deposits, of mean `mean`: set through the bytes that guide
-/// files hold of a cache.
+/// A voxel whose upper side has `count` deposits of mean `mean`. Writes the cache's bytes as in a guide file.
 template <class Exec>
 class busy_voxel {
  public:
@@ -376,7 +375,7 @@ class busy_voxel {
   std::string state() const {
     return wfpg::detail::guide_sections::to_bytes(scene_.exec, scene_.cache).bytes();
   }
-  /// Where the leaf's first side is: behind two bytes a node and one an inner node.
+  /// Offset of the leaf's first side: after two bytes a node and one an inner node.
   std::size_t leaf() const { return 3 * std::size_t(scene_.tree.node_count()) - scene_.tree.leaf_count(); }
 
   cached_scene<Exec> scene_;
@@ -390,7 +389,7 @@ WFPG_TEST_CASE("2^32 deposits in one voxel lose nothing", "[exitance_cache]") {
     CHECK(voxel.count() == before);
     long double sum = 2.0L * before, count = before;
     for (int round = 0; round < 4; ++round) {
-      std::vector<float> values(5, 0x1p31f);  // each moves the mean by about a half
+      std::vector<float> values(5, 0x1p31f);  // each moves the mean by about half
       values.resize(5 + 300 * (round % 2), 0.0f);
       voxel.add(values);
       for (const float value : values) sum += static_cast<long double>(value);
@@ -434,7 +433,7 @@ TEST_CASE("a mean counts up to 2^32 - 1 values, in batches of any size", "[exita
   CHECK(mean == Approx(sum / 4096.0).epsilon(1.0e-12));
 }
 
-WFPG_TEST_CASE("an octree and its cache take at most 29 bytes a node", "[exitance_cache]") {
+WFPG_TEST_CASE("an octree and its cache use at most 29 bytes a node", "[exitance_cache]") {
   for (const test_mesh& mesh : {sphere_mesh(24), box_mesh(), box_mesh({0, 0, 0}, {4, 3, 2.2f})})
     for (const std::uint32_t resolution : {32u, 128u}) {
       const cached_scene<Exec> scene(mesh, resolution, 100);

@@ -1,5 +1,5 @@
-// The field sampler: frequencies against probabilities worked out from the cells, densities that integrate to
-// one and are the sampler's own, and cells without weight that are never drawn.
+// The field sampler. Compares frequencies with probabilities of the cells. Tests that densities integrate to
+// one and equal the sampler's. Cells without weight are never sampled.
 #include "support/evaluate.hpp"
 #include "support/fields.hpp"
 #include "support/policies.hpp"
@@ -88,7 +88,7 @@ std::vector<T> draw(const Exec& exec, std::size_t n, Draw kernel, wfpg::array_vi
   return results.to_host(exec);
 }
 
-/// Numbers that land on both sides of every cell's border, and at both ends of [0,1).
+/// Numbers on both sides of each cell's border, and at both ends of [0,1).
 std::vector<float> difficult_numbers(const std::vector<std::uint32_t>& weights, std::uint32_t resolution,
                                      std::uint32_t row) {
   std::vector<float> numbers = {0.0f, 0x1p-24f, 0.5f, below_one};
@@ -121,7 +121,7 @@ const vec3 tilted = glm::normalize(vec3(0.3f, -0.8f, -0.52f));
 
 }  // namespace
 
-TEST_CASE("chi-square test: known tails, pooling, and wrong counts are found", "[chi_square]") {
+TEST_CASE("chi-square test: tails are known, small cells pooled, wrong counts found", "[chi_square]") {
   CHECK(chi_square_tail(3.841, 1.0) == Approx(0.05).epsilon(1e-3));
   CHECK(chi_square_tail(10.828, 1.0) == Approx(0.001).epsilon(1e-3));
   CHECK(chi_square_tail(124.342, 100.0) == Approx(0.05).epsilon(1e-3));
@@ -148,7 +148,8 @@ TEST_CASE("chi-square test: known tails, pooling, and wrong counts are found", "
 
 namespace {
 
-WFPG_TEST_CASE("field sampler: frequencies of 100 random fields", "[field_sampler]") {
+WFPG_TEST_CASE("field sampler: frequencies of 100 random fields match their probabilities",
+               "[field_sampler]") {
   const Exec exec;
   chi_square_family family;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
@@ -212,7 +213,7 @@ WFPG_TEST_CASE("field sampler: directions have the reported density", "[field_sa
   CHECK(family.accepted());
 }
 
-WFPG_TEST_CASE("field sampler: whatever a coordinate is, it has a cell", "[field_sampler]") {
+WFPG_TEST_CASE("field sampler: every coordinate has a cell", "[field_sampler]") {
   const Exec exec;
   const float nan = std::numeric_limits<float>::quiet_NaN(),
               infinity = std::numeric_limits<float>::infinity();
@@ -253,7 +254,7 @@ struct rectangles_above {
     const float column = (turn < 0.0f ? turn + 1.0f : turn) * float(columns);
     return wfpg::min(std::uint32_t(row), rows - 1) * columns + wfpg::min(std::uint32_t(column), columns - 1);
   }
-  /// A direction from (row, column), not whole numbers.
+  /// A direction from fractional (row, column).
   WFPG_HD vec3 direction(float row, float column) const {
     const float z = row / float(rows), turn = full_turn * column / float(columns);
     const float r = std::sqrt(1.0f - z * z);
@@ -270,8 +271,8 @@ struct rectangle_of_sample {
   }
 };
 
-/// The integral of a field's density over each rectangle, from a random point in each of n² parts: edges of
-/// cells that lie along a rectangle's would spoil the midpoint rule.
+/// Integrates a field's density over each rectangle, with a random point in each of n² parts. The midpoint
+/// rule would fail where cell edges lie along a rectangle's.
 struct integrate_rectangle {
   directional_field field;
   rectangles_above rectangles;
@@ -287,7 +288,7 @@ struct integrate_rectangle {
   }
 };
 
-/// Parts of the hemisphere, of which the smallest is an eighth.
+/// Parts of the hemisphere. The smallest is an eighth.
 constexpr bool (*parts_of_hemisphere[])(std::uint32_t row, std::uint32_t column) = {
     [](std::uint32_t row, std::uint32_t) { return row >= 4; },
     [](std::uint32_t row, std::uint32_t) { return row == 0; },
@@ -296,7 +297,7 @@ constexpr bool (*parts_of_hemisphere[])(std::uint32_t row, std::uint32_t column)
     [](std::uint32_t row, std::uint32_t column) { return row < 4 && column >= 12; },
     [](std::uint32_t row, std::uint32_t column) { return (row + column) % 2 == 0; }};
 
-WFPG_TEST_CASE("field sampler: on hemispheres a density that is off by 2% in a part is found",
+WFPG_TEST_CASE("field sampler: the test finds a density off by 2% in a part of the hemisphere",
                "[field_sampler]") {
   const Exec exec;
   constexpr std::size_t samples = 3 << 20, at_once = samples / 3;
@@ -311,9 +312,9 @@ WFPG_TEST_CASE("field sampler: on hemispheres a density that is off by 2% in a p
     double integral = 0.0;
     std::vector<double> expected =
         evaluate(exec, rectangles_above::count, integrate_rectangle{field, rectangles});
-    for (const double share : expected) integral += share;
+    for (const double fraction : expected) integral += fraction;
     CHECK(integral == Approx(1.0).margin(5.0e-4));
-    for (double& share : expected) share *= double(samples) / integral;
+    for (double& fraction : expected) fraction *= double(samples) / integral;
     if (kind == field_kind::uniform)
       for (const double count : expected) CHECK(count == Approx(samples / rectangles_above::count));
 
@@ -356,7 +357,7 @@ WFPG_TEST_CASE("field sampler: a sampled direction's density is its cell's, bit 
     }
 }
 
-WFPG_TEST_CASE("field sampler: cells without weight are never drawn, at borders and ends either",
+WFPG_TEST_CASE("field sampler: cells without weight are never sampled, even at borders and ends",
                "[field_sampler]") {
   const Exec exec;
   for (std::uint32_t resolution : {2u, 16u, 31u, 32u, 100u, 128u}) {
@@ -384,7 +385,7 @@ WFPG_TEST_CASE("field sampler: cells without weight are never drawn, at borders 
   }
 }
 
-WFPG_TEST_CASE("field sampler: u = 0 draws the first cell with weight, u just below 1 the last",
+WFPG_TEST_CASE("field sampler: u = 0 samples the first cell with weight, u near 1 the last",
                "[field_sampler]") {
   const Exec exec;
   for (std::uint32_t resolution : resolutions) {
@@ -440,7 +441,7 @@ WFPG_TEST_CASE("field sampler: values without rounding give the same bits on eve
   for (std::uint32_t resolution : resolutions) {
     random_numbers random(resolution);
     std::vector<float> values(std::size_t(resolution) * resolution);
-    float total = 0.0f;  // exact: integers, and less than 2^24 in all
+    float total = 0.0f;  // exact: integers with a sum below 2^24
     for (float& value : values) total += value = float(random.below(1000));
     const built_field<Exec> built(exec, values, resolution);
 
@@ -458,7 +459,7 @@ WFPG_TEST_CASE("field sampler: values without rounding give the same bits on eve
   }
 }
 
-WFPG_TEST_CASE("field sampler: floors, all-zero fields, and values near the ends of floats",
+WFPG_TEST_CASE("field sampler: floors, all-zero fields and extreme values are sampled correctly",
                "[field_sampler]") {
   const Exec exec;
   const built_field<Exec> floored(exec, {0.0f, 1.0f, 0.0f, 2.0f}, 2, 1.0f);

@@ -1,6 +1,6 @@
-// Kept fields: what a cell remembers and which are cast again; distributions against their own densities and
-// against brute force; the same bits on any number of threads and from casters of both forms. Who gets a slot
-// and when it is built is test_field_store_slots.cpp's.
+// Kept fields: what cells remember, and which cells are cast again. Compares distributions with densities and
+// brute force. Tests that threads and forms of casters do not change a bit. Slots are tested in
+// test_field_store_slots.cpp.
 #include "support/evaluate.hpp"
 #include "support/fields.hpp"
 #include "support/kept_fields.hpp"
@@ -36,7 +36,7 @@ float turned_light(std::uint32_t face, float u, float v) {
   return 3.0f + float(5 - face) * v + u;
 }
 
-/// The radiance of every node's sides as hits tell it, and as the cache does.
+/// The radiance of every node's sides, read through hits and from the cache.
 template <class Exec>
 std::pair<std::vector<float>, std::vector<float>> read_both(const lit_box<Exec>& box,
                                                             const std::vector<cone_hit>& hits) {
@@ -47,7 +47,7 @@ std::pair<std::vector<float>, std::vector<float>> read_both(const lit_box<Exec>&
           })};
 }
 
-WFPG_TEST_CASE("field store: a hit remembers a node's side, and follows the cache", "[field_store]") {
+WFPG_TEST_CASE("field store: a hit remembers a node's side and follows the cache", "[field_store]") {
   lit_box<Exec> box(graded_light, 16);
   std::vector<cone_hit> hits;
   for (wfpg::node_id node = 0; node < box.tree.view().node_count(); ++node)
@@ -67,7 +67,8 @@ struct remember_environment {
   WFPG_HD float operator()(float radiance) const { return cone_hit::environment(radiance).radiance(cache); }
 };
 
-WFPG_TEST_CASE("field store: a hit remembers the environment, and nonsense as darkness", "[field_store]") {
+WFPG_TEST_CASE("field store: a hit remembers the environment, and invalid radiance as darkness",
+               "[field_store]") {
   const lit_box<Exec> box(graded_light, 4);
   const wfpg::exitance_cache_view cache = box.cache.view();
   const auto remembered = [&](const std::vector<float>& radiance) {
@@ -81,7 +82,7 @@ WFPG_TEST_CASE("field store: a hit remembers the environment, and nonsense as da
   CHECK(evaluate(box.exec, [=] WFPG_HD() { return cone_hit().radiance(cache); }) == 0.0f);
 }
 
-/// How often each cell is cast by so many refreshes in turn.
+/// How often each cell is cast in `recast` successive refreshes.
 std::vector<int> times_cast(std::uint32_t resolution, std::uint32_t recast, std::uint32_t first) {
   std::vector<int> times(resolution * resolution, 0);
   const std::uint32_t cones = wfpg::refresh_cones(resolution, recast);
@@ -93,7 +94,7 @@ std::vector<int> times_cast(std::uint32_t resolution, std::uint32_t recast, std:
 
 }  // namespace
 
-TEST_CASE("field store: as many refreshes as one in how many cast every cell once", "[field_store]") {
+TEST_CASE("field store: `recast` successive refreshes cast every cell once", "[field_store]") {
   for (std::uint32_t recast : {1u, 3u, 8u, 16u, 32u})
     for (std::uint32_t resolution = 2; resolution <= 33; ++resolution) {
       const std::uint32_t cells = resolution * resolution;
@@ -103,7 +104,8 @@ TEST_CASE("field store: as many refreshes as one in how many cast every cell onc
         const std::vector<int> times = times_cast(resolution, recast, first);
         const auto end_of_runs = times.begin() + (cells - cells % recast);
         CHECK(std::all_of(times.begin(), end_of_runs, [](int n) { return n == 1; }));
-        CHECK(std::all_of(end_of_runs, times.end(), [](int n) { return n >= 1; }));  // of a shorter run
+        CHECK(std::all_of(end_of_runs, times.end(),
+                          [](int n) { return n >= 1; }));  // cells of the shorter last run
       }
     }
 }
@@ -125,14 +127,14 @@ TEST_CASE("field store: the cones of a refresh are spread over rows and columns"
     }
 }
 
-TEST_CASE("field store: a refresh casts a cell at least, however few", "[field_store]") {
+TEST_CASE("field store: a refresh casts at least one cell", "[field_store]") {
   for (std::uint32_t recast : {1000u, 0x7fffffffu, 0xfffffdc1u, 0xffffffffu})
     CHECK(wfpg::refresh_cones(24, recast) == 1);
 }
 
 namespace {
 
-/// Draws directions of a field.
+/// Samples directions from a field.
 struct draw_field {
   directional_field field;
   wfpg::array_view<drawn_direction> drawn;
@@ -146,8 +148,7 @@ struct field_pdf {
   WFPG_HD float operator()(vec3 direction) const { return field.pdf(direction); }
 };
 
-WFPG_TEST_CASE("field store: directions have the density that fields report, which sums to one",
-               "[field_store]") {
+WFPG_TEST_CASE("field store: directions have the field's density, which integrates to one", "[field_store]") {
   constexpr std::size_t samples = 20000;
   chi_square_family family;
   int below = 0;
@@ -179,7 +180,7 @@ WFPG_TEST_CASE("field store: directions have the density that fields report, whi
   CHECK(family.accepted());
 }
 
-/// Where a direction's cell is in a field's grid.
+/// Index of a direction's cell in a field's grid.
 std::size_t cell_of(const directional_field& field, vec3 d) {
   const std::uint32_t n = field.grid().resolution();
   const vec2 uv = field.hemisphere() ? wfpg::hemisphere_to_square(wfpg::frame(field.normal()).to_local(d))
@@ -199,7 +200,7 @@ struct look_through {
   }
 };
 
-/// What each cell of a field sees in the cache, from noted cones; -1 where no cone looked.
+/// The cached radiance that each cell sees, from logged cones. -1 where no cone looked.
 template <class Exec>
 std::vector<double> seen_through(const kept_box<Exec>& box, const directional_field& field) {
   const std::uint32_t n = field.grid().resolution();
@@ -212,7 +213,7 @@ std::vector<double> seen_through(const kept_box<Exec>& box, const directional_fi
   return seen;
 }
 
-/// The cosine at the centres of cells over a hemisphere.
+/// The cosine at the centre of a cell over a hemisphere.
 double central_cosine(std::size_t cell, std::uint32_t n) {
   const vec2 corner(float(cell % n), float(cell / n));
   return double(wfpg::square_to_hemisphere((corner + 0.5f) / float(n)).z);
@@ -232,7 +233,7 @@ double largest_error(const Exec& exec, const directional_field& field, std::vect
   return largest;
 }
 
-WFPG_TEST_CASE("field store: fields are what brute force makes of the same cones, also under other light",
+WFPG_TEST_CASE("field store: fields equal brute force over the same cones, after light changes too",
                "[field_store]") {
   for (guiding_mode mode : modes) {
     kept_box<Exec> box(slots_of(12, 4), mode, 144 + 36);
@@ -274,7 +275,7 @@ WFPG_TEST_CASE("field store: a field keeps the frame of its first ray", "[field_
   CHECK(box.field_of(box.prepare(rays_at(place, {0, 1, 0})), 0).normal() == vec3(0, 1, 0));
 }
 
-WFPG_TEST_CASE("field store: refreshes in turn cast each cell of a field once", "[field_store]") {
+WFPG_TEST_CASE("field store: successive refreshes cast each cell of a field once", "[field_store]") {
   kept_box<Exec> box(slots_of(8, 4, 4), guiding_mode::oriented, 4 * 16);
   const auto wave = rays_at({0.3f, 0.0f, 0.6f}, {0, 1, 0});
   box.begin();
@@ -290,7 +291,7 @@ WFPG_TEST_CASE("field store: refreshes in turn cast each cell of a field once", 
   CHECK(std::count(seen.begin(), seen.end(), -1.0) == 0);
 }
 
-WFPG_TEST_CASE("field store: refreshes follow light that moves without casting all cones", "[field_store]") {
+WFPG_TEST_CASE("field store: refreshes follow moving light without casting all cones", "[field_store]") {
   const auto moved = [](std::uint32_t face, float u, float v) {
     const vec3 p = face_point(face, u, v);
     return emitted({1.0f - p.x, p.y, 1.0f - p.z});
@@ -313,7 +314,7 @@ WFPG_TEST_CASE("field store: refreshes follow light that moves without casting a
   CHECK(after[1] > 20.0f * after[0]);
 }
 
-/// What a store tells after samples of births, refreshes, refusals and evictions.
+/// Counts of a store after samples of allocations, refreshes, refusals and evictions.
 struct store_history {
   std::vector<std::uint64_t> fields;
   std::uint64_t allocated = 0, freed = 0, refreshed = 0, refused = 0;
@@ -326,7 +327,7 @@ struct store_history {
 
 constexpr std::size_t inline_cones = ~std::size_t(0);
 
-/// From an inline caster, or a batch caster with a buffer of so many bytes.
+/// From an inline caster, or from a batch caster with a buffer of so many bytes.
 template <class Exec>
 store_history history(std::size_t buffer_bytes = inline_cones, batch_box_caster::log* log = nullptr) {
   wfpg::kept_field_options options = slots_of(8, 90);
@@ -354,7 +355,7 @@ store_history history(std::size_t buffer_bytes = inline_cones, batch_box_caster:
   return result;
 }
 
-WFPG_TEST_CASE("field store: the same bits on any number of threads", "[field_store]") {
+WFPG_TEST_CASE("field store: any number of threads gives the same bits", "[field_store]") {
   const store_history first = history<Exec>();
   CHECK(first.allocated > 90);
   CHECK(first.freed > 0);
@@ -366,8 +367,7 @@ WFPG_TEST_CASE("field store: the same bits on any number of threads", "[field_st
   });
 }
 
-WFPG_TEST_CASE("field store: casters of both forms, and buffers of any size, give the same bits",
-               "[field_store]") {
+WFPG_TEST_CASE("field store: both forms of casters and any buffer size give the same bits", "[field_store]") {
   const store_history in_place = history<Exec>();
   std::size_t rays = 0;
   for (std::size_t bytes : {std::size_t(0), std::size_t(5 * 64 * 40), std::size_t(1) << 22}) {

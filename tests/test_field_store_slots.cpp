@@ -1,6 +1,6 @@
-// Kept fields' slots: who gets one under a budget, when fields are built and with how many cones, at which
-// level of the octree they are, and when they are freed. What fields hold is test_field_store.cpp's, what a
-// wave may cast and who has to wait test_field_store_waves.cpp's.
+// Slots of kept fields: who gets one under a budget, when fields are built and with how many cones. Also
+// their octree levels, and when slots are freed. test_field_store.cpp tests what fields hold.
+// test_field_store_waves.cpp tests limits of a wave.
 #include "support/evaluate.hpp"
 #include "support/floor_rays.hpp"
 #include "support/kept_fields.hpp"
@@ -23,7 +23,7 @@ namespace {
 
 constexpr vec3 up{0, 1, 0}, down{0, -1, 0};
 
-WFPG_TEST_CASE("field store: budgets of nothing, less than a slot, one slot, and 1 MiB", "[field_store]") {
+WFPG_TEST_CASE("field store: budgets of 0, less than a slot, one slot, and 1 MiB work", "[field_store]") {
   const auto wave = wall_surfaces(600, 1);
   const std::size_t a_slot = field_store<Exec>::bytes_a_slot(24, false);
   for (std::size_t budget : {std::size_t(0), a_slot - 1, a_slot, 3 * a_slot + 7, std::size_t(1) << 20}) {
@@ -49,7 +49,7 @@ WFPG_TEST_CASE("field store: budgets of nothing, less than a slot, one slot, and
   }
 }
 
-WFPG_TEST_CASE("field store: a budget is spent on its slots and on nothing else", "[field_store]") {
+WFPG_TEST_CASE("field store: a budget is spent on slots only", "[field_store]") {
   for (std::uint32_t resolution : {2u, 16u, 24u, 33u, 128u})
     for (std::size_t slots : {1u, 2u, 3u, 64u, 65u}) {
       for (const bool learns : {false, true}) {
@@ -66,8 +66,7 @@ WFPG_TEST_CASE("field store: a budget is spent on its slots and on nothing else"
     }
 }
 
-WFPG_TEST_CASE("field store: births cast all cells, refreshes one in so many, once a sample",
-               "[field_store]") {
+WFPG_TEST_CASE("field store: a new field casts all cells, a refresh a part, once a sample", "[field_store]") {
   const struct {
     std::uint32_t resolution, recast;
     std::size_t all, part;
@@ -77,7 +76,7 @@ WFPG_TEST_CASE("field store: births cast all cells, refreshes one in so many, on
     kept_box<Exec> box(slots_of(c.resolution, 100, c.recast));
     const auto wave = floor_rays(7);
     box.begin();
-    box.settle(wave);
+    box.prepare_all(wave);
     CHECK(box.log.take() == 7 * c.all);
     CHECK(box.counts().allocated == 7);
     box.begin();
@@ -90,9 +89,8 @@ WFPG_TEST_CASE("field store: births cast all cells, refreshes one in so many, on
   }
 }
 
-WFPG_TEST_CASE(
-    "field store: fields are refreshed when an eighth of the samples has passed, or a quarter of many",
-    "[field_store]") {
+WFPG_TEST_CASE("field store: fields are refreshed after 1/8 of the samples, later after 1/4",
+               "[field_store]") {
   kept_box<Exec> box(slots_of(4, 10));
   const auto wave = rays_at(floor_place(0), up, 50);
   std::uint32_t last_built = 0;
@@ -100,8 +98,9 @@ WFPG_TEST_CASE(
     box.begin();
     const std::size_t cones = box.cones(wave) + box.cones(wave);
     const std::uint32_t parts = box.sample <= 32 ? 8 : 4;
-    const bool has_turn = box.sample <= 32 || box.sample % 8 == 0 || (box.sample + 1) % 8 == 0;
-    const bool due = has_turn && box.sample > last_built && parts * (box.sample - last_built) >= box.sample;
+    const bool wave_builds = box.sample <= 32 || box.sample % 8 == 0 || (box.sample + 1) % 8 == 0;
+    const bool due =
+        wave_builds && box.sample > last_built && parts * (box.sample - last_built) >= box.sample;
     INFO("sample " << box.sample);
     CHECK(cones == (box.sample == 1 ? 16u : due ? 4u : 0u));
     if (due) last_built = box.sample;
@@ -109,8 +108,7 @@ WFPG_TEST_CASE(
   CHECK(box.counts().refreshed < 30);
 }
 
-WFPG_TEST_CASE("field store: after many samples one wave in eight builds, whatever its depth",
-               "[field_store]") {
+WFPG_TEST_CASE("field store: after warm-up one wave in eight builds, at every depth", "[field_store]") {
   for (std::uint32_t depth : {0u, 1u, 2u, 3u, 6u}) {
     kept_box<Exec> box(slots_of(4, 40));
     while (box.sample < 40) box.whole_sample(floor_rays(3));
@@ -131,7 +129,7 @@ WFPG_TEST_CASE("field store: after many samples one wave in eight builds, whatev
   }
 }
 
-WFPG_TEST_CASE("field store: after bins are chosen anew all waves build for four samples", "[field_store]") {
+WFPG_TEST_CASE("field store: after bin sizes change all waves build for four samples", "[field_store]") {
   kept_box<Exec> box(slots_of(4, 40));
   while (box.sample < 64) box.whole_sample(floor_rays(3));
   for (int i = 0; i < 8; ++i) {
@@ -145,7 +143,7 @@ WFPG_TEST_CASE("field store: after bins are chosen anew all waves build for four
   }
 }
 
-WFPG_TEST_CASE("field store: waves that build nothing find what others do, and every wave is counted alone",
+WFPG_TEST_CASE("field store: waves that do not build find fields, and each counts its own rays",
                "[field_store]") {
   kept_box<Exec> box(slots_of(4, 40));
   auto wave = floor_rays(3);
@@ -181,7 +179,7 @@ WFPG_TEST_CASE("field store: waves that build nothing find what others do, and e
   CHECK(built > 1);
 }
 
-WFPG_TEST_CASE("field store: who is to find fields only is given none that are not there", "[field_store]") {
+WFPG_TEST_CASE("field store: find() returns no field that is not built", "[field_store]") {
   kept_box<Exec> box(slots_of(4, 40));
   box.begin();
   CHECK(box.store.builds_in_wave());
@@ -191,8 +189,7 @@ WFPG_TEST_CASE("field store: who is to find fields only is given none that are n
   CHECK(box.last_wave().with_field == 3);
 }
 
-WFPG_TEST_CASE("field store: what is invalidated after many samples is cast in the next wave",
-               "[field_store]") {
+WFPG_TEST_CASE("field store: fields invalidated after warm-up are cast in the next wave", "[field_store]") {
   kept_box<Exec> box(slots_of(4, 40));
   while (box.sample < 41) box.whole_sample(floor_rays(3));
   for (int i = 0; i < 5; ++i) {
@@ -204,7 +201,7 @@ WFPG_TEST_CASE("field store: what is invalidated after many samples is cast in t
   }
 }
 
-WFPG_TEST_CASE("field store: slots unused for some samples are freed and used again", "[field_store]") {
+WFPG_TEST_CASE("field store: idle slots are freed and used again", "[field_store]") {
   for (std::uint32_t idle : {1u, 2u, 5u}) {
     kept_field_options options = slots_of(4, 12);
     options.idle_samples = idle;
@@ -221,7 +218,7 @@ WFPG_TEST_CASE("field store: slots unused for some samples are freed and used ag
     CHECK(consistent(box));
     box.log.take();
     const auto wave = floor_rays(12);
-    CHECK(count_guided(box.exec(), box.settle(wave), 12) == 12);
+    CHECK(count_guided(box.exec(), box.prepare_all(wave), 12) == 12);
     CHECK(box.log.take() == 8 * 16 + 4 * 4);
     CHECK(box.counts().allocated == 20);
     CHECK(box.counts().live == 12);
@@ -230,7 +227,7 @@ WFPG_TEST_CASE("field store: slots unused for some samples are freed and used ag
   }
 }
 
-WFPG_TEST_CASE("field store: with refusals slots are freed after one idle sample", "[field_store]") {
+WFPG_TEST_CASE("field store: after refusals slots are freed after one idle sample", "[field_store]") {
   kept_box<Exec> box(slots_of(4, 5));
   box.whole_sample(floor_rays(5));
   CHECK(box.counts().refused == 0);
@@ -248,10 +245,8 @@ WFPG_TEST_CASE("field store: with refusals slots are freed after one idle sample
   CHECK(consistent(box));
 }
 
-WFPG_TEST_CASE(
-    "field store: many rays at one place make finer fields, which ancestors serve for until there "
-    "is room",
-    "[field_store]") {
+WFPG_TEST_CASE("field store: crowded places get finer fields; ancestors guide until there is room",
+               "[field_store]") {
   kept_box<Exec> box(slots_of(4, 8));
   const auto crowd = rays_at(floor_place(0), up, 500);
   auto wave = floor_rays(8);
@@ -272,7 +267,7 @@ WFPG_TEST_CASE(
   CHECK(box.counts().live == 2);
 }
 
-/// A sample of waves of rays from all walls, denser the nearer to a corner: no two nodes get as many.
+/// A sample of waves from all walls, denser toward a corner. No two nodes get equally many rays.
 template <class Exec>
 void sample_of_waves(kept_box<Exec>& box, std::uint64_t waves) {
   box.begin();
@@ -288,22 +283,22 @@ void sample_of_waves(kept_box<Exec>& box, std::uint64_t waves) {
   box.end();
 }
 
-WFPG_TEST_CASE("field store: bins are as small as there are slots for, and stay once fields have learnt",
+WFPG_TEST_CASE("field store: bins shrink to fill the slots, and stay after fields have learnt",
                "[field_store]") {
   for (const std::size_t slots : {110u, 180u}) {
     kept_box<Exec> box(slots_of(4, slots));
     INFO(slots << " slots");
     while (box.sample < 16) sample_of_waves(box, 8);
-    const std::uint32_t settled = box.state().pressure;
+    const std::uint32_t converged = box.state().pressure;
     while (box.sample < 33) sample_of_waves(box, 2);
     const double live = box.counts().live / static_cast<double>(slots);
     CHECK(live > 0.8);
     CHECK(live <= 1.0);
-    CHECK(box.state().pressure == settled);
+    CHECK(box.state().pressure == converged);
   }
 }
 
-TEST_CASE("field store: how many times as many rays as fit the room bins are to have", "[field_store]") {
+TEST_CASE("field store: next_pressure() scales bin sizes to the slots in use", "[field_store]") {
   using constants = wfpg::build_schedule_constants;
   const auto next = [](std::uint32_t sample, std::uint32_t slots, std::uint32_t used, std::uint32_t refused,
                        std::uint32_t pressure) {
@@ -324,7 +319,7 @@ TEST_CASE("field store: how many times as many rays as fit the room bins are to 
   CHECK(next(64, 800, 800, 1, constants::largest_pressure) == constants::largest_pressure);
 }
 
-WFPG_TEST_CASE("field store: levels are chosen anew after samples 1, 2, 4, 8, ...", "[field_store]") {
+WFPG_TEST_CASE("field store: levels are chosen after samples 1, 2, 4, 8, ...", "[field_store]") {
   kept_box<Exec> box(slots_of(4, 100));
   const auto few = rays_at(floor_place(0), up, 2), many = rays_at(floor_place(0), up, 1000);
   std::set<std::uint32_t> finer_in;
@@ -344,7 +339,7 @@ struct count_at {
   WFPG_HD void operator()(std::size_t i) const { marks.count(leaves[i], 1); }
 };
 
-/// The deepest ancestor of enough rays, or that of the least level. Half of c_ray a sample is enough.
+/// The deepest ancestor with at least `enough` rays. Never above the least level.
 wfpg::node_id bin_by_hand(const std::vector<node_record>& nodes, const std::vector<wfpg::node_id>& rays,
                           wfpg::node_id leaf, std::uint32_t min_level, std::size_t enough) {
   for (std::uint32_t level = nodes[leaf].level; level > min_level; --level) {
@@ -364,14 +359,13 @@ struct bin_of_leaf {
   }
 };
 
-WFPG_TEST_CASE(
-    "field store: bins are the deepest nodes with enough rays a sample, or as many as there is room",
-    "[field_store]") {
+WFPG_TEST_CASE("field store: bins are the deepest nodes with enough rays, limited by the slots",
+               "[field_store]") {
   const lit_box<Exec> box(patch_light, 16);
   const wfpg::sparse_voxel_octree_view tree = box.tree.view();
   random_numbers random(5);
   std::vector<wfpg::node_id> rays;
-  for (int i = 0; i < 400; ++i)  // dense at first leaves, sparse at the last ones
+  for (int i = 0; i < 400; ++i)  // dense in the first leaves, sparse in the last
     rays.push_back(tree.first_leaf() + random.below(1 + random.below(tree.leaf_count())));
   const wfpg::buffer<wfpg::node_id, Exec> leaves(box.exec, rays);
   const wfpg::buffer<std::uint32_t, Exec> pressure(
@@ -402,7 +396,7 @@ WFPG_TEST_CASE(
   }
 }
 
-WFPG_TEST_CASE("field store: a leaf of thousands of rays is a bin, and one of a few less is not",
+WFPG_TEST_CASE("field store: thresholds of thousands of rays decide exactly which leaf is a bin",
                "[field_store]") {
   const lit_box<Exec> box(patch_light, 16);
   const wfpg::sparse_voxel_octree_view tree = box.tree.view();

@@ -1,5 +1,4 @@
-// Waves of kept fields: how many cones one may cast and who waits, what is cast anew where something moved,
-// and rays, options and casters that are at fault.
+// Waves of kept fields: limits on cones, and invalidation. Also invalid rays, options and casters.
 #include "support/floor_rays.hpp"
 #include "support/kept_fields.hpp"
 #include "support/policies.hpp"
@@ -21,7 +20,7 @@ namespace {
 
 constexpr vec3 up{0, 1, 0}, down{0, -1, 0};
 
-WFPG_TEST_CASE("field store: a wave casts no more cones than it may, and nobody waits for ever",
+WFPG_TEST_CASE("field store: a wave respects its limit of cones, and every field is built in time",
                "[field_store]") {
   const auto wave = floor_rays(16);
   for (std::uint64_t most : {0, 15, 16, 35, 64}) {
@@ -50,7 +49,7 @@ WFPG_TEST_CASE("field store: a wave casts no more cones than it may, and nobody 
   }
 }
 
-WFPG_TEST_CASE("field store: a slot used again guides nobody until its own field is built", "[field_store]") {
+WFPG_TEST_CASE("field store: a reused slot guides nobody until its own field is built", "[field_store]") {
   const auto first = floor_rays(2);
   const std::vector<test_surface> second{first[1], make_surface({0.6f, 1.0f, 0.6f}, down, down)};
   int waited = 0;
@@ -61,7 +60,7 @@ WFPG_TEST_CASE("field store: a slot used again guides nobody until its own field
     kept_box<Exec> box(options, wfpg::guiding_mode::oriented, 16);
     box.sample = skipped;
     box.begin();
-    box.settle(first);
+    box.prepare_all(first);
     for (int sample = 0; sample < 3; ++sample) {
       box.begin();
       box.prepare({first[1]});
@@ -70,7 +69,7 @@ WFPG_TEST_CASE("field store: a slot used again guides nobody until its own field
     box.store.invalidate_all(box.exec());
     box.begin();
     box.log.take();
-    const guide_view view = box.prepare(second);  // both are to be cast whole, and one has to wait
+    const guide_view view = box.prepare(second);  // both need all cones, so one has to wait
     const bool built = box.log.cones().at(0).origin.y > 0.5f;
     CHECK(box.log.count() == 16);
     CHECK(guides(box.exec(), view, 0));
@@ -81,16 +80,16 @@ WFPG_TEST_CASE("field store: a slot used again guides nobody until its own field
   CHECK(waited > 0);
 }
 
-WFPG_TEST_CASE("field store: a limit on cones is shared evenly, however large the budget", "[field_store]") {
+WFPG_TEST_CASE("field store: a limit on cones is spread evenly, whatever the budget", "[field_store]") {
   const auto wave = floor_rays(16);
   kept_field_options options = slots_of(4, 2000);
-  options.max_wave_cones = 16;  // a birth, or 4 refreshes
+  options.max_wave_cones = 16;  // one new field, or 4 refreshes
   kept_box<Exec> box(options, wfpg::guiding_mode::oriented, 16);
   box.begin();
   while (count_guided(box.exec(), box.prepare(wave), 16) < 16) {
   }
   std::vector<int> cones(16, 0);
-  for (int sample = 0; sample < 14; ++sample) {  // every field is due in each of them
+  for (int sample = 0; sample < 14; ++sample) {  // every field is due in each sample
     box.begin();
     CHECK(box.cones(wave) == 16);
     for (const wfpg::ray& cone : box.log.cones(16))
@@ -118,7 +117,7 @@ WFPG_TEST_CASE("field store: a limit on cones makes no bins larger", "[field_sto
   CHECK(delayed > 160 * 4);
 }
 
-WFPG_TEST_CASE("field store: samples that only count rays leave bins to those that guide", "[field_store]") {
+WFPG_TEST_CASE("field store: samples that only count rays do not change bin sizes", "[field_store]") {
   kept_box<Exec> box(slots_of(4, 160));
   const auto surfaces = wall_surfaces(600, 1);
   const wfpg::buffer<test_surface, Exec> stored(box.exec(), surfaces);
@@ -132,7 +131,7 @@ WFPG_TEST_CASE("field store: samples that only count rays leave bins to those th
   CHECK(box.state().pressure == wfpg::field_store_state().pressure);
 }
 
-WFPG_TEST_CASE("field store: fields that may see what moved are cast anew, the others refreshed",
+WFPG_TEST_CASE("field store: fields that may see moved geometry are cast again, others refreshed",
                "[field_store]") {
   kept_box<Exec> box(slots_of(4, 100));
   std::vector<test_surface> floor = floor_rays(5), ceiling, glass = rays_at({0.0f, 0.4f, 0.4f}, {1, 0, 0});
@@ -147,7 +146,7 @@ WFPG_TEST_CASE("field store: fields that may see what moved are cast anew, the o
     return std::vector<std::size_t>{box.cones(floor), box.cones(ceiling), box.cones(glass)};
   };
   box.begin();
-  box.settle(all);
+  box.prepare_all(all);
   const std::vector<std::size_t> none{20, 20, 4}, see_all{80, 80, 16};
   CHECK(next({{0.4f, -2.0f, 0.4f}, {0.6f, -1.8f, 0.6f}}) == std::vector<std::size_t>{20, 80, 16});
   CHECK(next({{0.4f, 2.8f, 0.4f}, {0.6f, 3.0f, 0.6f}}) == std::vector<std::size_t>{80, 20, 16});
@@ -155,18 +154,18 @@ WFPG_TEST_CASE("field store: fields that may see what moved are cast anew, the o
   CHECK(next({floor_place(0) - 0.01f, floor_place(0) + 0.01f}) == see_all);
   CHECK(next({vec3(-9.0f), vec3(9.0f)}) == see_all);
   box.store.invalidate_all(box.exec());
-  CHECK(box.cones(all) == 80 + 80 + 16);  // in the same sample, too
+  CHECK(box.cones(all) == 80 + 80 + 16);  // in the same sample too
   CHECK(box.cones(all) == 0);
   box.begin();
   CHECK(box.cones(floor) == none[0]);
   CHECK(box.counts().allocated == 11);
 }
 
-WFPG_TEST_CASE("field store: invalid fields serve as they are until they are used next", "[field_store]") {
+WFPG_TEST_CASE("field store: invalid fields keep guiding until they are next used", "[field_store]") {
   kept_box<Exec> box(slots_of(8, 10));
   const auto wave = floor_rays(3);
   box.begin();
-  const auto before = field_bits(box.exec(), box.settle(wave), 3);
+  const auto before = field_bits(box.exec(), box.prepare_all(wave), 3);
   box.store.invalidate_all(box.exec());
   CHECK(box.cones({wave[0]}) == 64);
   box.begin();
@@ -185,7 +184,7 @@ WFPG_TEST_CASE("field store: unusual rays are counted and have no field", "[fiel
   wave[4].position = vec3(INFINITY);
   wave[5].position = {0.5f, 0.5f, 0.5f};
   box.begin();
-  const guide_view view = box.settle(wave);
+  const guide_view view = box.prepare_all(wave);
   CHECK(box.last_wave().unbinned == 3);
   CHECK(box.last_wave().without_field == 0);
   CHECK(box.last_wave().with_field == 7);
@@ -193,7 +192,8 @@ WFPG_TEST_CASE("field store: unusual rays are counted and have no field", "[fiel
   CHECK(count_guided(box.exec(), box.prepare({}), 12) == 0);
 }
 
-WFPG_TEST_CASE("field store: options out of range are named, and too many rays refused", "[field_store]") {
+WFPG_TEST_CASE("field store: options out of range are named, and too many rays are refused",
+               "[field_store]") {
   const auto refused = [](const char* name, void (*spoil)(kept_field_options&)) {
     kept_field_options options;
     spoil(options);
@@ -216,19 +216,18 @@ WFPG_TEST_CASE("field store: options out of range are named, and too many rays r
         box.max_rays);
 }
 
-WFPG_TEST_CASE("field store: a caster that throws leaves it usable, and fields are built in the next wave",
-               "[field_store]") {
+WFPG_TEST_CASE("field store: after a caster throws, the next wave builds its fields", "[field_store]") {
   const auto wave = floor_rays(16);
   kept_box<Exec> box(slots_of(4, 100)), other(slots_of(4, 100));
   for (std::size_t call : {0, 1, 3}) {
     box.begin();
     other.begin();
-    const auto expected = field_bits(other.exec(), other.settle(wave), wave.size());
+    const auto expected = field_bits(other.exec(), other.prepare_all(wave), wave.size());
     batch_box_caster::log log;
     log.throw_at = call;
     CHECK_THROWS_AS(box.prepare(wave, batch_box_caster{{}, &log}, 1), std::runtime_error);
     CHECK(consistent(box));
-    CHECK(field_bits(box.exec(), box.settle(wave), wave.size()) == expected);
+    CHECK(field_bits(box.exec(), box.prepare_all(wave), wave.size()) == expected);
     CHECK(count_guided(box.exec(), box.prepare(wave), wave.size()) == wave.size());
     CHECK(box.counts().live == 16);
     box.end();
@@ -236,7 +235,7 @@ WFPG_TEST_CASE("field store: a caster that throws leaves it usable, and fields a
   }
 }
 
-WFPG_TEST_CASE("field store: a wave after one that failed builds its own rays' fields only",
+WFPG_TEST_CASE("field store: a wave after a failed one builds fields for its own rays only",
                "[field_store]") {
   kept_box<Exec> box(slots_of(4, 100));
   const auto wave = floor_rays(2);

@@ -1,4 +1,4 @@
-// What path_guider asks of guides, with the one of docs/guides.md.
+// What path_guider requires of guides, tested with the guide of docs/guides.md.
 #include "pages/uniform_guide.hpp"
 #include "support/estimates.hpp"
 #include "support/guiding.hpp"
@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-/// A view that lacks its density. Out of the namespace below, where nvcc warns that nobody draws from it.
+/// A view without pdf(). Outside of the namespace below, where nvcc warns about unused functions.
 struct without_pdf {
   template <class Bsdf>
   WFPG_HD wfpg::sampled_direction sample(std::uint32_t, const wfpg::surface<Bsdf>&, float, wfpg::vec2) const {
@@ -27,7 +27,7 @@ using namespace wfpg_test;
 using wfpg::sampled_direction;
 using wfpg::sampling_technique;
 
-// Guides that lack one thing each.
+// Guides that each lack one thing.
 template <class Exec>
 struct without_options : uniform_guide<Exec> {
   using uniform_guide<Exec>::uniform_guide;
@@ -48,13 +48,13 @@ struct without_memory : uniform_guide<Exec> {
   void memory() const {}
 };
 
-/// One that has fewer samples recorded once means have settled, and notes what it was told of each.
+/// A guide that records fewer samples after warm-up, and logs what it is told of each.
 template <class Exec>
-struct with_turns : uniform_guide<Exec> {
+struct with_stride : uniform_guide<Exec> {
   using uniform_guide<Exec>::uniform_guide;
-  std::vector<std::size_t> recorded;       // paths, whenever there was something to learn
+  std::vector<std::size_t> recorded;       // paths, in each update that could learn
   std::vector<std::uint32_t> learnt_from;  // samples
-  std::vector<std::uint32_t> said;         // samples that update() was told are recorded
+  std::vector<std::uint32_t> said;         // samples that update() is told are recorded
   std::uint32_t updates = 0;
 
   wfpg::recording_needs recording() const { return {1, false, 4}; }
@@ -69,12 +69,12 @@ struct with_turns : uniform_guide<Exec> {
   void forget_light(const Exec&) {}
 };
 template <class Exec>
-struct without_turns : with_turns<Exec> {
-  using with_turns<Exec>::with_turns;
+struct with_zero_stride : with_stride<Exec> {
+  using with_stride<Exec>::with_stride;
   wfpg::recording_needs recording() const { return {1, false, 0}; }
 };
 
-/// One that notes in which samples it was to guide, before their waves.
+/// A guide that logs which samples are guided, before their waves.
 template <class Exec>
 struct with_notes : uniform_guide<Exec> {
   using uniform_guide<Exec>::uniform_guide;
@@ -83,14 +83,14 @@ struct with_notes : uniform_guide<Exec> {
   void begin_sample(const wfpg::sample_context<Exec>& at) { guided.push_back(at.guided); }
 };
 
-/// One that has no use for paths.
+/// A guide that records no paths.
 template <class Exec>
 struct without_paths : uniform_guide<Exec> {
   using uniform_guide<Exec>::uniform_guide;
   static constexpr bool records_paths = false;
 };
 
-WFPG_TEST_CASE("a guide is what has options, a mesh, a view, and learns", "[guide]") {
+WFPG_TEST_CASE("a guide has options, a mesh constructor, a view, and learns", "[guide]") {
   using guide = uniform_guide<Exec>;
   CHECK(wfpg::is_guide_v<guide, Exec>);
   CHECK(wfpg::is_guide_v<either_guide<Exec>, Exec>);
@@ -103,7 +103,7 @@ WFPG_TEST_CASE("a guide is what has options, a mesh, a view, and learns", "[guid
   CHECK(!wfpg::is_guide_v<without_memory<Exec>, Exec>);
 }
 
-/// Samples that are recorded of 100, of which light was forgotten after some.
+/// Which of 100 samples are recorded, if light is forgotten after some of them.
 template <class Exec>
 std::vector<std::uint32_t> recorded_samples(std::uint64_t seed, std::uint32_t forgotten_after) {
   const Exec exec;
@@ -111,34 +111,34 @@ std::vector<std::uint32_t> recorded_samples(std::uint64_t seed, std::uint32_t fo
   wfpg::sampling_options options;
   options.max_paths = 1024;
   options.seed = seed;
-  wfpg::path_guider<Exec, with_turns<Exec>> guider(exec, mesh.view(), options);
+  wfpg::path_guider<Exec, with_stride<Exec>> guider(exec, mesh.view(), options);
   for (std::uint32_t sample = 1; sample <= 100; ++sample) {
     guider.begin_sample();
     guider.end_sample();
     if (sample == forgotten_after) guider.forget_light();
   }
-  const with_turns<Exec>& guide = guider.guide();
+  const with_stride<Exec>& guide = guider.guide();
   CHECK(guide.updates == 100);
   CHECK(guide.said == guide.learnt_from);
   CHECK(guide.recorded == std::vector<std::size_t>(guide.learnt_from.size(), 512));
   return guide.learnt_from;
 }
 
-/// How many of them are among [first, last].
+/// How many samples are in [first, last].
 std::ptrdiff_t count_between(const std::vector<std::uint32_t>& samples, std::uint32_t first,
                              std::uint32_t last) {
   return std::count_if(samples.begin(), samples.end(),
                        [=](std::uint32_t s) { return s >= first && s <= last; });
 }
 
-WFPG_TEST_CASE("one sample in so many is recorded once means have settled, where a guide says so",
-               "[guide]") {
+WFPG_TEST_CASE("after warm-up one sample in so many is recorded, if a guide asks for it", "[guide]") {
   const auto samples = recorded_samples<Exec>(7, 0), others = recorded_samples<Exec>(8, 0);
   CHECK(count_between(samples, 1, 32) == 32);
   for (std::uint32_t first = 33; first < 100; first += 4)
     CHECK(count_between(samples, first, first + 3) == 1);
-  for (std::uint32_t turn = 0; turn < 4; ++turn)  // none of a host's own turns is always left out
-    CHECK(std::any_of(samples.begin() + 32, samples.end(), [=](std::uint32_t s) { return s % 4 == turn; }));
+  for (std::uint32_t offset = 0; offset < 4;
+       ++offset)  // no fixed position of a host's own cycle is always left out
+    CHECK(std::any_of(samples.begin() + 32, samples.end(), [=](std::uint32_t s) { return s % 4 == offset; }));
   CHECK(samples != others);
 
   const auto forgotten = recorded_samples<Exec>(7, 50);
@@ -147,26 +147,24 @@ WFPG_TEST_CASE("one sample in so many is recorded once means have settled, where
   CHECK(count_between(forgotten, 85, 100) == 4);
 }
 
-WFPG_TEST_CASE("a guide that has no sample recorded is refused", "[guide]") {
+WFPG_TEST_CASE("a sample_stride of 0 is refused", "[guide]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
-  CHECK_THROWS_WITH((wfpg::path_guider<Exec, without_turns<Exec>>(exec, mesh.view())),
+  CHECK_THROWS_WITH((wfpg::path_guider<Exec, with_zero_stride<Exec>>(exec, mesh.view())),
                     "wfpg: sample_stride is 0, expected at least 1");
 }
 
-TEST_CASE(
-    "as many paths are recorded as have the vertices that are wanted, or up to twice, and then a quarter",
-    "[guide]") {
+TEST_CASE("recorded_fraction() records enough paths for the wanted vertices, at most twice", "[guide]") {
   const auto needs = [](std::size_t paths, std::uint64_t wanted) {
     wfpg::sampling_options options;
     options.max_paths = paths;
     options.max_depth = 4;
     return wfpg::detail::recorded_fraction(options, wanted).needs(true);
   };
-  const auto is = [](const wfpg::recording_needs& n, std::uint32_t share, std::uint32_t turns) {
-    return n.directions && n.fraction_shift == share && n.sample_stride == turns;
+  const auto is = [](const wfpg::recording_needs& n, std::uint32_t shift, std::uint32_t stride) {
+    return n.directions && n.fraction_shift == shift && n.sample_stride == stride;
   };
-  CHECK(is(needs(1000, 0), 0, 1));  // none in particular: all
+  CHECK(is(needs(1000, 0), 0, 1));  // no number wanted: all
   CHECK(is(needs(1000, 16000), 0, 1));
   CHECK(is(needs(1000, 8000), 0, 2));  // a quarter is 2000 of 4000
   CHECK(is(needs(1000, 4000), 0, 4));
@@ -177,7 +175,7 @@ TEST_CASE(
   CHECK(is(needs(1000, 3), 10, 2));
 }
 
-/// A guider that has begun its n-th sample.
+/// A guider in its n-th sample.
 template <class Exec>
 uniform_guider<Exec> guider_in_sample(const Exec& exec, const box_mesh<Exec>& mesh, std::uint32_t n) {
   uniform_guider<Exec> guider = make_guider(exec, mesh.view(), 4096);
@@ -213,7 +211,7 @@ struct direction_of {
   WFPG_HD vec3 operator()(std::uint32_t ray) const { return drawn[ray].direction; }
 };
 
-WFPG_TEST_CASE("a guide is told from a sample's beginning on whether it guides", "[guide]") {
+WFPG_TEST_CASE("a guide is told at a sample's beginning whether it guides", "[guide]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   wfpg::sampling_options options;
@@ -228,8 +226,7 @@ WFPG_TEST_CASE("a guide is told from a sample's beginning on whether it guides",
   CHECK(guider.guide().guided == std::vector<bool>{false, false, true, true});
 }
 
-WFPG_TEST_CASE("a guide's share of directions is guide_fraction, after the samples that only record",
-               "[guide]") {
+WFPG_TEST_CASE("guide_fraction is the guide's fraction, after the samples that only record", "[guide]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   const auto surfaces = wall_surfaces(4096, 3);
@@ -249,7 +246,7 @@ WFPG_TEST_CASE("a guide's share of directions is guide_fraction, after the sampl
   CHECK(std::abs(below / guided - 0.5) < 4.0 * 0.5 / std::sqrt(guided));
 }
 
-WFPG_TEST_CASE("what is deeper than guided_depths is its BSDF's, by the octree's guide too", "[guide]") {
+WFPG_TEST_CASE("rays deeper than guided_depths sample their BSDF, with the octree's guide too", "[guide]") {
   const auto surfaces = wall_surfaces(700, 3);
   for (wfpg::guiding_mode mode : {wfpg::guiding_mode::oriented, wfpg::guiding_mode::plain})
     for (field_lifetime lifetime : lifetimes)
@@ -272,7 +269,7 @@ WFPG_TEST_CASE("what is deeper than guided_depths is its BSDF's, by the octree's
       }
 }
 
-WFPG_TEST_CASE("what is deeper than guided_depths has the density of its BSDF", "[guide]") {
+WFPG_TEST_CASE("rays deeper than guided_depths have the density of their BSDF", "[guide]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   const auto surfaces = wall_surfaces(4096, 3);
@@ -296,8 +293,7 @@ WFPG_TEST_CASE("what is deeper than guided_depths has the density of its BSDF", 
   }
 }
 
-WFPG_TEST_CASE("a guide's view has the densities of its directions, and answers queries with them",
-               "[guide]") {
+WFPG_TEST_CASE("a guide's view reports the densities of its directions, also in queries", "[guide]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   const auto surfaces = mixed_surfaces(1000, 5);
@@ -328,13 +324,13 @@ WFPG_TEST_CASE("a guide's view has the densities of its directions, and answers 
   CHECK(wrong == 0);
 }
 
-/// Of what paths of two bounces gather.
+/// Estimate of the radiance that paths of two bounces gather.
 template <class Guider, class Exec>
 estimate estimate_radiance(const Exec& exec, Guider&& guider, std::uint32_t samples, std::size_t paths) {
   return estimate_of(trace_paths(exec, guider, samples, paths, box_caster()));
 }
 
-WFPG_TEST_CASE("what paths gather is the same, whichever guide they have", "[guide]") {
+WFPG_TEST_CASE("the mean of paths is the same with each guide", "[guide]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   constexpr std::size_t paths = 2048;
@@ -348,7 +344,7 @@ WFPG_TEST_CASE("what paths gather is the same, whichever guide they have", "[gui
   CHECK(std::sqrt(found.variance) < 0.05 * found.mean);
 }
 
-WFPG_TEST_CASE("a guide that records no paths has a recorder that forgets them", "[guide]") {
+WFPG_TEST_CASE("a guide that records no paths gets a recorder that drops them", "[guide]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   wfpg::sampling_options options;
@@ -371,7 +367,7 @@ WFPG_TEST_CASE("a guide that records no paths has a recorder that forgets them",
   CHECK(guider.memory().transient() + 200 * 3 * 40 <= recorded.memory().transient());
 }
 
-WFPG_TEST_CASE("a guider that takes another's place gives its own memory back", "[guide]") {
+WFPG_TEST_CASE("move assignment of a guider frees its own memory", "[guide]") {
   counting_resource resource;
   const Exec exec = Exec().with_resource(&resource);
   const box_mesh<Exec> mesh(exec);
@@ -391,7 +387,7 @@ WFPG_TEST_CASE("a guider that takes another's place gives its own memory back", 
   CHECK(resource.bytes_in_use == before);
 }
 
-WFPG_TEST_CASE("what all guiders tell and check, they do with any guide", "[guide]") {
+WFPG_TEST_CASE("statistics, memory and checks of a guider work with any guide", "[guide]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   uniform_guider<Exec> guider = guider_in_sample(exec, mesh, 3);

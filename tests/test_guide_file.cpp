@@ -1,5 +1,5 @@
-// Guide files: what was saved goes on to the bit; what is truncated, altered, foreign, newer or made up is
-// refused by name and does no harm.
+// Guide files. Loaded guides continue bit for bit. Truncated, altered, foreign, newer or invented files are
+// refused by name and do no harm.
 #include "support/catch.hpp"
 #include "support/guiding.hpp"
 #include "support/policies.hpp"
@@ -46,7 +46,7 @@ auto loaded(const Exec& exec, const std::string& bytes, const Options& options) 
   return wfpg::load_guide(exec, in, options);
 }
 
-/// What is wrong with a file's bytes; empty where nothing is.
+/// The error message for a file's bytes. Empty if they load.
 template <class Options>
 std::string fault(const std::string& bytes, const Options& options) {
   try {
@@ -78,7 +78,7 @@ bool same_counts(const wfpg::guider_statistics& a, const wfpg::guider_statistics
   return same;
 }
 
-/// A guider that is saved and loaded is as it was, and traces the same paths.
+/// Checks that a loaded guider equals the saved one and traces the same paths.
 template <class Exec, class Options>
 void check_goes_on(const Exec& exec, const Options& options) {
   auto first = trained(exec, options, 5);
@@ -96,7 +96,7 @@ void check_goes_on(const Exec& exec, const Options& options) {
   CHECK(trace_paths(exec, fresh, 4, paths, box_caster()) != picture);
 }
 
-WFPG_TEST_CASE("a guider that was saved and loaded goes on to the bit", "[guide_file]") {
+WFPG_TEST_CASE("a loaded guider continues bit for bit", "[guide_file]") {
   const Exec exec;
   for (const field_lifetime lifetime : lifetimes)
     for (const guiding_mode mode : {guiding_mode::oriented, guiding_mode::plain})
@@ -108,11 +108,11 @@ WFPG_TEST_CASE("a guider that was saved and loaded goes on to the bit", "[guide_
       }
 }
 
-WFPG_TEST_CASE("fields without room, invalidated or without light go on to the bit", "[guide_file]") {
+WFPG_TEST_CASE("fields that are refused, invalidated or dark continue bit for bit", "[guide_file]") {
   const Exec exec;
   wfpg::kept_guide_options options = small_options();
   options.octree_resolution = 32;
-  for (const bool moved : {false, true}) {  // where nothing did, waves take turns to build fields from now on
+  for (const bool moved : {false, true}) {  // if nothing moved, waves take turns to build fields from now on
     wfpg::path_guider<Exec> first = trained(exec, options, 40);
     REQUIRE(first.statistics().kept.refused > 0);
     if (moved) {
@@ -126,15 +126,15 @@ WFPG_TEST_CASE("fields without room, invalidated or without light go on to the b
   }
 }
 
-WFPG_TEST_CASE("fields that wait for their cones are counted in a loaded guide, too", "[guide_file]") {
+WFPG_TEST_CASE("a loaded guide counts fields that wait for their cones", "[guide_file]") {
   const Exec exec;
   wfpg::kept_guide_options options = small_options();
   options.octree_resolution = 32;
   options.kept.budget_bytes *= 100;
-  options.kept.max_wave_cones = 3 * 16;  // three births a wave
+  options.kept.max_wave_cones = 3 * 16;  // three new fields a wave
   wfpg::path_guider<Exec> first = trained(exec, options, 2);
   const wfpg::kept_field_statistics counted = first.statistics().kept;
-  REQUIRE(2 * counted.live < counted.capacity);  // no birth was refused for want of a slot
+  REQUIRE(2 * counted.live < counted.capacity);  // no field was refused for want of a slot
   REQUIRE(counted.refused > 0);
   wfpg::path_guider<Exec> second = loaded(exec, saved(first), options);
   CHECK(second.statistics().kept.refused == counted.refused);
@@ -145,12 +145,12 @@ WFPG_TEST_CASE("fields that wait for their cones are counted in a loaded guide, 
   CHECK(same_counts(first.statistics(), second.statistics()));
 }
 
-WFPG_TEST_CASE("a guide that not all samples teach any more goes on to the bit", "[guide_file]") {
+WFPG_TEST_CASE("a guide that records only some samples continues bit for bit", "[guide_file]") {
   const Exec exec;
   wfpg::kept_guide_options options = small_options();
   options.octree_resolution = 8;
   options.deposits_per_leaf = 1;
-  for (const bool dark : {false, true}) {  // from then on all samples are recorded for a while
+  for (const bool dark : {false, true}) {  // all samples are recorded for a while after that
     wfpg::path_guider<Exec> first = trained(exec, options, 41);
     REQUIRE(first.guide().recording().sample_stride == 4);
     if (dark) first.forget_light();
@@ -161,7 +161,7 @@ WFPG_TEST_CASE("a guide that not all samples teach any more goes on to the bit",
   }
 }
 
-struct tell_lights {
+struct deposit_lights {
   wfpg::light_guide_view lights;
   WFPG_HD void operator()(std::size_t i) const {
     const vec2 u = hashed_numbers{8}(static_cast<std::uint32_t>(i), 0);
@@ -183,12 +183,12 @@ template <class Exec>
 wfpg::path_guider<Exec> trained_with_lights(const Exec& exec) {
   wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options_with_lights());
   guider.begin_sample();
-  exec.for_each(paths, tell_lights{guider.lights()});
+  exec.for_each(paths, deposit_lights{guider.lights()});
   guider.end_sample();
   return guider;
 }
 
-WFPG_TEST_CASE("choices of lights are saved and loaded to the bit", "[guide_file]") {
+WFPG_TEST_CASE("choices of lights are saved and loaded bit for bit", "[guide_file]") {
   const Exec exec;
   wfpg::path_guider<Exec> first = trained_with_lights(exec);
   const std::string bytes = saved(first);
@@ -199,7 +199,7 @@ WFPG_TEST_CASE("choices of lights are saved and loaded to the bit", "[guide_file
   wfpg::path_guider<Exec>* const both[] = {&first, &second};
   for (wfpg::path_guider<Exec>* guider : both) {
     guider->begin_sample();
-    exec.for_each(paths, tell_lights{guider->lights()});
+    exec.for_each(paths, deposit_lights{guider->lights()});
     guider->end_sample();
   }
   CHECK(saved(second) == saved(first));
@@ -220,7 +220,7 @@ WFPG_TEST_CASE("a guider without samples or without surfaces can be saved", "[gu
   }
 }
 
-WFPG_TEST_CASE("a warm start guides from the first sample on, with other options", "[guide_file]") {
+WFPG_TEST_CASE("a warm start guides from the first sample, with other options", "[guide_file]") {
   const Exec exec;
   const std::string bytes = saved(trained(exec, small_options()));
   wfpg::kept_guide_options options = small_options();
@@ -239,7 +239,7 @@ WFPG_TEST_CASE("a warm start guides from the first sample on, with other options
   CHECK(count_guided(exec, view, 200) > 150);
 }
 
-WFPG_TEST_CASE("fields that learn and fields that cannot take over from one another", "[guide_file]") {
+WFPG_TEST_CASE("guides with and without learnt radiance load each other's files", "[guide_file]") {
   const Exec exec;
   const wfpg::kept_guide_options learning = small_options();
   wfpg::kept_guide_options without_paths = learning;  // nothing to learn from
@@ -262,7 +262,7 @@ WFPG_TEST_CASE("fields that learn and fields that cannot take over from one anot
   CHECK(saved(third) == saved(forgetful));
 }
 
-TEST_CASE("guide files that are cut off, altered or foreign are told apart", "[guide_file]") {
+TEST_CASE("truncated, altered and foreign guide files have different errors", "[guide_file]") {
   const wfpg::kept_guide_options options = small_options();
   const std::string bytes = saved(trained(one_policy(), options));
   REQUIRE(fault(bytes, options).empty());
@@ -290,7 +290,7 @@ TEST_CASE("guide files that are cut off, altered or foreign are told apart", "[g
   for (const section_place& place : sections_of(bytes)) {
     names.push_back(place.name);
     std::string altered = bytes;
-    altered[place.head + 9] ^= 1;  // its length
+    altered[place.head + 9] ^= 1;  // the section's length
     names_it(altered, "altered: the checksum of the head of section " + place.name);
     altered = bytes;
     altered[place.payload + place.size] ^= 1;
@@ -309,7 +309,7 @@ TEST_CASE("guide files that are cut off, altered or foreign are told apart", "[g
              "section " + place.name + " is too ");
   }
   CHECK(names == std::vector<std::string>{"options", "octree", "cache", "counts", "levels", "fields", "end"});
-  // A length beyond all memory, with a right checksum.
+  // A length beyond all memory, with a correct checksum.
   const section_place octree = section_of(bytes, "octree");
   std::string endless = bytes;
   set_number(endless, octree.head + 8, 8, ~0ull);
@@ -319,7 +319,7 @@ TEST_CASE("guide files that are cut off, altered or foreign are told apart", "[g
            "has no section octree where it belongs");
 }
 
-TEST_CASE("guide files cut off anywhere are refused", "[guide_file]") {
+TEST_CASE("guide files truncated anywhere are refused", "[guide_file]") {
   const wfpg::kept_guide_options options = small_options();
   const std::string bytes = saved(trained(one_policy(), options));
   std::size_t read = 0;
@@ -353,7 +353,7 @@ TEST_CASE("guide files of other options are refused by the option's name", "[gui
   CHECK_THROWS_AS(loaded(one_policy(), bytes, invalid), std::invalid_argument);
 }
 
-TEST_CASE("a guide file has the octree's resolution, which a host's own fragments decide", "[guide_file]") {
+TEST_CASE("a guide file stores the octree's resolution, which fragments decide", "[guide_file]") {
   const one_policy exec;
   wfpg::kept_guide_options options = small_options();
   wfpg::path_guider<one_policy> guider(exec, wfpg::voxelize(exec, box_mesh<one_policy>(exec).view(), 16),
@@ -367,7 +367,7 @@ TEST_CASE("a guide file has the octree's resolution, which a host's own fragment
   CHECK(saved(loaded(exec, bytes, options)) == bytes);
 }
 
-TEST_CASE("what is in a guide file is checked, whatever its checksums say", "[guide_file]") {
+TEST_CASE("the content of a guide file is checked, even if its checksums are right", "[guide_file]") {
   const wfpg::kept_guide_options options = small_options();
   const std::string bytes = saved(trained(one_policy(), options));
   const std::uint64_t infinity = 0x7f800000u, nan = 0x7ff8000000000000ull;
@@ -419,8 +419,8 @@ TEST_CASE("what is in a guide file is checked, whatever its checksums say", "[gu
   CHECK(fault(with_payload(bytes, "fields", twice), options).find("a field twice") != std::string::npos);
 }
 
-/// Bytes altered anywhere behind right checksums are refused or give a guider that guides.
-TEST_CASE("guide files with anything in them do no harm", "[guide_file]") {
+/// Bytes altered anywhere, with correct checksums, are refused or give a guider that guides.
+TEST_CASE("guide files with random bytes do no harm", "[guide_file]") {
   const one_policy exec;
   const wfpg::kept_guide_options options = small_options();
   const std::string bytes = saved(trained(exec, options));
@@ -444,7 +444,7 @@ TEST_CASE("guide files with anything in them do no harm", "[guide_file]") {
   CHECK(guided > 50);
 }
 
-TEST_CASE("guide files replace one another whole", "[guide_file]") {
+TEST_CASE("saving replaces a guide file as a whole", "[guide_file]") {
   const one_policy exec;
   const wfpg::kept_guide_options options = small_options();
   const temporary_folder folder;

@@ -1,5 +1,5 @@
-// The format of guide files: the table in guide_file.hpp against what is written, guides of other scenes, and
-// how often a policy copies.
+// The format of guide files. Compares the table in guide_file.hpp with written files. Also guides of other
+// scenes, and the number of copies of a policy.
 #include "support/catch.hpp"
 #include "support/guiding.hpp"
 #include "support/policies.hpp"
@@ -48,7 +48,7 @@ auto trained(const Exec& exec, const Options& options) {
   return guider;
 }
 
-/// A row of the table: `bytes` for each `unit`, which is empty for what a file has once.
+/// A row of the table: `bytes` per `unit`. An empty unit means once per file.
 struct format_row {
   std::string section, content, unit;
   std::size_t bytes = 0;
@@ -74,7 +74,7 @@ std::vector<format_row> table_of(const std::string& text) {
   return rows;
 }
 
-/// How many of each unit a guider has, by counting fields in its file.
+/// How many of each unit a guider has. Counts the fields in its file.
 std::map<std::string, std::size_t> units_of(const wfpg::path_guider<one_policy>& guider,
                                             const wfpg::kept_guide_options& options,
                                             const std::string& bytes) {
@@ -98,7 +98,7 @@ std::map<std::string, std::size_t> units_of(const wfpg::path_guider<one_policy>&
           {"mean", payload_of(bytes, "lights").size() / 4}};
 }
 
-TEST_CASE("the table of a guide file says what is written", "[guide_file]") {
+TEST_CASE("the table in guide_file.hpp matches what is written", "[guide_file]") {
   const one_policy exec;
   const wfpg::kept_guide_options options = learning_options();
   const wfpg::path_guider<one_policy> guider = trained(exec, options);
@@ -119,7 +119,7 @@ TEST_CASE("the table of a guide file says what is written", "[guide_file]") {
     INFO("section " << place.name);
     CHECK(sizes[place.name] == place.size);
   }
-  CHECK(sizes.size() == sections_of(bytes).size());  // "end", too, which has nothing
+  CHECK(sizes.size() == sections_of(bytes).size());  // including "end", which is empty
 }
 
 std::string refusal_of(const std::string& bytes, const wfpg::kept_guide_options& options,
@@ -171,7 +171,7 @@ TEST_CASE("a guide of other triangles is refused by its octree", "[guide_file]")
   CHECK(refused());
 }
 
-/// A policy that counts copies to the host and back.
+/// A policy that counts copies to and from the host.
 class counting_policy : public wfpg::exec::cpu_policy<counting_policy, 8> {
  public:
   explicit counting_policy(wfpg::memory_resource* resource = nullptr) : cpu_policy(resource) {}

@@ -1,4 +1,4 @@
-// wfpg-inspect: directions and pictures of them, measures, scales, and the program's files and errors.
+// wfpg-inspect: directions and pictures of them, measures, colour scales, and the program's files and errors.
 #include "colour_scale.hpp"
 #include "directions.hpp"
 #include "inspection.hpp"
@@ -31,7 +31,7 @@ outcome run(const std::vector<std::string>& arguments) {
   return run_command(inspect::run_program, "wfpg-inspect", arguments);
 }
 
-/// The bytes of all that a page has in it as base64.
+/// The bytes of each base64 block in a page.
 std::vector<std::string> embedded_in(const std::string& page) {
   const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/",
                     mark = "base64,";
@@ -56,14 +56,14 @@ nlohmann::json numbers_in(const std::string& folder) {
 
 }  // namespace
 
-TEST_CASE("inspect: a cell's directions lie in it, and known ones where they should", "[inspect]") {
+TEST_CASE("inspect: a cell's directions lie in it, and known directions in known cells", "[inspect]") {
   const vec3 up = glm::normalize(vec3(0.3f, -0.5f, 0.8f));
   for (const direction_grid& grid :
        {direction_grid(7), direction_grid(7, up), direction_grid(2, up).refined(4)})
     for (std::size_t cell = 0; cell < grid.size(); ++cell)
       for (const vec2 inside : {vec2(0.1f), vec2(0.5f), vec2(0.9f, 0.2f)})
         REQUIRE(grid.cell_of(grid.direction(cell, inside)) == cell);
-  // The middle of the square is +z of the sphere, and the normal of a hemisphere; -z is at the corners.
+  // The centre of the square is +z of the sphere, or the normal of a hemisphere. -z is at the corners.
   CHECK(direction_grid(3).cell_of({0.0f, 0.0f, 1.0f}) == 4u);
   CHECK(direction_grid(3, up).cell_of(up) == 4u);
   const std::size_t corner = direction_grid(3).cell_of({0.0f, 0.0f, -1.0f}).value();
@@ -73,7 +73,7 @@ TEST_CASE("inspect: a cell's directions lie in it, and known ones where they sho
   CHECK(direction_grid(8, up).solid_angle() == Approx(2.0f * render::pi / 64.0f));
 }
 
-TEST_CASE("inspect: cells are of equal solid angle in a picture of latitudes and longitudes", "[inspect]") {
+TEST_CASE("inspect: cells have equal solid angle in a latitude-longitude picture", "[inspect]") {
   const int height = 512;
   const double rows = height;
   for (const direction_grid& grid : {direction_grid(4), direction_grid(4, vec3(0.0f, 1.0f, 0.0f))}) {
@@ -93,7 +93,7 @@ TEST_CASE("inspect: cells are of equal solid angle in a picture of latitudes and
   }
 }
 
-TEST_CASE("inspect: the middle of such a picture is -z, its right +x, its upper edge +y", "[inspect]") {
+TEST_CASE("inspect: a latitude-longitude picture has -z in its centre, +x right, +y up", "[inspect]") {
   check_close(inspect::direction_at({0.5f, 0.5f}), {0.0f, 0.0f, -1.0f});
   check_close(inspect::direction_at({0.75f, 0.5f}), {1.0f, 0.0f, 0.0f});
   check_close(inspect::direction_at({0.3f, 0.0f}), {0.0f, 1.0f, 0.0f});
@@ -109,7 +109,7 @@ TEST_CASE("inspect: the middle of such a picture is -z, its right +x, its upper 
             0.95f);
 }
 
-TEST_CASE("inspect: divergences and correlations of known distributions", "[inspect]") {
+TEST_CASE("inspect: divergences and correlations of known distributions are right", "[inspect]") {
   using inspect::correlation;
   using inspect::kl_divergence;
   const std::vector<double> p = inspect::normalised({1.0, 2.0, 3.0, 0.0}), q{0.25, 0.25, 0.25, 0.25};
@@ -125,11 +125,11 @@ TEST_CASE("inspect: divergences and correlations of known distributions", "[insp
   CHECK(inspect::normalised({0.0, 0.0}) == std::vector<double>{0.0, 0.0});
   std::vector<double> fine(16, 0.0);
   fine[5] = 4.0;   // second row, second column: the upper left block
-  fine[14] = 8.0;  // last row, third column: the lower right one
+  fine[14] = 8.0;  // last row, third column: the lower right block
   CHECK(inspect::coarsened(fine, 2) == std::vector<double>{1.0, 0.0, 0.0, 2.0});
 }
 
-TEST_CASE("inspect: scales name powers of ten, and lighter is more", "[inspect]") {
+TEST_CASE("inspect: scales label powers of ten, and brighter colours mean more", "[inspect]") {
   const auto scale = inspect::colour_scale::logarithmic(30.0, "1/sr");
   CHECK(scale.labels() == std::vector<std::string>{"0.01", "0.1", "1", "10", "100"});
   CHECK(scale.colour(100.0) == vec3(1.0f));
@@ -148,7 +148,7 @@ TEST_CASE("inspect: scales name powers of ten, and lighter is more", "[inspect]"
   CHECK(inspect::colour_scale::whole_numbers(2, "").labels() == std::vector<std::string>{"0", "1", "2"});
 }
 
-TEST_CASE("inspect: the program writes a page that needs nothing else", "[inspect]") {
+TEST_CASE("inspect: the program writes a self-contained page", "[inspect]") {
   temporary_folder folder;
   for (const std::string fields : {"kept", "transient"}) {
     const std::string output = folder.file(fields) + "/new";
@@ -160,7 +160,7 @@ TEST_CASE("inspect: the program writes a page that needs nothing else", "[inspec
     const std::string page = content_of(output + "/index.html");
     CHECK_FALSE(contains(page, "http"));
     const std::vector<std::string> pictures = embedded_in(page);
-    CHECK(pictures.size() == 27);  // 8 maps in two projections, 6 of the camera's, 5 bars
+    CHECK(pictures.size() == 27);  // 8 maps in two projections, 6 camera pictures, 5 bars
     CHECK(std::count(pictures.begin(), pictures.end(), content_of(output + "/bar-0.png")) > 0);
     for (const std::string name : {"field-octahedral", "light-latlong", "picture", "octree-levels"}) {
       INFO(name);
@@ -208,7 +208,7 @@ TEST_CASE("inspect: pixels without a field say so and have the octree's pictures
   CHECK(contains(log.str(), "warning: The pixel hits nothing"));
   CHECK(look(render::material_kind::mirror, 12)["hit"] == "a smooth mirror or glass");
   CHECK(contains(content_of((asked.output / "index.html").string()), "sampled by its BSDF alone"));
-  // Without room for a field there is still what the BSDF draws.
+  // Without room for a field, the BSDF's directions are still shown.
   asked.learning.kept.budget_bytes = 0;
   const nlohmann::json bare = look(render::material_kind::lambert, 12);
   CHECK(bare["hit"] == "a surface");
@@ -217,7 +217,7 @@ TEST_CASE("inspect: pixels without a field say so and have the octree's pictures
   CHECK(std::filesystem::exists(asked.output / "sampler-octahedral.png"));
 }
 
-TEST_CASE("inspect: what cannot be is named before anything is rendered", "[inspect]") {
+TEST_CASE("inspect: invalid arguments are named before anything is rendered", "[inspect]") {
   temporary_folder folder;
   const std::string output = folder.file("none");
   const auto error = [&](std::vector<std::string> arguments) {
@@ -252,7 +252,7 @@ TEST_CASE("inspect: what cannot be is named before anything is rendered", "[insp
   CHECK_FALSE(contains(taken.log, "learning"));
 }
 
-TEST_CASE("inspect: the octree is an OpenVDB file, or what is missing is said", "[inspect]") {
+TEST_CASE("inspect: the octree is written as OpenVDB, or an error says why not", "[inspect]") {
   temporary_folder folder;
   const std::string vdb = folder.file("octree.vdb"), output = folder.file("page");
   const outcome done = run({"cornell-box", "--pixel", "0,0", "--size", "8x8", "--spp", "1", "--reference-spp",

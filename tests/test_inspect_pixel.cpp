@@ -1,4 +1,4 @@
-// What wfpg-inspect finds at a pixel: light that arrives, samplers and their densities, bins, voxels.
+// What wfpg-inspect shows of a pixel: incident light, samplers and their densities, bins, voxels.
 #include "findings.hpp"
 #include "octree_pictures.hpp"
 #include "scene/builtin_scenes.hpp"
@@ -26,7 +26,7 @@ using render::image;
 using render::vec2;
 using render_test::check_close;
 
-/// Relative standard deviation of samples under light that is 1 from everywhere, drawn.
+/// Relative standard deviation of a sampler's estimates under light of radiance 1 from everywhere.
 double deviation_of(const inspect::pixel_sampler& sampler) {
   const int n = 50000;
   double sum = 0.0, squares = 0.0;
@@ -44,7 +44,7 @@ double deviation_of(const inspect::pixel_sampler& sampler) {
 
 }  // namespace
 
-TEST_CASE("inspect: light arrives in a furnace alike from everywhere", "[inspect]") {
+TEST_CASE("inspect: light in a furnace is equal from everywhere", "[inspect]") {
   const render::scene furnace = render::make_builtin_scene("furnace");
   render::render_options options = small(8, 2);
   options.nee = false;
@@ -52,14 +52,14 @@ TEST_CASE("inspect: light arrives in a furnace alike from everywhere", "[inspect
   const render::hit_surface& at = learnt.hits()[27];
   const direction_grid cells(6, wfpg::facing_normal(at.surface));
   const auto light = learnt.arriving(at, cells, 4, {});
-  // Three segments are left of four.
+  // Three of four segments are left.
   for (const image* half : {&light.first, &light.second})
     for (const vec3& pixel : half->pixels)
       check_close(pixel, vec3(float(render::furnace_radiance(3))), 1e-4f);
   CHECK(light.mean().pixels.size() == 36);
 }
 
-TEST_CASE("inspect: light arrives by all lamps, however the guide groups them", "[inspect]") {
+TEST_CASE("inspect: light arrives from all lamps, however the guide groups them", "[inspect]") {
   const render::scene lamps = render::make_builtin_scene("many-lamps");
   std::vector<vec3> by_one_group;
   for (const std::uint32_t groups : {1u, 32u}) {
@@ -76,7 +76,7 @@ TEST_CASE("inspect: light arrives by all lamps, however the guide groups them", 
   }
 }
 
-TEST_CASE("inspect: a floor under the sky is sampled as its BSDF does", "[inspect]") {
+TEST_CASE("inspect: a floor under the sky is sampled as its BSDF samples", "[inspect]") {
   const learnt_scene learnt(lit_floor(render::material_kind::lambert), small(16, 4), {});
   const std::uint32_t pixel = 12 * 16 + 8;
   REQUIRE(learnt.hits()[pixel].surface.active);
@@ -91,7 +91,7 @@ TEST_CASE("inspect: a floor under the sky is sampled as its BSDF does", "[inspec
   for (const auto* density : {&found.field, &found.reference, &found.product, &found.ideal, &found.sampler})
     CHECK(sum_of(*density) * area == Approx(1.0).epsilon(0.01));
   CHECK(sum_of(found.counted.density) * area == Approx(1.0));
-  // Light that is 1 from everywhere leaves the cosine.
+  // Light of radiance 1 from everywhere leaves the cosine.
   const auto cosines = inspect::cell_means(found.cells, 8, [](vec3 d) { return d.y; });
   for (std::size_t cell = 0; cell < found.cells.size(); ++cell)
     CHECK(found.ideal[cell] == Approx(cosines[cell] / double(render::pi)).margin(0.002));
@@ -102,14 +102,14 @@ TEST_CASE("inspect: a floor under the sky is sampled as its BSDF does", "[inspec
   CHECK(found.divergence_noise < 1e-6);
   const inspect::pixel_sampler sampler(learnt.fields(), pixel, learnt.hits()[pixel].surface);
   CHECK(found.noise.sampler == Approx(deviation_of(sampler)).epsilon(0.05));
-  double mean = 0.0;  // of the contributions, by their density
+  double mean = 0.0;  // mean contribution over the densities
   for (std::size_t cell = 0; cell < found.fine_cells.size(); ++cell)
     mean += found.contributions[cell] *
             found.sampler[found.cells.cell_of(found.fine_cells.direction(cell, vec2(0.5f))).value()];
   CHECK(mean * double(found.fine_cells.solid_angle()) == Approx(1.0).epsilon(0.05));
 }
 
-TEST_CASE("inspect: samples have the density that is shown, and no other pixel's", "[inspect]") {
+TEST_CASE("inspect: samples have the shown density, and not another pixel's", "[inspect]") {
   for (const auto method : {render::sampling_method::wfpg, render::sampling_method::wfpg_product})
     for (const auto lifetime : {render::fields::kept, render::fields::transient}) {
       render::render_options options = small(24, 6);
@@ -136,7 +136,7 @@ TEST_CASE("inspect: samples have the density that is shown, and no other pixel's
     }
 }
 
-TEST_CASE("inspect: histograms are the density cell by cell", "[inspect]") {
+TEST_CASE("inspect: histograms match the density cell by cell", "[inspect]") {
   const learnt_scene learnt(render::make_builtin_scene("cornell-box"), small(24, 6), {});
   inspect::finding_options options;
   options.reference_spp = 2;
@@ -169,7 +169,7 @@ TEST_CASE("inspect: a pixel's point lies in its bin's node, on a surface of its 
       ++binned;
       const auto& surface = learnt.hits()[pixel].surface;
       const wfpg::bounds3 box = tree.bounds(bin / wfpg::orientations);
-      const vec3 slack(1.5f * tree.grid().voxel_size());  // a neighbour's voxel serves where there is none
+      const vec3 slack(1.5f * tree.grid().voxel_size());  // a ray without a voxel uses a neighbour's
       CHECK(glm::all(glm::greaterThan(surface.position, box.lower - slack)));
       CHECK(glm::all(glm::lessThan(surface.position, box.upper + slack)));
       CHECK(bin % wfpg::orientations == wfpg::dominant_axis(wfpg::facing_normal(surface)));
@@ -179,7 +179,7 @@ TEST_CASE("inspect: a pixel's point lies in its bin's node, on a surface of its 
   }
 }
 
-TEST_CASE("inspect: pictures of the octree are of what the pixels hit", "[inspect]") {
+TEST_CASE("inspect: pictures of the octree show what the pixels hit", "[inspect]") {
   const learnt_scene learnt(lit_floor(render::material_kind::lambert), small(16, 4), {});
   const std::size_t sky = 2 * 16 + 8, floor = 12 * 16 + 8;
   const image normals = inspect::normal_picture(learnt);
@@ -193,7 +193,7 @@ TEST_CASE("inspect: pictures of the octree are of what the pixels hit", "[inspec
       lit += 1.0;
     }
   CHECK(lit > 64.0);
-  CHECK(sum / lit == Approx(0.8).epsilon(0.03));  // of what arrives
+  CHECK(sum / lit == Approx(0.8).epsilon(0.03));  // of the incident light
   CHECK(exitance.turned.pixels[floor].x < 0.0f);
   CHECK(exitance.facing.pixels[sky].x < 0.0f);
   CHECK(exitance.greatest >= double(exitance.facing.pixels[floor].x));

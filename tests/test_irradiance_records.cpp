@@ -1,5 +1,5 @@
-// Irradiance records: their cells and densities, tags of voxels where the answer is known, when they are
-// built, options. What cones find, and that pictures keep their mean, is test_irradiance_records_light.cpp's.
+// Irradiance records: cells and densities, known tags of voxels, builds, options.
+// test_irradiance_records_light.cpp tests their cones and the means of pictures.
 #include "support/catch.hpp"
 #include "support/records.hpp"
 #include "support/statistics.hpp"
@@ -18,7 +18,8 @@ using wfpg::irradiance_record;
 using wfpg::irradiance_records_options;
 using wfpg::voxel_tag;
 
-TEST_CASE("irradiance records: cells share the sphere alike, and directions find theirs", "[records]") {
+TEST_CASE("irradiance records: cells divide the sphere equally, and directions find their cell",
+          "[records]") {
   random_numbers random(3);
   std::vector<int> counts(irradiance_record::cells);
   constexpr int n = 128000;
@@ -33,12 +34,11 @@ TEST_CASE("irradiance records: cells share the sphere alike, and directions find
   double chi_square = 0.0;
   for (const int count : counts) chi_square += (count - 1000.0) * (count - 1000.0) / 1000.0;
   CHECK(chi_square_tail(chi_square, 127) > 1.0e-3);
-  CHECK(irradiance_record::cell_of({0.0f, 1.0f, 0.0f}) / 16 == 7);  // the poles are in cells, too
+  CHECK(irradiance_record::cell_of({0.0f, 1.0f, 0.0f}) / 16 == 7);  // the poles are in cells too
   CHECK(irradiance_record::cell_of({0.0f, -1.0f, 0.0f}) / 16 == 0);
 }
 
-TEST_CASE("irradiance records: cells that reach above a surface have cosines, and they are the cosine's",
-          "[records]") {
+TEST_CASE("irradiance records: cells above a surface have the cosine at their highest point", "[records]") {
   random_numbers random(4);
   for (int i = 0; i < 20000; ++i) {
     const vec3 normal = random.direction(), d = random.direction();
@@ -80,7 +80,7 @@ TEST_CASE("irradiance records: products of cosines and counters are summed four 
   }
 }
 
-TEST_CASE("lattice of normals: each direction is near one, and the axes are on it", "[records]") {
+TEST_CASE("lattice of normals: each direction is near a normal, and the axes are exact", "[records]") {
   const wfpg::detail::normal_lattice lattice{16};
   for (int axis = 0; axis < 3; ++axis)
     for (const float sign : {-1.0f, 1.0f}) {
@@ -121,7 +121,7 @@ struct surface_side {
   bool transmits;
 };
 
-WFPG_TEST_CASE("irradiance records: densities integrate to one, and frequencies are theirs", "[records]") {
+WFPG_TEST_CASE("irradiance records: densities integrate to one and match the frequencies", "[records]") {
   const Exec exec;
   chi_square_family family;
   const lit_mesh<Exec> mesh(exec, patch_lamp());
@@ -156,7 +156,8 @@ WFPG_TEST_CASE("irradiance records: densities integrate to one, and frequencies 
   CHECK(family.accepted());
 }
 
-WFPG_TEST_CASE("irradiance records: mixtures with BSDFs of all kinds answer what they drew", "[records]") {
+WFPG_TEST_CASE("irradiance records: mixtures with any BSDF report the density of their directions",
+               "[records]") {
   const Exec exec;
   const lit_mesh<Exec> mesh(exec, patch_lamp());
   records_guider<Exec> guider(exec, mesh.scene(), records_options());
@@ -180,11 +181,10 @@ WFPG_TEST_CASE("irradiance records: mixtures with BSDFs of all kinds answer what
     const bool is_delta = host[i].technique == wfpg::sampling_technique::delta;
     CHECK(densities[i] == Approx(is_delta ? 0.0f : host[i].pdf).epsilon(1.0e-4));
   }
-  CHECK(guided > 250);  // half of the 640 that can be
+  CHECK(guided > 250);  // half of the 640 that could be guided
 }
 
-/// What the tag of a voxel is in the walled box with a lamp on the left, by the voxel's coordinates; -1 where
-/// little light grazes it.
+/// The known tag of a voxel in the walled box with a lamp on the left. -1 where little light grazes it.
 int known_tag(wfpg::uvec3 v, const wfpg::voxel_grid& grid) {
   const vec3 lower = grid.origin + vec3(v) * grid.voxel_size(), upper = lower + grid.voxel_size();
   const auto holds = [&](int axis, float x) { return lower[axis] < x && x < upper[axis]; };
@@ -198,8 +198,7 @@ int known_tag(wfpg::uvec3 v, const wfpg::voxel_grid& grid) {
   return int(voxel_tag::directly_lit);
 }
 
-WFPG_TEST_CASE("irradiance records: tags of a box with a wall across it and a lamp on one side",
-               "[records]") {
+WFPG_TEST_CASE("irradiance records: tags are right in a box with a dividing wall and a lamp", "[records]") {
   const Exec exec;
   const lit_mesh<Exec> mesh(exec, ceiling_lamp(0.1f, 0.4f, 0.3f, 0.7f, 3.0f), true);
   irradiance_records_options options = records_options();
@@ -233,7 +232,7 @@ struct has_record {
   WFPG_HD bool operator()(vec3 p) const { return view.record(p) != nullptr; }
 };
 
-WFPG_TEST_CASE("irradiance records: of places in nodes that hold surface, or in a voxel beside one",
+WFPG_TEST_CASE("irradiance records: places in a node with surface, or one voxel away, have a record",
                "[records]") {
   const Exec exec;
   const lit_mesh<Exec> mesh(exec, ceiling_lamp(0.1f, 0.4f, 0.3f, 0.7f, 3.0f), true);
@@ -267,7 +266,7 @@ WFPG_TEST_CASE("irradiance records: of places in nodes that hold surface, or in 
   }
 }
 
-WFPG_TEST_CASE("irradiance records: built once, before the first guided direction, and when light moved",
+WFPG_TEST_CASE("irradiance records: they are built before the first guided wave and after light moves",
                "[records]") {
   const Exec exec;
   const lit_mesh<Exec> mesh(exec, ceiling_lamp(0.1f, 0.4f, 0.3f, 0.7f, 3.0f), true);
@@ -287,7 +286,7 @@ WFPG_TEST_CASE("irradiance records: built once, before the first guided directio
   guider.invalidate_all();
   begin_with_wave(exec, guider, walled_box_caster());
   CHECK(guider.guide().statistics().builds == 2);
-  CHECK(everything(exec, view, places) == first);  // nothing had changed
+  CHECK(everything(exec, view, places) == first);  // nothing has changed
 
   const auto lamp = ceiling_lamp(0.7f, 0.9f, 0.3f, 0.7f, 3.0f);
   exec.copy_from_host(mesh.emitters.data(), lamp.data(), mesh.emitters.bytes());
@@ -300,7 +299,7 @@ WFPG_TEST_CASE("irradiance records: built once, before the first guided directio
   CHECK(tags[1] == voxel_tag::directly_lit);
 }
 
-WFPG_TEST_CASE("irradiance records: casters of both forms give the same bits, and may throw", "[records]") {
+WFPG_TEST_CASE("irradiance records: both forms of casters give the same bits and may throw", "[records]") {
   const Exec exec;
   const lit_mesh<Exec> mesh(exec, patch_lamp());
   std::vector<std::vector<std::uint64_t>> found;
@@ -308,7 +307,7 @@ WFPG_TEST_CASE("irradiance records: casters of both forms give the same bits, an
     records_guider<Exec> guider(exec, mesh.scene(), records_options());
     if (batch) {
       batch_box_caster::log calls;
-      calls.throw_at = 1;  // the second
+      calls.throw_at = 1;  // the second call
       const batch_box_caster caster{{}, &calls};
       CHECK_THROWS_AS(begin_with_wave(exec, guider, caster), std::runtime_error);
       CHECK(guider.guide().statistics().builds == 0);
@@ -348,8 +347,7 @@ WFPG_TEST_CASE("irradiance records: options out of range are named", "[records]"
   }
 }
 
-WFPG_TEST_CASE("irradiance records: 64 bytes each, memory is told, and rebuilding allocates nothing",
-               "[records]") {
+WFPG_TEST_CASE("irradiance records: they take 64 bytes each, and rebuilds allocate nothing", "[records]") {
   counting_resource resource;
   const Exec exec = Exec().with_resource(&resource);
   const lit_mesh<Exec> mesh(exec, patch_lamp());
@@ -369,7 +367,8 @@ WFPG_TEST_CASE("irradiance records: 64 bytes each, memory is told, and rebuildin
   CHECK(resource.allocations - allocations <= (loops_on_host ? 1 : 7));  // the test's own
 }
 
-WFPG_TEST_CASE("irradiance records: without light, without emitters and without a scene", "[records]") {
+WFPG_TEST_CASE("irradiance records: they work without light, without emitters and without a scene",
+               "[records]") {
   const Exec exec;
   const std::vector<wfpg::emitting_triangle> unsound{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, 1.0f},
                                                      {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, -1.0f},

@@ -1,5 +1,5 @@
-// What records know of light, against brute force: cones through voxels, what emitters light, directly and by
-// way of smooth surfaces, the environment; and the means of paths that they guide.
+// What irradiance records know of light, compared with brute force. Cones through voxels, direct light, light
+// through smooth surfaces, the environment. Also the means of guided paths.
 #include "support/catch.hpp"
 #include "support/estimates.hpp"
 #include "support/records.hpp"
@@ -31,7 +31,7 @@ struct glow {
   }
 };
 
-/// The unit box's voxels, whose sides have radiance that a function of their place gives.
+/// The unit box's voxels. A function of the place gives the radiance of their sides.
 template <class Exec>
 struct glowing_voxels {
   wfpg::sparse_voxel_octree<Exec> octree;
@@ -51,7 +51,7 @@ struct glowing_voxels {
     const wfpg::buffer<wfpg::voxel_tag, Exec> tags(exec, leaves);
     const wfpg::buffer<wfpg::detail::leaf_light, Exec> light(exec, leaves);
     wfpg::detail::build_voxel_normals(exec, octree, fragments, normals.view(), swapped.view());
-    // Areas of one: voxels are opaque.
+    // Areas of one make voxels opaque.
     const wfpg::buffer<float, Exec> areas(exec, std::vector<float>(leaves, 1.0f));
     exec.for_each(leaves, glow<Radiance>{tree, radiance, light.data()});
     exec.for_each(leaves, wfpg::detail::light_leaves{light.data(), areas.data(), tree.first_leaf(), 0.0f,
@@ -62,7 +62,7 @@ struct glowing_voxels {
   voxel_cones cones() const { return {octree.view(), {nodes.data(), normals.data()}}; }
 };
 
-/// Different in each voxel.
+/// Radiance that differs from voxel to voxel.
 struct speckles {
   WFPG_HD float operator()(vec3 p) const {
     const float x = 37.0f * p.x + 53.0f * p.y + 71.0f * p.z;
@@ -73,7 +73,7 @@ struct slopes {
   WFPG_HD float operator()(vec3 p) const { return 0.2f + p.x * p.y + 0.5f * p.z * p.z; }
 };
 
-/// A thin cone, and the voxel that a ray meets.
+/// Difference between a thin cone's radiance and that of the voxel that a ray hits.
 struct thin_cone {
   voxel_cones cones;
   WFPG_HD float operator()(std::size_t i) const {
@@ -92,16 +92,16 @@ struct thin_cone {
   }
 };
 
-WFPG_TEST_CASE("irradiance records: thin cones see the voxel that a ray meets", "[records]") {
+WFPG_TEST_CASE("irradiance records: thin cones see the voxel that a ray hits", "[records]") {
   const Exec exec;
   const glowing_voxels<Exec> voxels(exec, 32, speckles());
   int wrong = 0;
   for (const float difference : evaluate(exec, 4000, thin_cone{voxels.cones()}))
     wrong += difference > 1.0e-4f ? 1 : 0;
-  CHECK(wrong < 8);  // that a voxel's edge parts
+  CHECK(wrong < 8);  // cones split by a voxel's edge
 }
 
-/// A cone as wide as a record's cell, and the mean of rays in the cell.
+/// A cone as wide as a record's cell, and the mean of rays in that cell.
 struct wide_cone {
   voxel_cones cones;
   WFPG_HD vec2 operator()(std::size_t i) const {
@@ -122,7 +122,7 @@ struct wide_cone {
   }
 };
 
-WFPG_TEST_CASE("irradiance records: wide cones see about the mean of what rays see", "[records]") {
+WFPG_TEST_CASE("irradiance records: wide cones see about the mean of rays", "[records]") {
   const Exec exec;
   const glowing_voxels<Exec> voxels(exec, 32, slopes());
   double error = 0.0, bias = 0.0, known = 0.0;
@@ -135,7 +135,7 @@ WFPG_TEST_CASE("irradiance records: wide cones see about the mean of what rays s
   CHECK(std::fabs(bias) < 0.05 * known);
 }
 
-/// The six walls of the box, glowing.
+/// The six walls of the box, emitting.
 std::vector<wfpg::emitting_triangle> glowing_walls() {
   std::vector<wfpg::emitting_triangle> walls;
   const std::vector<vec3> p = box_positions();
@@ -143,7 +143,7 @@ std::vector<wfpg::emitting_triangle> glowing_walls() {
   return walls;
 }
 
-WFPG_TEST_CASE("irradiance records: in a furnace all directions above a wall are alike",
+WFPG_TEST_CASE("irradiance records: in a furnace all directions above a wall are equal",
                "[records][furnace]") {
   const Exec exec;
   const lit_mesh<Exec> mesh(exec, glowing_walls());
@@ -162,7 +162,7 @@ WFPG_TEST_CASE("irradiance records: in a furnace all directions above a wall are
   CHECK(guider.guide().statistics().objects + guider.guide().statistics().directly_lit == 0);
 }
 
-/// Radiance of the walls that the patch lights, seen from a point along a direction; 0 of the patch itself.
+/// Radiance of the walls that the patch lights, from a point along a direction. 0 for the patch itself.
 double lit_wall_radiance(vec3 from, vec3 direction, double albedo) {
   wfpg::ray r;
   r.origin = from;
@@ -182,7 +182,7 @@ double lit_wall_radiance(vec3 from, vec3 direction, double albedo) {
   return albedo * irradiance / double(wfpg::pi);
 }
 
-WFPG_TEST_CASE("irradiance records: what a lamp lights, against brute force", "[records]") {
+WFPG_TEST_CASE("irradiance records: light of a lamp agrees with brute force", "[records]") {
   const Exec exec;
   const lit_mesh<Exec> mesh(exec, patch_lamp());
   irradiance_records_options options = records_options();
@@ -211,7 +211,7 @@ WFPG_TEST_CASE("irradiance records: what a lamp lights, against brute force", "[
     for (std::uint32_t cell = 0; cell < irradiance_record::cells; ++cell)
       apart += 0.5 * std::fabs(found[cell] / all_found - known[cell] / all_known);
     INFO("place " << place.x << " " << place.y);
-    CHECK(apart < 0.2);  // of the light is in other directions
+    CHECK(apart < 0.2);  // fraction of the light in wrong directions
   }
 }
 
@@ -222,14 +222,14 @@ struct window {
     return {std::fabs(p.x - wall_x) < 1.0e-4f && p.y > 0.5f, r.direction, 1.0f};
   }
 };
-/// Sends all light back.
+/// Reflects all light back.
 struct mirrors {
   WFPG_HD wfpg::smooth_bounce operator()(std::uint32_t, const wfpg::ray& r, float, vec2) const {
     return {true, -r.direction, 1.0f};
   }
 };
 
-/// The least and largest height at which light from the lamp comes through the wall to a voxel.
+/// The lowest and highest point at which light from the lamp crosses the wall to a voxel.
 vec2 heights_at_wall(vec3 lower, vec3 upper) {
   vec2 range(2.0f, -1.0f);
   for (int i = 0; i < 8; ++i) {
@@ -269,7 +269,7 @@ WFPG_TEST_CASE("irradiance records: voxels behind a window are lit where light c
   CHECK(wrong == 0);
 }
 
-/// What a place at the far wall knows of the direction that the lamp of the window is in.
+/// What a place at the far wall knows of the direction to the lamp behind the window.
 template <class Exec, class Smooth>
 std::uint32_t seen_of_lamp(const Exec& exec, const Smooth& smooth) {
   const lit_mesh<Exec> mesh(exec, ceiling_lamp(0.1f, 0.4f, 0.3f, 0.7f, 3.0f), true);
@@ -282,9 +282,9 @@ std::uint32_t seen_of_lamp(const Exec& exec, const Smooth& smooth) {
   return record.counter(irradiance_record::cell_of(glm::normalize(lamp - place)));
 }
 
-WFPG_TEST_CASE("irradiance records: a lamp is seen through what its light goes through", "[records]") {
+WFPG_TEST_CASE("irradiance records: a lamp is seen through smooth surfaces", "[records]") {
   const Exec exec;
-  CHECK(seen_of_lamp(exec, window()) >= 8);                    // the lamp is in other cells, too
+  CHECK(seen_of_lamp(exec, window()) >= 8);                    // the lamp is in neighbouring cells too
   CHECK(seen_of_lamp(exec, wfpg::no_smooth_surfaces()) <= 1);  // no light there at all
 }
 
@@ -307,7 +307,7 @@ struct sky_caster {
   }
 };
 
-WFPG_TEST_CASE("irradiance records: the environment is seen where the octree is left", "[records]") {
+WFPG_TEST_CASE("irradiance records: cones that leave the octree see the environment", "[records]") {
   const Exec exec;
   const wfpg::buffer<vec3, Exec> positions(exec, box_positions());
   const std::vector<wfpg::uvec3> floor{{0, 4, 5}, {0, 5, 1}};
@@ -322,7 +322,7 @@ WFPG_TEST_CASE("irradiance records: the environment is seen where the octree is 
   }
 }
 
-/// What paths gather that records guide.
+/// Estimate of the radiance that paths gather under guidance of records.
 template <class Exec>
 std::vector<float> guided_paths(const Exec& exec, const irradiance_records_options& options) {
   const lit_mesh<Exec> mesh(exec, patch_lamp());
@@ -330,7 +330,7 @@ std::vector<float> guided_paths(const Exec& exec, const irradiance_records_optio
   return trace_paths(exec, guider, 16, options.max_paths, box_caster());
 }
 
-WFPG_TEST_CASE("irradiance records: what paths gather keeps its mean, variance is less, reruns are alike",
+WFPG_TEST_CASE("irradiance records: guided paths keep the mean, lower the variance, and reruns agree",
                "[records]") {
   const Exec exec;
   irradiance_records_options options = records_options(0);
@@ -345,7 +345,7 @@ WFPG_TEST_CASE("irradiance records: what paths gather keeps its mean, variance i
       INFO("fraction " << fraction << (include_emission ? "" : ", without emission"));
       options.guide_fraction = unless_zero(fraction);
       options.include_emission = include_emission;
-      options.floor = fraction == 1.0f ? 1.0f : 0.01f;  // weights are bounded, as a test of means needs
+      options.floor = fraction == 1.0f ? 1.0f : 0.01f;  // a test of means needs bounded weights
       const estimate found = estimate_of(guided_paths(exec, options));
       INFO("variance " << found.variance << ", unguided " << unguided.variance);
       CHECK(std::fabs(found.mean - unguided.mean) < 4.0 * std::sqrt(found.variance + unguided.variance));

@@ -1,5 +1,5 @@
-// What fields learn: means in 4 bytes and in 2, exact sums of what many threads say in any order, what is
-// dropped; and a field store whose fields turn to where light was found.
+// What fields learn. Means in 4 and in 2 bytes, exact sums of many threads in any order, dropped values. Also
+// a field store whose fields turn toward light that paths found.
 #include "support/evaluate.hpp"
 #include "support/fields.hpp"
 #include "support/kept_fields.hpp"
@@ -18,7 +18,7 @@ using wfpg::learnt_mean;
 using wfpg::mixed_with;
 using wfpg::stochastic_mean16;
 
-TEST_CASE("learnt mean: of up to 255 values, to a part in 2^16 each time", "[learnt_radiance]") {
+TEST_CASE("learnt mean: 255 values have a relative error of 2^-17 each", "[learnt_radiance]") {
   learnt_mean mean;
   CHECK(mean.count() == 0);
   double sum = 0.0;
@@ -35,7 +35,7 @@ TEST_CASE("learnt mean: of up to 255 values, to a part in 2^16 each time", "[lea
   CHECK(std::abs(static_cast<double>(at_once.mean()) / (sum / 255.0) - 1.0) < 1.0 / 0x1p17);
 }
 
-TEST_CASE("learnt mean: old values fade once there are 255", "[learnt_radiance]") {
+TEST_CASE("learnt mean: old values fade after 255 values", "[learnt_radiance]") {
   learnt_mean mean;
   mean.add(1000.0, 1000);
   CHECK(mean.mean() == 1.0f);
@@ -47,7 +47,7 @@ TEST_CASE("learnt mean: old values fade once there are 255", "[learnt_radiance]"
   CHECK(mean.mean() < 1e-5f);
 }
 
-TEST_CASE("learnt mean: zero, the smallest and the largest", "[learnt_radiance]") {
+TEST_CASE("learnt mean: zero, tiny and huge values keep their precision", "[learnt_radiance]") {
   learnt_mean mean;
   mean.add(0.0, 7);
   CHECK(mean.mean() == 0.0f);
@@ -59,7 +59,7 @@ TEST_CASE("learnt mean: zero, the smallest and the largest", "[learnt_radiance]"
   }
 }
 
-TEST_CASE("rough mean: exact where it can be", "[learnt_radiance]") {
+TEST_CASE("stochastic_mean16: representable means are exact", "[learnt_radiance]") {
   random_numbers random(2);
   for (std::uint32_t n : {1u, 2u, 3u, 4u, 6u, 8u, 12u, 16u, 24u, 32u, 48u, 64u, 96u, 128u, 192u})
     for (const double value : {0.0, 0x1p-63, 1.0, 1.5, 1.03125, 63.0, 0x1p63}) {
@@ -72,7 +72,8 @@ TEST_CASE("rough mean: exact where it can be", "[learnt_radiance]") {
     }
 }
 
-TEST_CASE("rough mean: of values too small or too large, the nearest there is", "[learnt_radiance]") {
+TEST_CASE("stochastic_mean16: values out of range become the nearest representable one",
+          "[learnt_radiance]") {
   for (const std::uint32_t random : {0u, 0xffffffffu}) {
     stochastic_mean16 small, large;
     small.add(1e-30, 1, random);
@@ -84,10 +85,10 @@ TEST_CASE("rough mean: of values too small or too large, the nearest there is", 
   }
 }
 
-TEST_CASE("rough mean: what it rounds it does not shift", "[learnt_radiance]") {
+TEST_CASE("stochastic_mean16: stochastic rounding is unbiased", "[learnt_radiance]") {
   random_numbers random(3);
   constexpr int trials = 20000;
-  for (const std::uint32_t values : {5u, 20u, 60u, 100u}) {  // far from where counts end
+  for (const std::uint32_t values : {5u, 20u, 60u, 100u}) {  // far below the largest count
     double means = 0.0, squares = 0.0, counts = 0.0, exact = 0.0;
     for (std::uint32_t i = 0; i < values; ++i) exact += (1.0 + i % 7) / values;
     for (int trial = 0; trial < trials; ++trial) {
@@ -99,13 +100,13 @@ TEST_CASE("rough mean: what it rounds it does not shift", "[learnt_radiance]") {
     }
     INFO(values << " values");
     const double deviation = std::sqrt(std::max(squares - means * means, 0.0) / trials);
-    // Counts that err change what values weigh, which the mean knows in second order.
+    // Errors of counts change the weights of values. This changes the mean in second order only.
     CHECK(std::abs(means - exact) < 4.0 * deviation + 0.01 * exact);
     CHECK(std::abs(counts / values - 1.0) < 0.02);
   }
 }
 
-TEST_CASE("rough mean: old values fade once there are 192", "[learnt_radiance]") {
+TEST_CASE("stochastic_mean16: old values fade after 192 values", "[learnt_radiance]") {
   random_numbers random(4);
   stochastic_mean16 mean;
   mean.add(1000.0, 1000, 0);
@@ -117,7 +118,7 @@ TEST_CASE("rough mean: old values fade once there are 192", "[learnt_radiance]")
   CHECK(mean.mean() < 1e-5f);
 }
 
-TEST_CASE("a cone counts for so many values beside a mean", "[learnt_radiance]") {
+TEST_CASE("a cone counts as several values beside a mean", "[learnt_radiance]") {
   stochastic_mean16 mean;
   CHECK(mixed_with(mean, 5.0f, 1.0f) == 5.0f);
   mean.add(6.0, 3, 0);
@@ -130,23 +131,23 @@ namespace {
 constexpr float not_a_number = std::numeric_limits<float>::quiet_NaN();
 const vec3 up(0.0f, 0.0f, 1.0f);
 
-/// Fields over hemispheres above z, of 2 x 2 cells, and what they are told.
+/// Fields over hemispheres above z, of 2 x 2 cells, and the values deposited in them.
 template <class Exec>
-struct told_fields {
+struct deposited_fields {
   static constexpr std::uint32_t cells = 4;
 
   Exec exec;
   wfpg::buffer<wfpg::resident_field, Exec> fields;
   wfpg::detail::value_queue<Exec> queue;
 
-  told_fields(std::size_t count, std::size_t capacity)
+  deposited_fields(std::size_t count, std::size_t capacity)
       : fields(exec, std::vector<wfpg::resident_field>(count, {up, 0.7f})),
         queue(exec, capacity, count * cells) {}
 
   wfpg::learnt_radiance_view view() const {
     return {const_view<wfpg::resident_field>(fields), 2, queue.view()};
   }
-  /// Mean and count of every cell, of fields that are all in use.
+  /// Mean and count of every cell. All fields are in use.
   std::vector<stochastic_mean16> means() {
     queue.sum(exec);
     wfpg::field_slot in_use;
@@ -161,32 +162,33 @@ struct told_fields {
   }
 };
 
-/// Thread i's value, over twenty orders of magnitude, and the field that it is for.
-WFPG_HD float told_value(std::uint32_t i) {
+/// Thread i's value, over twenty orders of magnitude, and its field.
+WFPG_HD float deposited_value(std::uint32_t i) {
   const float u = hashed_numbers{5}(i, 0).x;
   return std::exp(46.0f * u - 23.0f);
 }
-WFPG_HD std::uint32_t told_field(std::uint32_t i) {
+WFPG_HD std::uint32_t deposited_field(std::uint32_t i) {
   return (i * 2654435761u) >> 29;
 }
 
-WFPG_TEST_CASE("learnt radiance: means of many threads' values, whatever their order", "[learnt_radiance]") {
+WFPG_TEST_CASE("learnt radiance: means of many threads' values do not depend on the order",
+               "[learnt_radiance]") {
   constexpr std::uint32_t threads = 5000, fields = 8;
   std::vector<stochastic_mean16> first;
   for (const bool backwards : {false, true}) {
-    told_fields<Exec> told(fields, threads);
-    const wfpg::learnt_radiance_view view = told.view();
-    told.exec.for_each(threads, [=] WFPG_HD(std::size_t thread) {
+    deposited_fields<Exec> deposited(fields, threads);
+    const wfpg::learnt_radiance_view view = deposited.view();
+    deposited.exec.for_each(threads, [=] WFPG_HD(std::size_t thread) {
       const auto n = static_cast<std::uint32_t>(thread);
       const std::uint32_t i = backwards ? threads - 1 - n : n;
-      view.deposit(told_field(i), up, told_value(i));
+      view.deposit(deposited_field(i), up, deposited_value(i));
     });
-    const std::vector<stochastic_mean16> means = told.means();
+    const std::vector<stochastic_mean16> means = deposited.means();
     for (std::uint32_t field = 0; field < fields; ++field) {
       double sum = 0.0, count = 0.0;
       for (std::uint32_t i = 0; i < threads; ++i)
-        if (told_field(i) == field) {
-          sum += static_cast<double>(told_value(i));
+        if (deposited_field(i) == field) {
+          sum += static_cast<double>(deposited_value(i));
           count += 1.0;
         }
       double mean = 0.0;
@@ -200,12 +202,13 @@ WFPG_TEST_CASE("learnt radiance: means of many threads' values, whatever their o
   }
 }
 
-WFPG_TEST_CASE("learnt radiance: nonsense, and what is of no field, is dropped", "[learnt_radiance]") {
-  told_fields<Exec> told(2, 10);
-  const wfpg::learnt_radiance_view view = told.view();
+WFPG_TEST_CASE("learnt radiance: invalid values, and values without a field, are dropped",
+               "[learnt_radiance]") {
+  deposited_fields<Exec> deposited(2, 10);
+  const wfpg::learnt_radiance_view view = deposited.view();
   CHECK(!view.empty());
   CHECK(wfpg::learnt_radiance_view().empty());
-  told.exec.for_each(1, [=] WFPG_HD(std::size_t) {
+  deposited.exec.for_each(1, [=] WFPG_HD(std::size_t) {
     view.deposit(0, up, not_a_number);
     view.deposit(0, up, -1.0f);
     view.deposit(0, up, 1.0f / 0.0f);
@@ -218,7 +221,7 @@ WFPG_TEST_CASE("learnt radiance: nonsense, and what is of no field, is dropped",
     view.deposit(0, up, -0.0f);
     view.deposit(1, up, 5.0f);  // one too many
   });
-  const std::vector<stochastic_mean16> means = told.means();
+  const std::vector<stochastic_mean16> means = deposited.means();
   std::uint32_t counts[2] = {0, 0};
   float sums[2] = {0.0f, 0.0f};
   for (std::uint32_t i = 0; i < 8; ++i) {
@@ -228,12 +231,12 @@ WFPG_TEST_CASE("learnt radiance: nonsense, and what is of no field, is dropped",
   CHECK(counts[0] == 2);
   CHECK(sums[0] == 1.0f);
   CHECK(counts[1] == 1);
-  CHECK(sums[1] > 0x1.fp63f);  // the most that a mean can be
+  CHECK(sums[1] > 0x1.fp63f);  // the largest mean
 }
 
-/// One value in one call, and three in several.
+/// Deposits one value in one call, and three in several.
 template <class Exec>
-void tell(const Exec& exec, const wfpg::learnt_radiance_view& view) {
+void deposit_values(const Exec& exec, const wfpg::learnt_radiance_view& view) {
   exec.for_each(100, [=] WFPG_HD(std::size_t) {
     view.deposit(0, up, 1.0f);
     const std::uint32_t first = view.reserve(3);
@@ -242,39 +245,40 @@ void tell(const Exec& exec, const wfpg::learnt_radiance_view& view) {
   });
 }
 
-WFPG_TEST_CASE("learnt radiance: an empty view learns nothing, whatever it is told", "[learnt_radiance]") {
+WFPG_TEST_CASE("learnt radiance: an empty view drops all deposits", "[learnt_radiance]") {
   const Exec exec;
-  tell(exec, {});
+  deposit_values(exec, {});
   auto options = slots_of(16, 10, 4, false);
   const kept_box<Exec> does_not_learn(options, wfpg::guiding_mode::oriented, 0, 1000);
   CHECK(does_not_learn.store.learnt().empty());
-  tell(exec, does_not_learn.store.learnt());
+  deposit_values(exec, does_not_learn.store.learnt());
   options = slots_of(16, 10, 4, true);
   const kept_box<Exec> no_room(options);  // for values
   CHECK(no_room.store.learnt().empty());
-  tell(exec, no_room.store.learnt());
+  deposit_values(exec, no_room.store.learnt());
 }
 
-/// The share of a field's directions in the cell around one.
+/// The fraction of a field's directions in the cell around a direction.
 template <class Exec>
-double share_around(const kept_box<Exec>& box, const wfpg::guide_view& view, vec3 direction) {
-  const std::vector<float> share = evaluate(box.exec(), std::size_t(1), [=] WFPG_HD(std::size_t) {
+double fraction_around(const kept_box<Exec>& box, const wfpg::guide_view& view, vec3 direction) {
+  const std::vector<float> fraction = evaluate(box.exec(), std::size_t(1), [=] WFPG_HD(std::size_t) {
     const wfpg::directional_field field = view.mixture(0).field;
     return field.pdf(direction) * field.cell_solid_angle();
   });
-  return static_cast<double>(share[0]);
+  return static_cast<double>(fraction[0]);
 }
 
-WFPG_TEST_CASE("learnt radiance: a field turns to where light was found, and forgets", "[learnt_radiance]") {
+WFPG_TEST_CASE("learnt radiance: a field turns toward light that paths found, and forgets",
+               "[learnt_radiance]") {
   kept_box<Exec> box(slots_of(16, 100, 4, true), wfpg::guiding_mode::oriented, 0, 1000);
   box.box.cache.clear(box.exec());  // cones see nothing
   box.field.filter_alpha = 0.0f;
   const auto wave = rays_at({0.5f, 0.5f, 0.0f}, up, 20);
   const vec3 lit = glm::normalize(vec3(0.4f, 0.3f, 0.8f));
   wfpg::guide_view view = box.whole_sample(wave);
-  CHECK(share_around(box, view, lit) == Approx(1.0 / 256.0).epsilon(1e-4));
+  CHECK(fraction_around(box, view, lit) == Approx(1.0 / 256.0).epsilon(1e-4));
   box.begin();
-  view = box.settle(wave);
+  view = box.prepare_all(wave);
   const wfpg::learnt_radiance_view learnt = box.store.learnt();
   box.exec().for_each(50, [=] WFPG_HD(std::size_t) {
     const std::uint32_t field = view.mixture(0).number;
@@ -283,29 +287,28 @@ WFPG_TEST_CASE("learnt radiance: a field turns to where light was found, and for
   });
   box.end();
   view = box.whole_sample(wave);
-  CHECK(share_around(box, view, lit) > 0.98);  // but for the floor
-  CHECK(share_around(box, view, up) < 0.001);
+  CHECK(fraction_around(box, view, lit) > 0.98);  // except for the floor
+  CHECK(fraction_around(box, view, up) < 0.001);
   box.store.forget(box.exec());
-  CHECK(share_around(box, box.whole_sample(wave), lit) == Approx(1.0 / 256.0).epsilon(1e-4));
+  CHECK(fraction_around(box, box.whole_sample(wave), lit) == Approx(1.0 / 256.0).epsilon(1e-4));
 }
 
-WFPG_TEST_CASE("learnt radiance: what is told waits for a sample's end that learns", "[learnt_radiance]") {
+WFPG_TEST_CASE("learnt radiance: deposits wait for the end of a sample that learns", "[learnt_radiance]") {
   kept_box<Exec> box(slots_of(16, 100, 4, true), wfpg::guiding_mode::oriented, 0, 1000);
   box.box.cache.clear(box.exec());
   box.field.filter_alpha = 0.0f;
   const auto wave = rays_at({0.5f, 0.5f, 0.0f}, up, 20);
   box.whole_sample(wave);
   box.begin();
-  const wfpg::guide_view view = box.settle(wave);
+  const wfpg::guide_view view = box.prepare_all(wave);
   const wfpg::learnt_radiance_view learnt = box.store.learnt();
   box.exec().for_each(50, [=] WFPG_HD(std::size_t) { learnt.deposit(view.mixture(0).number, up, 4.0f); });
   box.store.end_sample(box.exec(), false);
-  CHECK(share_around(box, box.whole_sample(wave), up) == Approx(1.0 / 256.0).epsilon(1e-4));
-  CHECK(share_around(box, box.whole_sample(wave), up) > 0.98);
+  CHECK(fraction_around(box, box.whole_sample(wave), up) == Approx(1.0 / 256.0).epsilon(1e-4));
+  CHECK(fraction_around(box, box.whole_sample(wave), up) > 0.98);
 }
 
-WFPG_TEST_CASE("learnt radiance: cones count beside it, and a field that is cast anew forgets",
-               "[learnt_radiance]") {
+WFPG_TEST_CASE("learnt radiance: cones count beside it, and a field cast anew forgets", "[learnt_radiance]") {
   auto options = slots_of(16, 100, 4, true);
   options.cone_samples = 10.0f;
   kept_box<Exec> box(options, wfpg::guiding_mode::oriented, 0, 1000);
@@ -313,21 +316,21 @@ WFPG_TEST_CASE("learnt radiance: cones count beside it, and a field that is cast
   const auto wave = rays_at({0.5f, 0.5f, 0.0f}, up, 20);
   box.whole_sample(wave);
   box.begin();
-  wfpg::guide_view view = box.settle(wave);
-  const double before = share_around(box, view, up);
+  wfpg::guide_view view = box.prepare_all(wave);
+  const double before = fraction_around(box, view, up);
   const wfpg::learnt_radiance_view learnt = box.store.learnt();
   box.exec().for_each(5, [=] WFPG_HD(std::size_t) { learnt.deposit(view.mixture(0).number, up, 1000.0f); });
   box.end();
-  const double after = share_around(box, box.whole_sample(wave), up);
+  const double after = fraction_around(box, box.whole_sample(wave), up);
   CHECK(after > before);
   CHECK(after > 0.9);
   box.store.invalidate_all(box.exec());
-  CHECK(share_around(box, box.whole_sample(wave), up) == Approx(before).epsilon(0.3));
+  CHECK(fraction_around(box, box.whole_sample(wave), up) == Approx(before).epsilon(0.3));
 }
 
 }  // namespace
 
-TEST_CASE("learnt radiance: a cone's share has to be positive and finite", "[learnt_radiance]") {
+TEST_CASE("learnt radiance: cone_samples must be positive and finite", "[learnt_radiance]") {
   for (float samples : {0.0f, -1.0f, not_a_number, std::numeric_limits<float>::infinity()}) {
     auto options = slots_of(16, 10, 4, true);
     options.cone_samples = samples;

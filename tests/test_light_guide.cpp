@@ -1,5 +1,5 @@
-// Choices of lights: their probabilities sum to one and are those that choose() has, follow what was
-// deposited as a plain computation says, reach down from parents, and never leave a group of lights out.
+// Choices of lights. Probabilities sum to one, equal those of choose(), and match a plain computation from
+// deposits. They reach down from parents, and no group of lights is left out.
 #include "support/evaluate.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
@@ -18,8 +18,8 @@ using namespace wfpg_test;
 
 namespace {
 
-/// An octree over the walls of the unit box, and a guide of a few groups over it that listens to every path
-/// of samples of 3000 values.
+/// An octree over the walls of the unit box, and a guide of a few groups over it. It records every path of
+/// samples of 3000 values.
 template <class Exec>
 struct guided_box {
   Exec exec;
@@ -43,7 +43,7 @@ wfpg::light_guide_options three_groups() {
   return options;
 }
 
-/// A place of the box, and what its row says.
+/// A place in the box, and the probabilities of its row.
 struct asked_place {
   vec3 position;
   vec3 normal;
@@ -87,7 +87,7 @@ std::vector<std::uint32_t> rows_of(const guided_box<Exec>& box, const std::vecto
   return rows.to_host(box.exec);
 }
 
-/// Of each place's groups, one place after the other.
+/// Probabilities of each place's groups, one place after the other.
 template <class Exec>
 std::vector<float> probabilities_at(const guided_box<Exec>& box, const std::vector<asked_place>& places) {
   const wfpg::buffer<std::uint32_t, Exec> rows(box.exec, rows_of(box, places));
@@ -104,20 +104,20 @@ std::vector<wfpg::light_choice> choices_at(const guided_box<Exec>& box, const as
   return choices.to_host(box.exec);
 }
 
-/// What one path has to say of a choice at a place.
-struct told {
+/// A path's contribution after a choice at a place.
+struct light_deposit {
   asked_place at;
   std::uint32_t group;
-  float scattered;  ///< but for the group's probability
+  float scattered;  ///< not yet divided by the group's probability
 };
 
-struct tell {
+struct deposit_lights {
   wfpg::light_guide_view guide;
-  wfpg::array_view<const told> values;
+  wfpg::array_view<const light_deposit> values;
   WFPG_HD void operator()(std::size_t i) const {
-    const told& value = values[i];
+    const light_deposit& value = values[i];
     const std::uint32_t row = guide.find(value.at.position, value.at.normal);
-    // The number that finds the group: the middle of its interval.
+    // The number that chooses the group: the middle of its interval.
     float before = 0.0f;
     for (std::uint32_t g = 0; g < value.group; ++g) before += guide.probability(row, g);
     const wfpg::light_choice choice = guide.choose(row, before + 0.5f * guide.probability(row, value.group));
@@ -126,10 +126,10 @@ struct tell {
 };
 
 template <class Exec>
-void learn(guided_box<Exec>& box, const std::vector<told>& values, std::uint32_t seed = 1) {
-  const wfpg::buffer<told, Exec> deposited(box.exec, values);
+void learn(guided_box<Exec>& box, const std::vector<light_deposit>& values, std::uint32_t seed = 1) {
+  const wfpg::buffer<light_deposit, Exec> deposited(box.exec, values);
   box.lights.begin_sample(seed);
-  box.exec.for_each(values.size(), tell{box.lights.view(), deposited.view()});
+  box.exec.for_each(values.size(), deposit_lights{box.lights.view(), deposited.view()});
   box.lights.end_sample(box.exec);
 }
 
@@ -148,24 +148,24 @@ std::vector<asked_place> places_on_walls(std::size_t count) {
   return places;
 }
 
-std::vector<told> values_on_walls(std::size_t count) {
+std::vector<light_deposit> values_on_walls(std::size_t count) {
   random_numbers random(9);
-  std::vector<told> values;
+  std::vector<light_deposit> values;
   for (const asked_place& place : places_on_walls(count))
     values.push_back(
         {place, random.below(3), random.below(4) == 0 ? 0.0f : std::exp(random.between(-9.0f, 9.0f))});
   return values;
 }
 
-/// On the floor only one of three groups is seen. Of one alone nothing would follow: its prior may be wrong.
-std::vector<told> only_group(std::uint32_t seen, int times) {
-  std::vector<told> values;
+/// On the floor only one of three groups is seen. All three get values, since priors may be wrong.
+std::vector<light_deposit> only_group(std::uint32_t seen, int times) {
+  std::vector<light_deposit> values;
   for (int i = 0; i < times; ++i)
     for (std::uint32_t g = 0; g < 3; ++g) values.push_back({on_floor, g, g == seen ? 5.0f : 0.0f});
   return values;
 }
 
-/// As choose_light_groups documents, for one group that a row knows `mean` of from n values.
+/// The estimate that choose_light_groups documents, for a group with `mean` from n values.
 double expected_estimate(double prior, double scale, double mean, double n) {
   const double parent = 8.0;
   return (parent * scale * prior + n * mean) / (parent + n);
@@ -173,36 +173,36 @@ double expected_estimate(double prior, double scale, double mean, double n) {
 
 }  // namespace
 
-WFPG_TEST_CASE("a guide of lights that knows nothing goes by weight", "[light_guide]") {
+WFPG_TEST_CASE("a light guide without data chooses groups by weight", "[light_guide]") {
   const guided_box<Exec> box(three_groups());
   const std::vector<float> p = probabilities_at(box, {on_floor});
-  // A fifth is left to halves by weight and alike.
+  // Half of a fifth is by weight, the other half uniform.
   CHECK(p[0] == Approx(0.8 * 0.25 + 0.2 * 0.5 * (0.25 + 1.0 / 3.0)));
   CHECK(p[1] == Approx(0.8 * 0.5 + 0.2 * 0.5 * (0.5 + 1.0 / 3.0)));
   CHECK(p[0] + p[1] + p[2] == Approx(1.0));
 }
 
-WFPG_TEST_CASE("groups worth nothing have no part of the defensive choices", "[light_guide]") {
+WFPG_TEST_CASE("groups of weight 0 get no defensive probability", "[light_guide]") {
   wfpg::light_guide_options options;
   options.weights = {0.0f, 3.0f, 0.0f, 0.0f, 1.0f, 4.0f, 0.0f};
   options.floor = 0.5f;
   const guided_box<Exec> box(options);
   const std::vector<float> p = probabilities_at(box, {on_floor});
   for (std::size_t g = 0; g < p.size(); ++g) {
-    const double share = static_cast<double>(options.weights[g]) / 8.0;
+    const double fraction = static_cast<double>(options.weights[g]) / 8.0;
     const double alike = options.weights[g] > 0.0f ? 1.0 / 3.0 : 0.0;  // of three groups
     INFO("group " << g);
-    CHECK(p[g] == Approx(0.5 * share + 0.5 * 0.5 * (share + alike)));
+    CHECK(p[g] == Approx(0.5 * fraction + 0.5 * 0.5 * (fraction + alike)));
   }
 }
 
-WFPG_TEST_CASE("groups are chosen as often as their probabilities say", "[light_guide]") {
+WFPG_TEST_CASE("groups are chosen with their probabilities", "[light_guide]") {
   wfpg::light_guide_options options;
-  const auto is_worth_nothing = [](std::size_t g) { return g == 5 || g > 30; };  // the last ones, too
+  const auto is_worth_nothing = [](std::size_t g) { return g == 5 || g > 30; };  // including the last ones
   for (std::size_t g = 0; g < 33; ++g)
     options.weights.push_back(is_worth_nothing(g) ? 0.0f : static_cast<float>(1 + g % 4));
   guided_box<Exec> box(options);
-  std::vector<told> values;
+  std::vector<light_deposit> values;
   random_numbers random(4);
   for (int i = 0; i < 400; ++i) {
     const std::uint32_t group = random.below(33);
@@ -237,7 +237,7 @@ WFPG_TEST_CASE("probabilities sum to one everywhere and leave no group out", "[l
   }
 }
 
-WFPG_TEST_CASE("groups worth nothing are never chosen, whatever rounding leaves", "[light_guide]") {
+WFPG_TEST_CASE("groups of weight 0 are never chosen, whatever the rounding", "[light_guide]") {
   random_numbers random(6);
   for (int i = 0; i < 20; ++i) {
     wfpg::light_guide_options options;
@@ -253,22 +253,22 @@ WFPG_TEST_CASE("groups worth nothing are never chosen, whatever rounding leaves"
       return most;
     };
     CHECK(chance_of_last() == 0.0f);
-    std::vector<told> values;
+    std::vector<light_deposit> values;
     for (int k = 0; k < 100; ++k) values.push_back({on_floor, random.below(3), random.unit()});
     learn(box, values);
     CHECK(chance_of_last() == 0.0f);
   }
 }
 
-WFPG_TEST_CASE("a row that has learnt follows its parents and its own means", "[light_guide]") {
+WFPG_TEST_CASE("a row with data combines its parents and its own means", "[light_guide]") {
   wfpg::light_guide_options options = three_groups();
   options.resolution = 2;  // two levels: the root and its children
   guided_box<Exec> box(options);
-  // On the floor, group 0 brings nothing in 40 choices, group 1 brings 3 in 20, group 2 is not asked.
-  std::vector<told> values(40, {on_floor, 0, 0.0f});
+  // On the floor, group 0 brings nothing in 40 choices, group 1 brings 3 in 20. Group 2 is not chosen.
+  std::vector<light_deposit> values(40, {on_floor, 0, 0.0f});
   values.insert(values.end(), 20, {on_floor, 1, 3.0f});
   learn(box, values);
-  const double share[] = {0.25, 0.5, 0.25};
+  const double fraction[] = {0.25, 0.5, 0.25};
   const double mean[] = {0.0, 3.0, 0.0}, n[] = {40.0, 20.0, 0.0};
   double prior[] = {0.25, 0.5, 0.25};
   for (int level = 0; level < 2; ++level) {
@@ -282,15 +282,15 @@ WFPG_TEST_CASE("a row that has learnt follows its parents and its own means", "[
   }
   const std::vector<float> p = probabilities_at(box, {on_floor, on_wall});
   for (std::size_t g = 0; g < 3; ++g) {
-    const double defensive = 0.5 * (share[g] + 1.0 / 3.0);
+    const double defensive = 0.5 * (fraction[g] + 1.0 / 3.0);
     CHECK(p[g] == Approx(0.8 * prior[g] + 0.2 * defensive).epsilon(1e-4));
     // Nothing was learnt of surfaces that face another way.
-    CHECK(p[3 + g] == Approx(0.8 * share[g] + 0.2 * defensive).epsilon(1e-4));
+    CHECK(p[3 + g] == Approx(0.8 * fraction[g] + 0.2 * defensive).epsilon(1e-4));
   }
 }
 
-/// A path of a host: it chooses a group on the floor, draws of its lights, and says what came of it. What a
-/// group brings is between nothing and twice its mean.
+/// A path of a host. It chooses a group on the floor, samples a light, and deposits the result. A group
+/// brings between nothing and twice its mean.
 struct ask_light {
   wfpg::light_guide_view guide;
   wfpg::array_view<const float> means;
@@ -304,8 +304,7 @@ struct ask_light {
   }
 };
 
-WFPG_TEST_CASE("choices become proportional to what groups bring, however seldom they were made",
-               "[light_guide]") {
+WFPG_TEST_CASE("choices become proportional to the groups' light, however rarely chosen", "[light_guide]") {
   const std::vector<float> brings{1.0f, 4.0f, 16.0f};
   wfpg::light_guide_options options = three_groups();
   for (const std::vector<float>& weights :
@@ -320,16 +319,16 @@ WFPG_TEST_CASE("choices become proportional to what groups bring, however seldom
     }
     const std::vector<float> p = probabilities_at(box, {on_floor});
     for (std::size_t g = 0; g < 3; ++g) {
-      const double share = static_cast<double>(weights[g] / (weights[0] + weights[1] + weights[2]));
-      const double defensive = 0.5 * (share + 1.0 / 3.0), learnt = static_cast<double>(brings[g]) / 21.0;
+      const double fraction = static_cast<double>(weights[g] / (weights[0] + weights[1] + weights[2]));
+      const double defensive = 0.5 * (fraction + 1.0 / 3.0), learnt = static_cast<double>(brings[g]) / 21.0;
       INFO("group " << g << " of weight " << weights[g]);
-      // A mean of 250 choices is known to 4%. Learnt estimates would be off by 0.04 and more.
+      // The mean of 250 choices is known to 4%. Unconverged estimates would be off by 0.04 or more.
       CHECK(p[g] == Approx(0.8 * learnt + 0.2 * defensive).margin(0.01));
     }
   }
 }
 
-WFPG_TEST_CASE("where nothing was learnt nearby, choices are the parent's", "[light_guide]") {
+WFPG_TEST_CASE("places without data nearby use their parent's choices", "[light_guide]") {
   guided_box<Exec> box(three_groups());
   learn(box, only_group(2, 100));
   const asked_place beside{{0.2f, 0.0f, 0.3f}, {0.0f, 1.0f, 0.0f}};
@@ -339,8 +338,8 @@ WFPG_TEST_CASE("where nothing was learnt nearby, choices are the parent's", "[li
   CHECK(p[5] < p[2]);
 }
 
-WFPG_TEST_CASE("what is learnt does not depend on the order of deposits", "[light_guide]") {
-  std::vector<told> values = values_on_walls(3000);
+WFPG_TEST_CASE("learnt choices do not depend on the order of deposits", "[light_guide]") {
+  std::vector<light_deposit> values = values_on_walls(3000);
   guided_box<Exec> box(three_groups()), other(three_groups());
   learn(box, values);
   random_numbers random(2);
@@ -350,11 +349,11 @@ WFPG_TEST_CASE("what is learnt does not depend on the order of deposits", "[ligh
   CHECK(probabilities_at(box, places) == probabilities_at(other, places));
 }
 
-WFPG_TEST_CASE("of many paths another part is listened to in each sample", "[light_guide]") {
+WFPG_TEST_CASE("each sample records another part of many paths", "[light_guide]") {
   wfpg::light_guide_options options = three_groups();
   options.resolution = 1;
   constexpr std::size_t paths = 32768;  // 384 are wanted
-  std::vector<told> values(paths, {on_floor, 0, 0.0f});
+  std::vector<light_deposit> values(paths, {on_floor, 0, 0.0f});
   for (std::size_t i = 0; i < paths; i += 2) values[i] = {on_floor, 1, 1.0f};
   const auto learnt = [&](std::uint32_t seed) {
     guided_box<Exec> box(options, paths);
@@ -363,32 +362,32 @@ WFPG_TEST_CASE("of many paths another part is listened to in each sample", "[lig
     return probabilities_at(box, {on_floor});
   };
   CHECK(learnt(1)[1] > 0.6f);
-  // What groups bring depends on who is heard.
+  // Contributions differ between paths, so another selection gives other choices.
   for (std::size_t i = 0; i < paths; ++i)
     values[i].scattered = static_cast<float>(values[i].group == 1 ? i : paths - i);
   CHECK(learnt(1) == learnt(1));
   CHECK(learnt(1) != learnt(2));
 }
 
-WFPG_TEST_CASE("choices forget, and drop what cannot be", "[light_guide]") {
+WFPG_TEST_CASE("choices forget light, and invalid deposits are dropped", "[light_guide]") {
   guided_box<Exec> box(three_groups(), 100);
   const std::vector<float> before = probabilities_at(box, {on_floor});
   const float nan = std::numeric_limits<float>::quiet_NaN(),
               infinite = std::numeric_limits<float>::infinity();
   learn(box, {{on_floor, 0, nan}, {on_floor, 0, -1.0f}, {on_floor, 0, infinite}});
   CHECK(probabilities_at(box, {on_floor}) == before);
-  learn(box, only_group(0, 300));  // nine times what the queue holds
+  learn(box, only_group(0, 300));  // nine times the queue's capacity
   const std::vector<float> after = probabilities_at(box, {on_floor});
   CHECK(after[0] > 0.6f);
   box.lights.forget(box.exec);
   CHECK(probabilities_at(box, {on_floor}) == before);
-  // A host that never says how many choices a sample has can ask, and nothing is learnt.
+  // A host that never gives the number of choices may call choose(), but nothing is learnt.
   guided_box<Exec> silent(three_groups(), 0);
   learn(silent, only_group(0, 10));
   CHECK(probabilities_at(silent, {on_floor}) == before);
 }
 
-WFPG_TEST_CASE("places that the octree does not know have the root's choices", "[light_guide]") {
+WFPG_TEST_CASE("places outside the octree use the root's choices", "[light_guide]") {
   guided_box<Exec> box(three_groups());
   const asked_place outside{{40.0f, 0.0f, 0.0f}, {0.0f, 1.0f, 0.0f}};
   learn(box, only_group(2, 100));
@@ -398,7 +397,7 @@ WFPG_TEST_CASE("places that the octree does not know have the root's choices", "
   CHECK(probabilities_at(box, {outside})[2] > 0.4f);
 }
 
-WFPG_TEST_CASE("options of light groups that cannot be are refused by name", "[light_guide]") {
+WFPG_TEST_CASE("invalid options of light groups are refused by name", "[light_guide]") {
   const auto refused = [](const wfpg::light_guide_options& options, const std::string& name) {
     try {
       guided_box<Exec> box(options);

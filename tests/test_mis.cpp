@@ -1,5 +1,5 @@
-// Multiple importance sampling: the heuristics, and the mixture of a field and a BSDF of one lobe or two,
-// whose density has to be how often it draws a direction.
+// Multiple importance sampling: the heuristics, and mixtures of a field and a BSDF of one or two lobes. A
+// mixture's density must match the frequency of its directions.
 #include "support/evaluate.hpp"
 #include "support/fields.hpp"
 #include "support/policies.hpp"
@@ -42,7 +42,7 @@ std::vector<sampled_direction> draw(const Exec& exec, const guide_mixture& mixtu
   return drawn.to_host(exec);
 }
 
-/// What a mixture says of the density of directions.
+/// The mixture's density of directions.
 template <class Surface>
 struct mixture_pdf {
   guide_mixture mixture;
@@ -57,7 +57,7 @@ struct field_pdf {
   WFPG_HD float operator()(vec3 direction) const { return field.pdf(direction); }
 };
 
-/// The same of what was drawn, by the policy that drew it.
+/// The density of sampled directions, evaluated on the policy that sampled them.
 template <class Exec, class Pdf>
 std::vector<float> densities(const Exec& exec, const Pdf& pdf, const std::vector<sampled_direction>& drawn) {
   std::vector<vec3> directions;
@@ -224,10 +224,10 @@ WFPG_TEST_CASE("MIS: a BSDF whose sampling fails ends the path", "[mis]") {
     }
 }
 
-/// A cosine and a lobe about the mirrored direction. One of the two is chosen by probability, and the density
-/// is the sum. It does not tell that it has parts.
+/// A cosine lobe and a lobe about the mirrored direction. A random number chooses one, and the density is the
+/// sum. It does not report its parts.
 struct two_lobes {
-  static constexpr float narrow_share = 0.4f;
+  static constexpr float narrow_fraction = 0.4f;
 
   test_bsdf wide, narrow;
 
@@ -240,27 +240,27 @@ struct two_lobes {
     return 0.3f * wide.eval(outgoing, incident) + 0.6f * narrow.eval(outgoing, incident);
   }
   WFPG_HD float pdf(vec3 outgoing, vec3 incident) const {
-    return (1.0f - narrow_share) * wide.pdf(outgoing, incident) +
-           narrow_share * narrow.pdf(outgoing, incident);
+    return (1.0f - narrow_fraction) * wide.pdf(outgoing, incident) +
+           narrow_fraction * narrow.pdf(outgoing, incident);
   }
   WFPG_HD wfpg::bsdf_sample sample(vec3 outgoing, vec2 u) const {
-    const bool is_narrow = u.x < narrow_share;
-    const float rest = is_narrow ? u.x / narrow_share : (u.x - narrow_share) / (1.0f - narrow_share);
+    const bool is_narrow = u.x < narrow_fraction;
+    const float rest = is_narrow ? u.x / narrow_fraction : (u.x - narrow_fraction) / (1.0f - narrow_fraction);
     wfpg::bsdf_sample drawn = (is_narrow ? narrow : wide).sample(outgoing, {std::fmin(rest, 0.999999f), u.y});
     if (drawn.pdf > 0.0f) drawn.pdf = pdf(outgoing, drawn.direction);
     return drawn;
   }
 };
 
-/// Tells how narrow the lobe is, so that it is guided less.
-struct told_lobes : two_lobes {
+/// Reports how narrow the lobe is, so that it is guided less.
+struct reported_lobes : two_lobes {
   using two_lobes::two_lobes;
-  WFPG_HD wfpg::glossy_part glossy(vec3) const { return {narrow_share, 0.2f}; }
+  WFPG_HD wfpg::glossy_part glossy(vec3) const { return {narrow_fraction, 0.2f}; }
 };
 
-/// Also draws each of its lobes alone.
-struct separate_lobes : told_lobes {
-  using told_lobes::told_lobes;
+/// Also samples each of its lobes alone.
+struct separate_lobes : reported_lobes {
+  using reported_lobes::reported_lobes;
   WFPG_HD wfpg::bsdf_sample sample_part(bool glossy, vec3 outgoing, vec2 u) const {
     return (glossy ? narrow : wide).sample(outgoing, u);
   }
@@ -270,7 +270,7 @@ struct separate_lobes : told_lobes {
 };
 
 static_assert(wfpg::is_bsdf_v<two_lobes> && !wfpg::has_glossy_part_v<two_lobes>);
-static_assert(wfpg::is_bsdf_v<told_lobes> && !wfpg::has_separate_parts_v<told_lobes>);
+static_assert(wfpg::is_bsdf_v<reported_lobes> && !wfpg::has_separate_parts_v<reported_lobes>);
 static_assert(wfpg::is_bsdf_v<separate_lobes> && wfpg::has_separate_parts_v<separate_lobes>);
 
 float sky(vec3 d) {
@@ -293,8 +293,7 @@ double reflected(const wfpg::surface<Bsdf>& s) {
   return sum * 4.0 * pi / (rows * columns);
 }
 
-/// How many standard errors the estimate lies off the exact value, with densities less what `missing` says of
-/// a direction.
+/// Standard errors between the estimate and the exact value. `missing` is subtracted from the densities.
 template <class Bsdf, class Missing>
 double deviation(const wfpg::surface<Bsdf>& s, const std::vector<sampled_direction>& drawn, double exact,
                  const Missing& missing) {
@@ -311,12 +310,12 @@ double deviation(const wfpg::surface<Bsdf>& s, const std::vector<sampled_directi
   return (mean - exact) / std::sqrt((squares / n - mean * mean) / n);
 }
 
-/// A mixture of fields and a BSDF of two lobes: its frequencies, its shares, and what it estimates. A density
-/// that lacks one of the lobes would be found.
+/// Checks frequencies, fractions and estimates of a mixture of fields and a BSDF of two lobes. A density
+/// without one of the lobes would be found.
 template <class Bsdf, class Exec>
 void check_two_lobes(const Exec& exec, chi_square_family& family) {
   constexpr std::size_t samples = 40000;
-  const vec3 outgoing = glm::normalize(up + vec3(0.25f, 0.0f, 0.1f));  // no part of the lobe is cut off
+  const vec3 outgoing = glm::normalize(up + vec3(0.25f, 0.0f, 0.1f));  // the whole lobe is above the surface
   const wfpg::surface<Bsdf> s{{}, up, up, outgoing, Bsdf(up), true};
   const double exact = reflected(s);
   const built_field<Exec> built(exec, field_values(field_kind::noise, 16, 3), 16, 0.05f);
@@ -335,15 +334,15 @@ void check_two_lobes(const Exec& exec, chi_square_family& family) {
       family.add(report.frequencies, "BSDF " + std::to_string(family.size()));
     }
 
-    const wfpg::mixture_fractions shares = mixture.fractions_of(s);
-    CHECK(shares.guide + shares.glossy + shares.smooth == Approx(1.0f));
-    const double guide = double(shares.guide), guided = double(count(drawn, sampling_technique::guide));
+    const wfpg::mixture_fractions parts = mixture.fractions_of(s);
+    CHECK(parts.guide + parts.glossy + parts.smooth == Approx(1.0f));
+    const double guide = double(parts.guide), guided = double(count(drawn, sampling_technique::guide));
     CHECK(std::abs(guided / samples - guide) <= 4.0 * std::sqrt(guide * (1.0 - guide) / samples));
 
     CHECK(std::abs(deviation(s, drawn, exact, [](vec3) { return 0.0f; })) < 4.0);
-    const bool apart = shares.glossy > 0.0f;
-    const float narrow = apart ? shares.glossy : shares.smooth * Bsdf::narrow_share;
-    const float wide = apart ? shares.smooth : shares.smooth * (1.0f - Bsdf::narrow_share);
+    const bool apart = parts.glossy > 0.0f;
+    const float narrow = apart ? parts.glossy : parts.smooth * Bsdf::narrow_fraction;
+    const float wide = apart ? parts.smooth : parts.smooth * (1.0f - Bsdf::narrow_fraction);
     const auto of_narrow = [&](vec3 d) { return narrow * s.bsdf.narrow.pdf(outgoing, d); };
     const auto of_wide = [&](vec3 d) { return wide * s.bsdf.wide.pdf(outgoing, d); };
     CHECK(deviation(s, drawn, exact, of_narrow) > 8.0);
@@ -351,12 +350,11 @@ void check_two_lobes(const Exec& exec, chi_square_family& family) {
   }
 }
 
-WFPG_TEST_CASE("MIS: of a BSDF of two lobes the density is that of both, and estimates have no bias",
-               "[mis]") {
+WFPG_TEST_CASE("MIS: with a BSDF of two lobes the density has both, and estimates have no bias", "[mis]") {
   const Exec exec;
   chi_square_family family;
   check_two_lobes<two_lobes>(exec, family);
-  check_two_lobes<told_lobes>(exec, family);
+  check_two_lobes<reported_lobes>(exec, family);
   check_two_lobes<separate_lobes>(exec, family);
   INFO(family.message());
   CHECK(family.accepted());

@@ -39,7 +39,7 @@ std::vector<uvec3> coordinates() {
   return points;
 }
 
-WFPG_TEST_CASE("Morton codes round trip", "[morton]") {
+WFPG_TEST_CASE("a point's Morton code round trips", "[morton]") {
   const Exec exec;
   const std::vector<uvec3> points = coordinates();
   const wfpg::buffer<uvec3, Exec> device_points(exec, points), decoded(exec, points.size());
@@ -56,7 +56,7 @@ WFPG_TEST_CASE("Morton codes round trip", "[morton]") {
   CHECK((codes.to_host(exec) == expected));
 }
 
-TEST_CASE("Morton codes round trip from every bit of a code", "[morton]") {
+TEST_CASE("every bit of a Morton code round trips", "[morton]") {
   for (int bit = 0; bit < 63; ++bit) {
     const morton_code code = morton_code(1) << bit;
     REQUIRE(wfpg::morton_encode(wfpg::morton_decode(code)) == code);

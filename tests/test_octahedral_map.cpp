@@ -38,7 +38,7 @@ struct hemisphere {
   WFPG_HD static bool covers(vec3 d) { return d.z >= 0.0f; }
 };
 
-/// Points of the square: a grid with its edges, its diagonals, points close to them, and random ones.
+/// Points of the square: a grid with its edges, its diagonals, points close to them, and random points.
 std::vector<vec2> square_points() {
   std::vector<vec2> points;
   for (int x = 0; x <= 32; ++x)
@@ -59,7 +59,7 @@ std::vector<vec2> square_points() {
   return points;
 }
 
-/// Axes, edges of the octants, directions close to the poles and the equator, random ones.
+/// Axes, edges of the octants, directions close to the poles and the equator, random directions.
 std::vector<vec3> directions() {
   std::vector<vec3> all;
   for (int i = 0; i < 27; ++i)
@@ -77,7 +77,7 @@ std::vector<vec3> directions() {
   return all;
 }
 
-/// Round trips of all points, computed by the policy.
+/// Round trips of all points, computed on the policy.
 template <class Map, class Exec>
 void check_square_round_trip(const Exec& exec) {
   const std::vector<vec2> points = square_points();
@@ -118,17 +118,17 @@ void check_direction_round_trip(const Exec& exec) {
   CHECK(far == 0);
 }
 
-WFPG_TEST_CASE("octahedral round trips from the square", "[octahedral_map]") {
+WFPG_TEST_CASE("points of the square round trip through the octahedral map", "[octahedral_map]") {
   check_square_round_trip<sphere>(Exec());
   check_square_round_trip<hemisphere>(Exec());
 }
 
-WFPG_TEST_CASE("octahedral round trips from directions", "[octahedral_map]") {
+WFPG_TEST_CASE("directions round trip through the octahedral map", "[octahedral_map]") {
   check_direction_round_trip<sphere>(Exec());
   check_direction_round_trip<hemisphere>(Exec());
 }
 
-TEST_CASE("poles and edges of the octahedral map", "[octahedral_map]") {
+TEST_CASE("poles and edges of the octahedral map have known places", "[octahedral_map]") {
   const auto close = [](vec3 a, vec3 b) { return angle_between(a, b) < 1.0e-6; };
   CHECK(close(wfpg::square_to_sphere({0.5f, 0.5f}), {0, 0, 1}));
   for (const float u : {0.0f, 1.0f})
@@ -173,7 +173,7 @@ WFPG_HD double cell_area(int x, int y, int size, int steps) {
   return std::abs(area);
 }
 
-/// The largest relative error of any cell's area, and that of their sum.
+/// The largest relative error of any cell's area, and the error of their sum.
 template <class Map, class Exec>
 void check_areas(const Exec& exec, int size, int steps) {
   const std::size_t cells = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
@@ -201,7 +201,7 @@ WFPG_TEST_CASE("the octahedral map preserves area to 1e-5", "[octahedral_map]") 
   check_areas<hemisphere>(exec, 7, 1000);
 }
 
-/// How many corners two cells have in common on the sphere.
+/// How many corners two cells share on the sphere.
 int shared_corners(int ax, int ay, int bx, int by, int size) {
   int shared = 0;
   for (int i = 0; i < 4; ++i)
@@ -232,11 +232,12 @@ TEST_CASE("wrapped cells are neighbours on the sphere", "[octahedral_map]") {
     };
     for (int along = 0; along < size; ++along)
       for (int across = -size; across < 2 * size - 1; ++across) {
-        compare(across, along, 1, 0, 2);  // each step crosses one edge, out of the grid and beyond
+        compare(across, along, 1, 0, 2);  // each step crosses one edge, inside and outside of the grid
         compare(along, across, 0, 1, 2);
       }
     for (int along = 0; along < size; ++along)
-      for (const int outside : {-1, size}) {  // over an edge, not back through it, but for its middle
+      for (const int outside :
+           {-1, size}) {  // outside points do not mirror to the same row, except in the edge's middle
         const int inside = outside < 0 ? 0 : size - 1;
         const bool middle = 2 * along + 1 == size;
         stuck += (wrapped(outside, along, size).y == along) != middle ? 1 : 0;

@@ -1,4 +1,4 @@
-// The partitioner against std::stable_sort.
+// The partitioner, compared with std::stable_sort.
 #include "support/catch.hpp"
 #include "support/evaluate.hpp"
 #include "support/policies.hpp"
@@ -18,7 +18,7 @@ using indices = std::vector<std::uint32_t>;
 
 constexpr std::uint32_t excluded = 0xffffffffu;
 
-/// What a partition has to be: included indices by key, the begin of each group and the end of the last.
+/// The expected partition: included indices by key, the begin of each group and the end of the last.
 struct expected_partition {
   indices permutation, offsets, keys;
 };
@@ -41,7 +41,7 @@ expected_partition sorted_stably(const indices& keys) {
   return expected;
 }
 
-/// What a view says of a group.
+/// A group as a view reports it.
 struct group_record {
   std::uint32_t key, begin, size;
 };
@@ -96,7 +96,7 @@ WFPG_TEST_CASE("partition equals a stable sort", "[partitioner]") {
   check_partition(exec, partitioner, random_keys(3, 2, 0.0f, 5));
 }
 
-WFPG_TEST_CASE("partition of edge cases", "[partitioner]") {
+WFPG_TEST_CASE("partitions are right in edge cases", "[partitioner]") {
   const Exec exec;
   wfpg::partitioner<Exec> partitioner(exec, 1000);
   check_partition(exec, partitioner, {});

@@ -1,5 +1,5 @@
-// The facade: options, waves of unusual rays, deposits and drops, memory, statistics, failures. What
-// directions it draws is test_path_guider_sampling.cpp's.
+// The facade: options, waves of unusual rays, deposits and drops, memory, statistics, failures.
+// test_path_guider_sampling.cpp tests the sampled directions.
 #include "support/guiding.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
@@ -25,7 +25,7 @@ constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
 struct bad_option {
-  const char* name;  ///< that the message has to contain
+  const char* name;  ///< must be in the message
   std::function<void(guider_options&)> spoil;
 };
 
@@ -100,7 +100,7 @@ WFPG_TEST_CASE("path guider: options out of range are named", "[path_guider]") {
   CHECK(refusal([&] { octree_guider<Exec>(exec, mesh.view(), good); }).empty());
 }
 
-WFPG_TEST_CASE("path guider: waves beyond the capacity, and outputs that are too small", "[path_guider]") {
+WFPG_TEST_CASE("path guider: waves beyond the capacity and too small outputs are refused", "[path_guider]") {
   for (field_lifetime lifetime : lifetimes) {
     guided_box<Exec> box(lifetime);
     box.learn();
@@ -121,7 +121,7 @@ WFPG_TEST_CASE("path guider: waves beyond the capacity, and outputs that are too
   }
 }
 
-WFPG_TEST_CASE("path guider: no rays, and no capacity for any", "[path_guider]") {
+WFPG_TEST_CASE("path guider: waves without rays work, even with a capacity of 0", "[path_guider]") {
   for (field_lifetime lifetime : lifetimes) {
     guided_box<Exec> box(lifetime);
     box.learn();
@@ -142,7 +142,7 @@ WFPG_TEST_CASE("path guider: no rays, and no capacity for any", "[path_guider]")
   }
 }
 
-/// What a ray's BSDF draws alone, and its density of that.
+/// The direction that a ray's BSDF samples alone, and its density.
 struct sample_of_bsdf {
   stored_surfaces surfaces;
   WFPG_HD wfpg::bsdf_sample operator()(std::size_t i) const {
@@ -181,7 +181,7 @@ WFPG_TEST_CASE("path guider: rays outside every voxel are counted and sampled by
   }
 }
 
-WFPG_TEST_CASE("path guider: inactive rays of the capacity get nothing and disturb nobody", "[path_guider]") {
+WFPG_TEST_CASE("path guider: inactive rays get no direction and change no other ray", "[path_guider]") {
   for (field_lifetime lifetime : lifetimes) {
     guided_box<Exec> box(lifetime);
     box.learn();
@@ -202,7 +202,7 @@ WFPG_TEST_CASE("path guider: inactive rays of the capacity get nothing and distu
     }
     CHECK(wrong == 0);
     const auto after = box.guider.statistics().depths[0];
-    CHECK(after.rays - before.rays == 600);  // neither inactive ones nor mirrors
+    CHECK(after.rays - before.rays == 600);  // neither inactive rays nor mirrors
     CHECK(after.unbinned == before.unbinned);
 
     std::vector<test_surface> all_inactive(50, test_surface{});
@@ -266,10 +266,10 @@ int count_toward_patch(field_lifetime lifetime) {
 
 WFPG_TEST_CASE("path guider: an octree from hit points and bounds guides", "[path_guider]") {
   for (field_lifetime lifetime : lifetimes)
-    CHECK(count_toward_patch<Exec>(lifetime) > 200);  // of cosine-distributed ones about 60
+    CHECK(count_toward_patch<Exec>(lifetime) > 200);  // about 60 of cosine-distributed directions
 }
 
-/// One path each.
+/// Records one path with invalid values.
 struct record_nonsense {
   wfpg::path_recorder_view recorder;
   stored_surfaces surfaces;
@@ -288,8 +288,7 @@ struct record_nonsense {
   }
 };
 
-WFPG_TEST_CASE("path guider: what is not finite is dropped and counted, and guiding goes on",
-               "[path_guider]") {
+WFPG_TEST_CASE("path guider: values that are not finite are dropped and counted", "[path_guider]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   for (field_lifetime lifetime : lifetimes) {
@@ -319,7 +318,7 @@ WFPG_TEST_CASE("path guider: vertices out of range are dropped and counted", "[p
     const vec3 nowhere(0.0f), up(0, 1, 0), one(1.0f);
     recorder.vertex(4, 0, nowhere, up, one);  // no such path
     recorder.vertex(0, 3, nowhere, up, one);  // no such depth
-    recorder.vertex(0, 1, nowhere, up, one);  // not in order
+    recorder.vertex(0, 1, nowhere, up, one);  // out of order
     recorder.radiance(0, 0, one);             // no such vertex
     recorder.emission(7, 0, one);
     recorder.emission(0, 5, one);
@@ -332,9 +331,9 @@ WFPG_TEST_CASE("path guider: vertices out of range are dropped and counted", "[p
   guider.end_sample();
 }
 
-WFPG_TEST_CASE("path guider: a caster that throws leaves it usable", "[path_guider]") {
+WFPG_TEST_CASE("path guider: an exception in a caster leaves the guider usable", "[path_guider]") {
   guider_options options = box_options(guiding_mode::oriented, field_lifetime::transient);
-  options.caster_buffer_bytes = 1;  // a bin a call
+  options.caster_buffer_bytes = 1;  // one bin per call
   guided_box<Exec> box(options), other(options);
   box.learn();
   other.learn();
@@ -359,10 +358,9 @@ WFPG_TEST_CASE("path guider: a caster that throws leaves it usable", "[path_guid
   CHECK(box.sample(surfaces).size() == surfaces.size());
 }
 
-WFPG_TEST_CASE("path guider: a caster that throws leaves kept fields to be built by the next wave",
-               "[path_guider]") {
+WFPG_TEST_CASE("path guider: after a caster throws, the next wave builds the kept fields", "[path_guider]") {
   guider_options options = box_options();
-  options.caster_buffer_bytes = 1;  // a field a call
+  options.caster_buffer_bytes = 1;  // one field per call
   guided_box<Exec> box(options), other(options);
   box.learn();
   other.learn();
@@ -376,7 +374,7 @@ WFPG_TEST_CASE("path guider: a caster that throws leaves kept fields to be built
     failing.calls = 0;
     CHECK_THROWS_AS(box.guider.prepare(wave.get(), batch_box_caster{{}, &failing}), std::runtime_error);
     in_use.push_back(box.guider.memory().transient());
-    other.sample_again(surfaces);  // so that as many rays are counted
+    other.sample_again(surfaces);  // counts as many rays
     other.sample(surfaces);
     const auto expected = other.sample_again(surfaces);
     CHECK(same_bits(box.sample_again(surfaces, batch_box_caster{{}, &log}), expected));
@@ -390,7 +388,7 @@ WFPG_TEST_CASE("path guider: a caster that throws leaves kept fields to be built
   CHECK(in_use.back() == in_use[2]);  // nothing leaks
 }
 
-WFPG_TEST_CASE("path guider: without room for fields rays are their BSDF's, and statistics say so",
+WFPG_TEST_CASE("path guider: rays without a field sample their BSDF, and statistics count them",
                "[path_guider]") {
   for (const bool no_budget : {true, false}) {
     guider_options options = box_options();
@@ -417,7 +415,7 @@ WFPG_TEST_CASE("path guider: without room for fields rays are their BSDF's, and 
   }
 }
 
-/// Cones that a sample of one wave casts.
+/// The number of cones that a sample of one wave casts.
 template <class Exec>
 std::size_t cones_of_sample(guided_box<Exec>& box, const std::vector<test_surface>& surfaces) {
   batch_box_caster::log log;
@@ -432,7 +430,8 @@ struct pdf_of_first_ray {
   WFPG_HD float operator()() const { return view.pdf(0, direction); }
 };
 
-WFPG_TEST_CASE("path guider: what moved is cast anew, light that moved is not", "[path_guider]") {
+WFPG_TEST_CASE("path guider: fields near moved geometry are cast again, near moved light not",
+               "[path_guider]") {
   guided_box<Exec> box;
   box.learn();
   const std::vector<test_surface> surfaces(300, make_surface({0.5f, 0, 0.5f}, {0, 1, 0}, {0, 1, 0}));
@@ -453,7 +452,7 @@ WFPG_TEST_CASE("path guider: what moved is cast anew, light that moved is not", 
   CHECK(toward_patch() > 1.0f);
   box.guider.forget_light();
   CHECK(cones_of_sample(box, surfaces) == refreshed);
-  CHECK(toward_patch() == Approx(0.5f / wfpg::pi));  // all dark: uniform over the hemisphere
+  CHECK(toward_patch() == Approx(0.5f / wfpg::pi));  // no light: uniform over the hemisphere
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
-// Hosts at fault: casters that throw or answer nonsense, BSDFs and surfaces that are not finite, random
-// numbers at the ends of their range. No density is NaN, infinite or negative, and the guider goes on.
+// Faulty hosts: casters that throw or return invalid hits, BSDFs and surfaces that are not finite. Also
+// random numbers at the ends of their range. No density is NaN, infinite or negative, and the guider stays
+// usable.
 #include "support/catch.hpp"
 #include "support/evaluate.hpp"
 #include "support/guiding.hpp"
@@ -26,7 +27,7 @@ using wfpg::sampling_technique;
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
-/// f(options) of both lifetimes and modes, with and without products.
+/// Calls f(options) for both lifetimes and modes, with and without products.
 template <class F>
 void for_each_kind(const F& f) {
   for (const field_lifetime lifetime : lifetimes)
@@ -43,7 +44,7 @@ WFPG_HD bool is_density(float density) {
   return density >= 0.0f && wfpg::is_finite(density);
 }
 
-/// Whether a direction may be handed out: finite, with a density, or none.
+/// Whether a direction is valid: finite and with a density, or none.
 bool is_sound(const sampled_direction& d) {
   if (d.technique == sampling_technique::none) return d.pdf == 0.0f;
   return d.pdf > 0.0f && is_density(d.pdf) && wfpg::is_finite(d.direction);
@@ -56,7 +57,7 @@ std::size_t count_unsound(const std::vector<sampled_direction>& drawn) {
 }
 
 #if !defined(__CUDACC__)
-/// Inline; throws from one of its calls on.
+/// Inline caster that throws from one of its calls on.
 struct throwing_caster {
   std::atomic<int>* left;
 
@@ -66,7 +67,8 @@ struct throwing_caster {
   }
 };
 
-WFPG_TEST_CASE("path guider: an inline caster that throws leaves it usable", "[path_guider][faults]") {
+WFPG_TEST_CASE("path guider: an exception in an inline caster leaves the guider usable",
+               "[path_guider][faults]") {
   for_each_kind([](const guider_options& options) {
     guided_box<Exec> box(options), other(options);
     box.learn();
@@ -86,7 +88,7 @@ WFPG_TEST_CASE("path guider: an inline caster that throws leaves it usable", "[p
 }
 #endif
 
-/// Every other answer is none.
+/// Every other hit is invalid.
 struct nonsense_caster {
   WFPG_HD wfpg::ray_hit operator()(const wfpg::ray& r) const {
     const float answers[] = {nan, -nan, infinity, -infinity, 3.0e38f, -3.0e38f, -1.0f};
@@ -104,7 +106,7 @@ struct batch_nonsense_caster {
   }
 };
 
-WFPG_TEST_CASE("path guider: distances and radiance that are none are darkness", "[path_guider][faults]") {
+WFPG_TEST_CASE("path guider: invalid distances and radiance count as darkness", "[path_guider][faults]") {
   for_each_kind([](const guider_options& options) {
     guided_box<Exec> box(options);
     box.learn();
@@ -116,7 +118,7 @@ WFPG_TEST_CASE("path guider: distances and radiance that are none are darkness",
   });
 }
 
-/// Answers nonsense instead of what a Lambertian surface would, in one of its functions, on request.
+/// A Lambertian. One of its functions returns invalid values on request.
 struct faulty_bsdf {
   static constexpr std::uint32_t kinds = 5 * 5;
 
@@ -141,7 +143,7 @@ struct faulty_bsdf {
   }
 };
 
-/// The same in parts, half of it glossy.
+/// A faulty BSDF in parts, half of it glossy.
 struct faulty_parts : faulty_bsdf {
   WFPG_HD wfpg::glossy_part glossy(vec3) const { return {0.5f, 0.3f}; }
   WFPG_HD wfpg::bsdf_sample sample_part(bool, vec3 wo, vec2 u) const { return sample(wo, u); }
@@ -160,7 +162,7 @@ struct faulty_surfaces {
   }
 };
 
-/// Directions of all kinds.
+/// Queries of directions of all kinds.
 struct faulty_queries {
   WFPG_HD vec3 operator()(std::uint32_t ray) const {
     if (ray % 7 == 0) return vec3(nan);
@@ -170,7 +172,7 @@ struct faulty_queries {
   }
 };
 
-/// Whether a view's answer to a query is no density.
+/// Whether a view's answer to a query is an invalid density.
 template <class Bsdf>
 struct ask_densities {
   wfpg::guide_view view;
@@ -205,10 +207,10 @@ void check_faulty_bsdfs(guided_box<Exec>& box, bsdf_kind kind) {
   CHECK(count_where(box.exec, host.size(), asks_unsound) == 0);
 }
 
-WFPG_TEST_CASE("path guider: what a BSDF says that is no density counts as none", "[path_guider][faults]") {
+WFPG_TEST_CASE("path guider: invalid densities of a BSDF count as none", "[path_guider][faults]") {
   for_each_kind([](const guider_options& options) {
     guided_box<Exec> box(options);
-    check_faulty_bsdfs<faulty_bsdf>(box, bsdf_kind::lambert);  // of an unguided sample, too
+    check_faulty_bsdfs<faulty_bsdf>(box, bsdf_kind::lambert);  // of an unguided sample too
     box.learn();
     for (const bsdf_kind kind : {bsdf_kind::lambert, bsdf_kind::mirror}) {
       check_faulty_bsdfs<faulty_bsdf>(box, kind);
@@ -219,7 +221,7 @@ WFPG_TEST_CASE("path guider: what a BSDF says that is no density counts as none"
   });
 }
 
-/// A third of them have something that is not finite.
+/// Surfaces of which a third have a value that is not finite.
 std::vector<test_surface> faulty_surfaces_of(std::size_t n) {
   auto surfaces = wall_surfaces(n, 3);
   const float bad[] = {nan, infinity, -infinity, 3.0e38f};
@@ -231,7 +233,7 @@ std::vector<test_surface> faulty_surfaces_of(std::size_t n) {
   return surfaces;
 }
 
-WFPG_TEST_CASE("path guider: surfaces that are not finite draw nothing without a density",
+WFPG_TEST_CASE("path guider: surfaces that are not finite get no direction without a density",
                "[path_guider][faults]") {
   const auto surfaces = faulty_surfaces_of(360);
   for_each_kind([&](const guider_options& options) {
@@ -241,7 +243,7 @@ WFPG_TEST_CASE("path guider: surfaces that are not finite draw nothing without a
     CHECK(count_unsound(box.sample_again(surfaces)) == 0);
     CHECK(count_unsound(box.sample_again(surfaces, marcher)) == 0);
     const auto depth = box.guider.statistics().depths[0];
-    CHECK(depth.unbinned >= 8 * 80);  // by their position or shading normal
+    CHECK(depth.unbinned >= 8 * 80);  // because of their position or shading normal
     CHECK(depth.rays >= 6 * 240);
     box.guider.end_sample();
     check_guides(box.guider);
@@ -257,7 +259,7 @@ struct end_numbers {
   }
 };
 
-WFPG_TEST_CASE("path guider: random numbers at the ends of their range draw directions as others do",
+WFPG_TEST_CASE("path guider: random numbers at the ends of their range give valid directions",
                "[path_guider][faults]") {
   for_each_kind([](const guider_options& options) {
     guided_box<Exec> box(options);
@@ -266,14 +268,14 @@ WFPG_TEST_CASE("path guider: random numbers at the ends of their range draw dire
     const wfpg::buffer<test_surface, Exec> surfaces(box.exec, host);
     const wfpg::buffer<sampled_direction, Exec> drawn(box.exec, host.size());
     const wfpg::wave wave{0, host.size(), stored_surfaces{const_view<test_surface>(surfaces)}, end_numbers{}};
-    for (int settle = 0; settle < 4; ++settle) box.guider.prepare(wave, box_caster{});
+    for (int warm_up = 0; warm_up < 4; ++warm_up) box.guider.prepare(wave, box_caster{});
     box.guider.sample_directions(wave, box_caster{}, drawn.view());
     CHECK(count_unsound(drawn.to_host(box.exec)) == 0);
     const wfpg::guide_view view = box.guider.prepare(wave, box_caster{});
     std::size_t guided = 0, dead = 0;
     for (const sampled_direction& d : drawn.to_host(box.exec)) {
       guided += d.technique == sampling_technique::guide;
-      dead += d.technique == sampling_technique::none;  // the BSDF's own, at its horizon
+      dead += d.technique == sampling_technique::none;  // of the BSDF at its horizon
     }
     CHECK(guided > 100);
     CHECK(dead <= 100);
@@ -283,7 +285,7 @@ WFPG_TEST_CASE("path guider: random numbers at the ends of their range draw dire
   });
 }
 
-/// One path each: directions that lead nowhere.
+/// Records one path with directions that are invalid.
 struct record_nowhere {
   wfpg::path_recorder_view recorder;
   WFPG_HD void operator()(std::size_t path) const {
@@ -299,7 +301,7 @@ struct record_nowhere {
   }
 };
 
-WFPG_TEST_CASE("path guider: vertices and directions that lead nowhere are dropped and counted",
+WFPG_TEST_CASE("path guider: invalid vertices and directions are dropped and counted",
                "[path_guider][faults]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);

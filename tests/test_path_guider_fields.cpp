@@ -1,5 +1,5 @@
-// Which field a guider gives a ray, and what is drawn anew for each sample and depth: the ray that cones
-// start from, directions inside cells, points at which products evaluate BSDFs. What forget_light() forgets.
+// The field of each ray, and random choices of each sample and depth. These are the ray that cones start
+// from, directions inside cells, and points at which products evaluate BSDFs. Also tests forget_light().
 #include "support/chi_square.hpp"
 #include "support/evaluate.hpp"
 #include "support/guiding.hpp"
@@ -23,8 +23,8 @@ using wfpg::guiding_mode;
 
 namespace {
 
-/// Surfaces of one place that are turned any way, and seen from either side; their geometric normals are any
-/// of that side.
+/// Surfaces at one place with random shading normals, seen from either side. Their geometric normals are any
+/// on that side.
 std::vector<test_surface> turned_surfaces(std::size_t n, vec3 place) {
   random_numbers random(3);
   std::vector<test_surface> surfaces;
@@ -38,7 +38,7 @@ std::vector<test_surface> turned_surfaces(std::size_t n, vec3 place) {
   return surfaces;
 }
 
-/// Of the six axes the one that is nearest to a shading normal on the viewer's side.
+/// The axis of six that is nearest to a shading normal on the viewer's side.
 std::uint32_t nearest_axis(const test_surface& s) {
   const vec3 facing = glm::dot(s.normal, s.outgoing) < 0.0f ? -s.normal : s.normal;
   std::uint32_t nearest = 0;
@@ -72,7 +72,7 @@ WFPG_TEST_CASE("path guider: rays share a field by their shading normal on the o
     const wfpg::guide_view view = box.guider.prepare(wave.get(), box_caster{});
     const auto fields = evaluate(box.exec, surfaces.size(), find_field{view});
     const bool oriented = options.mode == guiding_mode::oriented;
-    std::map<std::uint32_t, std::uint32_t> orientation_of;  // a field
+    std::map<std::uint32_t, std::uint32_t> orientation_of;  // by field
     std::size_t shared = 0, wrong_side = 0;
     for (std::size_t i = 0; i < surfaces.size(); ++i) {
       const bool reflects = oriented && !surfaces[i].bsdf.transmits();
@@ -88,8 +88,8 @@ WFPG_TEST_CASE("path guider: rays share a field by their shading normal on the o
   }
 }
 
-/// Points of a square's n x n cells, one a cell in each wave: whether each is as likely to be anywhere in its
-/// cell as elsewhere, and whatever the two waves before it had there.
+/// Checks random points in a square's n x n cells, one per cell and wave. Each must be uniform in its cell
+/// and independent of the two waves before.
 class drawn_anew {
  public:
   explicit drawn_anew(std::uint32_t n)
@@ -127,11 +127,11 @@ class drawn_anew {
   static constexpr std::uint32_t fine = 4;
 
   std::uint32_t n_;
-  std::vector<std::vector<std::uint32_t>> waves_;  // a cell: quarters of it
+  std::vector<std::vector<std::uint32_t>> waves_;  // by cell: quarters of the cell
   std::vector<double> inside_, pairs_;
 };
 
-/// Small bins and fields: nodes of level 2, of few rays.
+/// Small bins and fields: nodes of level 2 with few rays.
 guider_options small_fields(field_lifetime lifetime, std::uint32_t resolution) {
   guider_options options = box_options(guiding_mode::oriented, lifetime);
   options.octree_resolution = 8;
@@ -144,7 +144,7 @@ guider_options small_fields(field_lifetime lifetime, std::uint32_t resolution) {
 
 constexpr std::uint32_t samples = 500, depths = 2;
 
-/// Six places of one node of the floor.
+/// Six places in one node of the floor.
 std::vector<test_surface> six_rays() {
   std::vector<test_surface> rays;
   for (int i = 0; i < 6; ++i)
@@ -173,7 +173,7 @@ std::vector<std::vector<wfpg::ray>> cones_of_waves(field_lifetime lifetime, std:
   return waves;
 }
 
-WFPG_TEST_CASE("path guider: each ray of a bin is as often the one that cones start from", "[path_guider]") {
+WFPG_TEST_CASE("path guider: each ray of a bin is equally often the start of its cones", "[path_guider]") {
   const auto rays = six_rays();
   chi_square_family family;
   for (const field_lifetime lifetime : lifetimes) {
@@ -199,7 +199,7 @@ WFPG_TEST_CASE("path guider: each ray of a bin is as often the one that cones st
   CHECK(family.accepted());
 }
 
-WFPG_TEST_CASE("path guider: cones are drawn anew inside their cells for each sample and depth",
+WFPG_TEST_CASE("path guider: cones have random places in their cells for each sample and depth",
                "[path_guider]") {
   chi_square_family family;
   for (const field_lifetime lifetime : lifetimes) {
@@ -221,7 +221,7 @@ WFPG_TEST_CASE("path guider: cones are drawn anew inside their cells for each sa
   CHECK(family.accepted());
 }
 
-/// Notes where it is evaluated.
+/// Logs where it is evaluated.
 struct noting_bsdf {
   std::uint32_t* count = nullptr;
   wfpg::array_view<vec3> incident;
@@ -248,7 +248,7 @@ struct one_noting_surface {
   }
 };
 
-WFPG_TEST_CASE("path guider: products evaluate BSDFs at other points in each sample and depth",
+WFPG_TEST_CASE("path guider: products evaluate BSDFs at other points for each sample and depth",
                "[path_guider]") {
   constexpr std::uint32_t p = 4;
   chi_square_family family;
@@ -287,8 +287,7 @@ WFPG_TEST_CASE("path guider: products evaluate BSDFs at other points in each sam
   CHECK(family.accepted());
 }
 
-/// What a guider knows at a place of the floor: which lights are asked, and what the place's field says of a
-/// direction.
+/// What a guider knows at a place on the floor: choices of lights, and the field's density of a direction.
 struct knowledge {
   float chances[3];  ///< of groups of lights
   float density;     ///< of the direction, per steradian
@@ -323,7 +322,7 @@ struct find_light {
   }
 };
 
-WFPG_TEST_CASE("path guider: what was learnt of lights is forgotten with all light", "[path_guider]") {
+WFPG_TEST_CASE("path guider: forget_light() forgets choices of lights and learnt radiance", "[path_guider]") {
   for (const field_lifetime lifetime : lifetimes) {
     INFO(name_of(lifetime));
     guider_options options = box_options(guiding_mode::oriented, lifetime);
@@ -332,7 +331,7 @@ WFPG_TEST_CASE("path guider: what was learnt of lights is forgotten with all lig
     options.binning.rays_per_bin = 1000;  // the place keeps its field
     guided_box<Exec> box(options);
     const test_surface at = make_surface({0.3f, 0.0f, 0.3f}, {0, 1, 0}, {0, 1, 0});
-    const vec3 direction = glm::normalize(vec3(-0.3f, 0.8f, 0.4f));  // where the patch is not
+    const vec3 direction = glm::normalize(vec3(-0.3f, 0.8f, 0.4f));  // away from the patch
     const wave_of_surfaces<Exec> wave(box.exec, std::vector<test_surface>(40, at));
     const auto known = [&] {
       const wfpg::guide_view view = box.guider.prepare(wave.get(), box_caster{});
@@ -360,7 +359,7 @@ WFPG_TEST_CASE("path guider: what was learnt of lights is forgotten with all lig
     };
     learn();
     next_sample();
-    known();  // fields see what they learnt once they are refreshed
+    known();  // fields use learnt radiance after a refresh
     next_sample();
     const knowledge learnt = known();
     CHECK(learnt.chances[2] > 2.0f * before.chances[2]);
@@ -368,7 +367,7 @@ WFPG_TEST_CASE("path guider: what was learnt of lights is forgotten with all lig
     if (lifetime == field_lifetime::kept) CHECK(learnt.density > 10.0f * before.density);
     check_forgotten();
     learn();
-    check_forgotten();  // what the sample has found so far, too
+    check_forgotten();  // including contributions of the current sample
   }
 }
 

@@ -1,4 +1,5 @@
-// A guider's two forms, of which one samples a wave and the other lets a host's kernel draw: they are one.
+// The two forms of a guider: one samples a wave, the other lets a host's kernel sample. Both give the same
+// directions.
 #include "support/guiding.hpp"
 #include "support/kinds_of_guiding.hpp"
 #include "support/policies.hpp"
@@ -15,7 +16,7 @@ using wfpg::sampled_direction;
 
 namespace {
 
-/// A renderer's kernel of the prepared form.
+/// A renderer's kernel that samples from a prepared view.
 struct sample_view {
   wfpg::guide_view view;
   stored_surfaces surfaces;
@@ -41,10 +42,9 @@ std::vector<sampled_direction> sample_prepared(guided_box<Exec>& box,
   return directions.to_host(box.exec);
 }
 
-WFPG_TEST_CASE("path guider: both forms draw the same directions from the same numbers, bit for bit",
-               "[path_guider]") {
+WFPG_TEST_CASE("path guider: both forms sample the same directions, bit for bit", "[path_guider]") {
   for (guider_options options : kinds_of_guiding()) {
-    options.binning.rays_per_bin = 8;  // bins with more and with fewer rays than these
+    options.binning.rays_per_bin = 8;  // bins have more and fewer rays than this
     guided_box<Exec> fused(options), prepared(options), batch(options), prepared_batch(options);
     for (guided_box<Exec>* box : {&fused, &prepared, &batch, &prepared_batch}) box->learn();
     const auto surfaces = mixed_surfaces(700, 4);
@@ -68,7 +68,7 @@ WFPG_TEST_CASE("path guider: both forms draw the same directions from the same n
   }
 }
 
-WFPG_TEST_CASE("path guider: both forms agree, and count alike, where few waves make fields any more",
+WFPG_TEST_CASE("path guider: both forms and their counts agree after warm-up, when few waves build",
                "[path_guider]") {
   for (guiding_mode mode : modes)
     for (std::uint32_t products : {0u, 4u}) {
@@ -104,7 +104,7 @@ WFPG_TEST_CASE("path guider: both forms agree, and count alike, where few waves 
     }
 }
 
-WFPG_TEST_CASE("path guider: both forms agree where nothing guides yet", "[path_guider]") {
+WFPG_TEST_CASE("path guider: both forms agree before anything guides", "[path_guider]") {
   for (guider_options options : kinds_of_guiding()) {
     INFO(describe(options));
     options.unguided_samples = 1;

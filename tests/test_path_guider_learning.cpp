@@ -1,5 +1,5 @@
-// A guider's fields as a renderer meets them: where their cones start, which of them learns what a direction
-// found, whatever drew it, and that unguided rays decide where fields are, too.
+// A guider's fields in a renderer. Tests where cones start, which field learns from a direction, and that
+// unguided rays count for bins.
 #include "support/evaluate.hpp"
 #include "support/guiding.hpp"
 #include "support/kept_fields.hpp"
@@ -24,7 +24,7 @@ using wfpg::sampling_technique;
 
 namespace {
 
-/// Batch: the box's hits, and keeps all cones.
+/// Batch caster that returns the box's hits and logs all cones.
 struct batch_noting_caster {
   std::vector<wfpg::ray>* cones;
 
@@ -37,14 +37,14 @@ struct batch_noting_caster {
   }
 };
 
-/// A ray's surface, and the way off it that its cones have to go.
+/// A ray's surface, and the side on which its cones must start.
 struct surface_and_side {
   test_surface surface;
   vec3 off;
 };
 
-/// On the floor and on a wall, seen from either side, with a shading normal of its own, and without a
-/// geometric one.
+/// Surfaces on the floor and on a wall, seen from either side. Some have another shading normal, some no
+/// geometric normal.
 std::vector<surface_and_side> surfaces_to_leave() {
   const vec3 shading = glm::normalize(vec3(0.3f, 1.0f, 0.2f));
   const vec3 floor_up(0, 1, 0), wall(-1, 0, 0);
@@ -60,7 +60,7 @@ std::vector<surface_and_side> surfaces_to_leave() {
   return all;
 }
 
-/// How many of the cones do not start off the surface, by 1/1000 of a voxel or 1/10,000 of its coordinates.
+/// Counts cones that do not start off the surface by 1/1000 of a voxel or 1/10,000 of its coordinates.
 std::size_t started_elsewhere(const std::vector<wfpg::ray>& cones, const surface_and_side& from,
                               float voxel) {
   const vec3 p = glm::abs(from.surface.position);
@@ -82,7 +82,7 @@ WFPG_TEST_CASE("path guider: cones start off the surface, on the side that it is
       cone_log<Exec> log(inlined.exec, 2000);
       std::vector<wfpg::ray> batch;
       const std::vector<test_surface> wave(5, from.surface);
-      for (int sample = 0; sample < 2; ++sample) {  // in the second, kept fields are refreshed
+      for (int sample = 0; sample < 2; ++sample) {  // the second refreshes kept fields
         inlined.guider.begin_sample();
         inlined.sample(wave, log.caster());
         batched.guider.begin_sample();
@@ -97,11 +97,11 @@ WFPG_TEST_CASE("path guider: cones start off the surface, on the side that it is
     }
 }
 
-/// How a renderer gets a direction.
+/// How a renderer samples a direction.
 enum class drawn_by : std::uint32_t {
-  sample_directions,  ///< the guider draws those of a wave
-  view,               ///< a kernel asks the view, with its surface
-  field               ///< a kernel asks the view for one of the field alone
+  sample_directions,  ///< the guider samples a wave
+  view,               ///< a kernel samples from the view, with its surface
+  field               ///< a kernel samples from the field alone
 };
 
 struct draw_from_view {
@@ -119,13 +119,13 @@ struct draw_from_view {
   }
 };
 
-/// The environment shines on the floor from x > 0, and on the ceiling from x < 0.
+/// The environment lights the floor from x > 0, and the ceiling from x < 0.
 WFPG_HD bool is_lit(const test_surface& s, vec3 direction) {
   return (direction.x > 0.0f) == (s.normal.y > 0.0f);
 }
 
-/// Paths that leave the scene at once; those that `technique` drew are told of.
-struct tell_paths {
+/// Paths that leave the scene at once. Records those that `technique` sampled.
+struct record_paths {
   wfpg::path_recorder_view recorder;
   stored_surfaces surfaces;
   wfpg::array_view<const sampled_direction> directions;
@@ -141,7 +141,7 @@ struct tell_paths {
   }
 };
 
-/// Whether what a ray's field draws is lit, of `count` rays in turn.
+/// Whether a direction of a ray's field is lit, for `count` rays in turn.
 struct is_draw_lit {
   wfpg::guide_view view;
   stored_surfaces surfaces;
@@ -153,10 +153,10 @@ struct is_draw_lit {
   }
 };
 
-/// The lit share of what fields draw after eight samples, of which each tells what the directions found that
-/// `technique` drew.
+/// The lit fraction of the fields' directions after eight samples. Each sample records the directions that
+/// `technique` sampled.
 template <class Exec>
-double learnt_share(std::uint32_t products, drawn_by form, sampling_technique technique) {
+double lit_fraction(std::uint32_t products, drawn_by form, sampling_technique technique) {
   constexpr std::size_t rays = 1000;
   guider_options options = box_options();
   options.product_resolution = unless_zero(products);
@@ -165,7 +165,7 @@ double learnt_share(std::uint32_t products, drawn_by form, sampling_technique te
   options.max_depth = 2;
   options.deposit_capacity.reset();
   options.deposits_per_leaf.reset();  // all paths are recorded
-  options.binning.min_level = 5;      // a field for each place from the beginning
+  options.binning.min_level = 5;      // one field per place from the beginning
   guided_box<Exec> box(options);
   std::vector<test_surface> surfaces;
   for (std::size_t i = 0; i < rays; ++i) {
@@ -187,7 +187,7 @@ double learnt_share(std::uint32_t products, drawn_by form, sampling_technique te
       box.exec.fill_bytes(drawn.data(), 0, drawn.bytes());
       box.exec.for_each(rays, draw_from_view{view, stored, random, form, drawn.view()});
     }
-    box.exec.for_each(rays, tell_paths{box.guider.recorder(), stored, drawn.view(), technique});
+    box.exec.for_each(rays, record_paths{box.guider.recorder(), stored, drawn.view(), technique});
     box.guider.end_sample();
   }
   CHECK(box.guider.statistics().dropped_vertices == 0);
@@ -197,16 +197,16 @@ double learnt_share(std::uint32_t products, drawn_by form, sampling_technique te
   return double(count_where(box.exec, draws, is_draw_lit{view, stored, rays})) / draws;
 }
 
-WFPG_TEST_CASE("path guider: a field learns what its directions find, whatever drew them", "[path_guider]") {
+WFPG_TEST_CASE("path guider: a field learns from a direction whatever sampled it", "[path_guider]") {
   for (const std::uint32_t products : {0u, 4u})
     for (const drawn_by form : {drawn_by::sample_directions, drawn_by::view, drawn_by::field})
       for (const sampling_technique technique : {sampling_technique::guide, sampling_technique::bsdf}) {
         if (form == drawn_by::field && technique == sampling_technique::bsdf) continue;
         INFO("products " << products << ", form " << int(form) << ", technique " << int(technique));
-        CHECK(learnt_share<Exec>(products, form, technique) > 0.8);
+        CHECK(lit_fraction<Exec>(products, form, technique) > 0.8);
       }
-  // Told of nothing, a field has no side.
-  CHECK(learnt_share<Exec>(0, drawn_by::view, sampling_technique::none) == Approx(0.5).margin(0.05));
+  // Without recorded directions, both sides are equal.
+  CHECK(lit_fraction<Exec>(0, drawn_by::view, sampling_technique::none) == Approx(0.5).margin(0.05));
 }
 
 /// Twenty places on the floor with 40 rays each, and ten on the ceiling with one.
@@ -220,7 +220,7 @@ std::vector<test_surface> crowds_and_loners() {
   return surfaces;
 }
 
-/// The key of the field that a ray is to have: its leaf's where many rays are, or that of the largest node
+/// The expected key of a ray's field: its leaf's if many rays are there. Otherwise that of the largest node
 /// that can be a bin.
 struct key_of_ray {
   wfpg::sparse_voxel_octree_view tree;
@@ -233,7 +233,7 @@ struct key_of_ray {
   }
 };
 
-/// Fields that there are.
+/// The number of fields.
 template <class Exec>
 std::set<std::uint32_t> live_keys(const guided_box<Exec>& box) {
   std::set<std::uint32_t> keys;
@@ -242,7 +242,7 @@ std::set<std::uint32_t> live_keys(const guided_box<Exec>& box) {
   return keys;
 }
 
-WFPG_TEST_CASE("path guider: rays that were not guided count where fields are chosen", "[path_guider]") {
+WFPG_TEST_CASE("path guider: unguided rays count when bins are chosen", "[path_guider]") {
   const auto surfaces = crowds_and_loners();
   for (const bool fused : {false, true}) {
     guider_options options = box_options();
@@ -270,10 +270,10 @@ WFPG_TEST_CASE("path guider: rays that were not guided count where fields are ch
   }
 }
 
-WFPG_TEST_CASE("path guider: rays that got no field count where fields are chosen", "[path_guider]") {
+WFPG_TEST_CASE("path guider: rays without a field count when bins are chosen", "[path_guider]") {
   const auto surfaces = crowds_and_loners();
   guider_options options = box_options();
-  options.kept.max_wave_cones = 256;  // one birth a wave
+  options.kept.max_wave_cones = 256;  // one new field per wave
   guided_box<Exec> box(options);
   const wfpg::buffer<test_surface, Exec> stored(box.exec, surfaces);
   const auto keys =

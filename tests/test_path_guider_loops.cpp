@@ -1,5 +1,5 @@
-// Loops that fail to begin, as a launch on a device may: each loop of samples fails in its turn, and the
-// guider goes on. Of one policy, whose loops fail on request.
+// Loops that fail to start, as a launch on a device may. Each loop of a sample fails in its turn, and the
+// guider stays usable. The policy's loops fail on request.
 #include "support/catch.hpp"
 #include "support/guiding.hpp"
 #include "support/policies.hpp"
@@ -18,7 +18,7 @@ namespace {
 
 using namespace wfpg_test;
 
-/// Loops since fail_loop(), and the one that fails.
+/// Counts loops since fail_loop(), and knows which one fails.
 struct loop_count {
   std::size_t begun = 0, fails_at = 0;
 
@@ -29,7 +29,7 @@ struct loop_count {
   bool failed() const { return fails_at > 0 && begun >= fails_at; }
 };
 
-/// The serial policy, but that the k-th loop throws before it begins.
+/// The serial policy, except that the k-th loop throws before it starts.
 class failing_policy : public wfpg::exec::cpu_policy<failing_policy, 8> {
  public:
   explicit failing_policy(wfpg::memory_resource* resource = nullptr) : cpu_policy(resource) {}
@@ -46,15 +46,15 @@ class failing_policy : public wfpg::exec::cpu_policy<failing_policy, 8> {
   }
 
  private:
-  loop_count* loops_ = nullptr;  // null: none fails
+  loop_count* loops_ = nullptr;  // null: no loop fails
 };
 
 static_assert(wfpg::exec::is_execution_policy_v<failing_policy>);
 
-/// What happens to a sample after a step of it threw.
+/// What happens to a sample after one of its steps threw.
 enum class afterwards { again, next_sample };
 
-/// Some samples, of which the k-th loop fails; `failed_step`: the step that threw.
+/// Runs some samples of which the k-th loop fails. `failed_step` is the step that threw.
 std::vector<wfpg::sampled_direction> sample_with_fault(octree_guider<failing_policy>& guider,
                                                        loop_count& loops, std::size_t k, afterwards then,
                                                        int& failed_step) {
@@ -77,7 +77,7 @@ std::vector<wfpg::sampled_direction> sample_with_fault(octree_guider<failing_pol
   return samples.drawn();
 }
 
-/// Fails at each loop of some samples; how many there were.
+/// Fails at each loop of some samples. Returns the number of loops.
 std::size_t fail_in_samples(const guider_options& options, afterwards then) {
   const box_mesh<failing_policy> mesh{failing_policy()};
   std::vector<wfpg::sampled_direction> expected;
@@ -88,7 +88,7 @@ std::size_t fail_in_samples(const guider_options& options, afterwards then) {
     const auto drawn = sample_with_fault(guider, loops, k, then, failed_step);
     if (k == 0) expected = drawn;
     INFO("loop " << k << ", step " << failed_step);
-    // A wave that is asked for again counts its rays again, which decides where kept fields are.
+    // A repeated wave counts its rays again, which moves kept fields.
     const bool is_alike = failed_step < 0 || failed_step == stepwise_samples<failing_policy>::begin ||
                           failed_step == stepwise_samples<failing_policy>::end ||
                           options.fields == field_lifetime::transient;
@@ -98,8 +98,7 @@ std::size_t fail_in_samples(const guider_options& options, afterwards then) {
   }
 }
 
-TEST_CASE("path guider: each loop of samples fails in its turn, and the call is made again",
-          "[path_guider]") {
+TEST_CASE("path guider: each loop of a sample may fail, and a repeated call works", "[path_guider]") {
   std::size_t covered = 0;
   for_each_stepwise_options(
       [&](const guider_options& options) { covered += fail_in_samples(options, afterwards::again); });
@@ -107,14 +106,13 @@ TEST_CASE("path guider: each loop of samples fails in its turn, and the call is 
   SUCCEED(covered << " loops");
 }
 
-TEST_CASE("path guider: the same where fields lack room, so that bins follow it", "[path_guider]") {
+TEST_CASE("path guider: each loop of a sample may fail while bins adapt to few slots", "[path_guider]") {
   guider_options options = stepwise_options(field_lifetime::kept, 0);
   options.kept.budget_bytes /= 2;
   CHECK(fail_in_samples(options, afterwards::again) > 50);
 }
 
-TEST_CASE("path guider: each loop of samples fails in its turn, and the sample is given up",
-          "[path_guider]") {
+TEST_CASE("path guider: each loop of a sample may fail, and the next sample works", "[path_guider]") {
   std::size_t covered = 0;
   for_each_stepwise_options(
       [&](const guider_options& options) { covered += fail_in_samples(options, afterwards::next_sample); });

@@ -1,5 +1,5 @@
-// Memory that runs out: every allocation of building a guider, of a sample and of loading a guide fails in
-// its turn. The call throws, nothing leaks, and the guider goes on. And memory that is not zero.
+// Memory that runs out. Every allocation of a constructor, of a sample and of a load fails in its turn. The
+// call throws, nothing leaks, and the guider stays usable. Also memory that is not zero.
 #include "support/catch.hpp"
 #include "support/failing_resource.hpp"
 #include "support/guiding.hpp"
@@ -21,8 +21,7 @@ namespace {
 using namespace wfpg_test;
 using wfpg::sampled_direction;
 
-WFPG_TEST_CASE("path guider: each allocation of its construction fails in its turn",
-               "[path_guider][memory]") {
+WFPG_TEST_CASE("path guider: each allocation of its constructor may fail", "[path_guider][memory]") {
   const box_mesh<Exec> mesh{Exec()};
   std::size_t covered = 0;
   for_each_stepwise_options([&](const guider_options& options) {
@@ -31,13 +30,13 @@ WFPG_TEST_CASE("path guider: each allocation of its construction fails in its tu
     covered += fail_at_each(resource, [&] { const octree_guider<Exec> guider(exec, mesh.view(), options); });
   });
   CHECK(covered > 4 * 30);
-  tell_failed(covered);
+  print_failed(covered);
 }
 
-/// What happens to a sample after a step of it threw.
+/// What happens to a sample after one of its steps threw.
 enum class afterwards { again, next_sample };
 
-/// Some samples, of which one allocation fails, the k-th; the directions that were drawn. `failed_step`: the
+/// Runs some samples of which the k-th allocation fails, and returns the directions. `failed_step` is the
 /// step that threw.
 template <class Exec, class Guide>
 std::vector<sampled_direction> sample_with_fault(wfpg::path_guider<Exec, Guide>& guider,
@@ -60,7 +59,7 @@ std::vector<sampled_direction> sample_with_fault(wfpg::path_guider<Exec, Guide>&
   return samples.drawn();
 }
 
-/// Fails at each allocation of some samples; how many there were.
+/// Fails at each allocation of some samples. Returns the number of allocations.
 template <class Exec>
 std::size_t fail_in_samples(const guider_options& options, const box_mesh<Exec>& mesh, afterwards then) {
   int failed_step = -1;
@@ -73,7 +72,7 @@ std::size_t fail_in_samples(const guider_options& options, const box_mesh<Exec>&
       octree_guider<Exec> guider(Exec().with_resource(&resource), mesh.view(), options);
       const auto drawn = sample_with_fault(guider, resource, k, then, failed_step);
       INFO("allocation " << k << ", step " << failed_step);
-      // A wave that is asked for again counts its rays again, which decides where kept fields are.
+      // A repeated wave counts its rays again, which moves kept fields.
       const bool is_alike = failed_step < 0 || failed_step == stepwise_samples<Exec>::begin ||
                             failed_step == stepwise_samples<Exec>::end ||
                             options.fields == field_lifetime::transient;
@@ -85,7 +84,7 @@ std::size_t fail_in_samples(const guider_options& options, const box_mesh<Exec>&
   }
 }
 
-WFPG_TEST_CASE("path guider: each allocation of samples fails in its turn, and the call is made again",
+WFPG_TEST_CASE("path guider: each allocation of a sample may fail, and a repeated call works",
                "[path_guider][memory]") {
   const box_mesh<Exec> mesh{Exec()};
   std::size_t covered = 0;
@@ -93,10 +92,10 @@ WFPG_TEST_CASE("path guider: each allocation of samples fails in its turn, and t
     covered += fail_in_samples<Exec>(options, mesh, afterwards::again);
   });
   CHECK(covered > 10);
-  tell_failed(covered);
+  print_failed(covered);
 }
 
-WFPG_TEST_CASE("path guider: each allocation of samples fails in its turn, and the sample is given up",
+WFPG_TEST_CASE("path guider: each allocation of a sample may fail, and the next sample works",
                "[path_guider][memory]") {
   const box_mesh<Exec> mesh{Exec()};
   std::size_t covered = 0;
@@ -104,10 +103,10 @@ WFPG_TEST_CASE("path guider: each allocation of samples fails in its turn, and t
     covered += fail_in_samples<Exec>(options, mesh, afterwards::next_sample);
   });
   CHECK(covered > 10);
-  tell_failed(covered);
+  print_failed(covered);
 }
 
-WFPG_TEST_CASE("each allocation of loading a guide fails in its turn", "[guide_file][memory]") {
+WFPG_TEST_CASE("each allocation of load_guide() may fail", "[guide_file][memory]") {
   const box_mesh<Exec> mesh{Exec()};
   std::size_t covered = 0;
   for_each_stepwise_options([&](const guider_options& options) {
@@ -130,15 +129,16 @@ WFPG_TEST_CASE("each allocation of loading a guide fails in its turn", "[guide_f
     });
   });
   CHECK(covered > 4 * 30);
-  tell_failed(covered);
+  print_failed(covered);
 }
 
-/// Of a host whose arena has an error of its own.
+/// A host's arena that throws its own exception.
 class throwing_resource : public failing_resource {
   [[noreturn]] void refuse() const override { throw std::length_error("the arena is full"); }
 };
 
-WFPG_TEST_CASE("path guider: what a resource throws by itself comes through", "[path_guider][memory]") {
+WFPG_TEST_CASE("path guider: exceptions of a memory resource reach the caller unchanged",
+               "[path_guider][memory]") {
   const box_mesh<Exec> mesh{Exec()};
   throwing_resource resource;
   const Exec exec = Exec().with_resource(&resource);
@@ -169,7 +169,7 @@ std::string guide_with(unsigned char poison, field_lifetime lifetime) {
   });
 }
 
-WFPG_TEST_CASE("a guider reads nothing that it has not written", "[path_guider][memory]") {
+WFPG_TEST_CASE("a guider reads only memory that it has written", "[path_guider][memory]") {
   for (const field_lifetime lifetime : lifetimes) {
     INFO(name_of(lifetime));
     const std::string zeros = guide_with<Exec>(0x00, lifetime);

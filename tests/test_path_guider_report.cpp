@@ -1,4 +1,4 @@
-// What a guider tells of itself, and what it asks of its memory resource.
+// What a guider reports of itself, and what it allocates from its memory resource.
 #include "support/guiding.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
@@ -17,7 +17,7 @@ using wfpg::guiding_mode;
 
 namespace {
 
-/// What a guider may keep across samples.
+/// Memory that a guider may keep across samples.
 template <class Exec>
 std::size_t most_persistent(const octree_guider<Exec>& guider) {
   const std::size_t nodes = guider.guide().octree().node_count(),
@@ -27,7 +27,7 @@ std::size_t most_persistent(const octree_guider<Exec>& guider) {
          (kept ? guider.options().kept.budget_bytes + 4 * (nodes + leaves) : 0);
 }
 
-WFPG_TEST_CASE("path guider: memory() is what it holds of its resource, by part", "[path_guider]") {
+WFPG_TEST_CASE("path guider: memory() is what it allocated, by part", "[path_guider]") {
   counting_resource resource;
   const Exec exec = Exec().with_resource(&resource);
   for (field_lifetime lifetime : lifetimes) {
@@ -63,8 +63,7 @@ std::size_t bytes_of(const octree_guider<Exec>& guider, const std::string& name)
   return 0;
 }
 
-WFPG_TEST_CASE("path guider: what recording takes is bounded by the leaves, not by the paths",
-               "[path_guider]") {
+WFPG_TEST_CASE("path guider: recording memory is bounded by the leaves, not by the paths", "[path_guider]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   for (const std::size_t paths : {std::size_t(300), std::size_t(20000), std::size_t(200000)}) {
@@ -83,7 +82,7 @@ WFPG_TEST_CASE("path guider: what recording takes is bounded by the leaves, not 
   }
 }
 
-/// What all surfaces radiate, after 12 samples of 4,096 paths.
+/// Mean radiance of all surfaces after 12 samples of 4,096 paths.
 template <class Exec>
 float learned_radiance(std::uint32_t deposits_per_leaf) {
   const Exec exec;
@@ -99,23 +98,23 @@ float learned_radiance(std::uint32_t deposits_per_leaf) {
   return evaluate(exec, [=] WFPG_HD { return cache.radiance(0, 0); });
 }
 
-WFPG_TEST_CASE("path guider: a share of the paths teaches what all of them do", "[path_guider]") {
+WFPG_TEST_CASE("path guider: a fraction of the paths gives about the means of all", "[path_guider]") {
   const float all = learned_radiance<Exec>(0), some = learned_radiance<Exec>(32);
   CHECK(all > 0.0f);
   CHECK(some != all);
   CHECK(std::abs(some - all) < 0.1f * all);
 }
 
-/// A guider after 32 empty samples, of so small an octree that it wants few of its paths.
+/// A guider after 32 empty samples. Its octree is so small that it records few paths.
 template <class Exec>
-struct settled_guider {
+struct warmed_up_guider {
   static constexpr std::size_t paths = 2048;
 
   Exec exec;
   box_mesh<Exec> mesh{exec};
   octree_guider<Exec> guider;
 
-  explicit settled_guider(std::size_t deposit_capacity)
+  explicit warmed_up_guider(std::size_t deposit_capacity)
       : guider(exec, mesh.view(), options(deposit_capacity)) {
     REQUIRE(guider.guide().recording().sample_stride == 4);
     for (int sample = 0; sample < 32; ++sample) {
@@ -137,42 +136,44 @@ struct settled_guider {
   }
 };
 
-WFPG_TEST_CASE("path guider: once means have settled one sample in four teaches", "[path_guider]") {
-  settled_guider<Exec> settled(0);
+WFPG_TEST_CASE("path guider: after warm-up one sample in four is recorded", "[path_guider]") {
+  warmed_up_guider<Exec> warmed_up(0);
   std::uint64_t sample = 33;
   for (int round = 0; round < 4; ++round) {
     int taught = 0;
     for (int turn = 0; turn < 4; ++turn) {
-      const float before = settled.radiance();
-      trace_paths(settled.exec, settled.guider, {1, settled.paths, 2, sample++}, box_caster{}, patch_box());
-      taught += settled.radiance() != before ? 1 : 0;
+      const float before = warmed_up.radiance();
+      trace_paths(warmed_up.exec, warmed_up.guider, {1, warmed_up.paths, 2, sample++}, box_caster{},
+                  patch_box());
+      taught += warmed_up.radiance() != before ? 1 : 0;
     }
     CHECK(taught == 1);
   }
-  CHECK(settled.guider.statistics().dropped_vertices == 0);
-  CHECK(settled.guider.statistics().deposits.total() == 0);
+  CHECK(warmed_up.guider.statistics().dropped_vertices == 0);
+  CHECK(warmed_up.guider.statistics().deposits.total() == 0);
 }
 
-WFPG_TEST_CASE("path guider: what a host deposits by itself is seen after every sample", "[path_guider]") {
-  settled_guider<Exec> settled(6 * 4 * 4);
+WFPG_TEST_CASE("path guider: a host's own deposits change the cache after every sample", "[path_guider]") {
+  warmed_up_guider<Exec> warmed_up(6 * 4 * 4);
   for (std::uint32_t sample = 33; sample <= 37; ++sample) {
-    const float before = settled.radiance();
-    settled.guider.begin_sample();
-    deposit_on_walls(settled.exec, settled.guider.guide().cache(), 4,
+    const float before = warmed_up.radiance();
+    warmed_up.guider.begin_sample();
+    deposit_on_walls(warmed_up.exec, warmed_up.guider.guide().cache(), 4,
                      [=](std::uint32_t, float, float) { return static_cast<float>(sample); });
-    settled.guider.end_sample();
-    CHECK(settled.radiance() > before);
+    warmed_up.guider.end_sample();
+    CHECK(warmed_up.radiance() > before);
   }
 }
 
-/// Other bins every time, and a third more of them after the first.
+/// Other bins in each wave, and a third more after the first sample.
 std::vector<test_surface> unlike_wave(std::uint32_t sample, std::uint32_t depth) {
   auto surfaces = wall_surfaces(512, 10 * sample + depth);
   for (std::size_t i = 0; sample == 0 && i < 140; ++i) surfaces[i] = surfaces[140];
   return surfaces;
 }
 
-/// Allocations after the first of 8 samples. Forms: fused and prepared, with an inline and a batch caster.
+/// Allocations after the first of 8 samples: with fused and prepared calls, and with inline and batch
+/// casters.
 template <class Exec>
 std::size_t late_allocations(const guider_options& options, int form) {
   counting_resource resource;
@@ -239,7 +240,7 @@ WFPG_TEST_CASE("path guider: statistics count bins, rays and cones by depth", "[
   CHECK(statistics.depths[1].bins * 2 == first.bins);
   CHECK(statistics.depths[1].cones == statistics.depths[1].bins * 64);
   CHECK(statistics.depths[2].rays == 0);
-  CHECK(statistics.depths.back().rays == 600);  // depths beyond share the last place
+  CHECK(statistics.depths.back().rays == 600);  // larger depths share the last entry
   double seconds = 0.0;
   for (const wfpg::stage_time& stage : statistics.seconds) {
     CHECK(stage.seconds >= 0.0);
@@ -249,8 +250,7 @@ WFPG_TEST_CASE("path guider: statistics count bins, rays and cones by depth", "[
   CHECK(seconds > 0.0);
 }
 
-WFPG_TEST_CASE("path guider: statistics count fields that are made or refreshed, and slots",
-               "[path_guider]") {
+WFPG_TEST_CASE("path guider: statistics count allocated and refreshed fields, and slots", "[path_guider]") {
   guided_box<Exec> box;
   box.learn();
   const auto surfaces = wall_surfaces(600, 7);
@@ -285,7 +285,7 @@ WFPG_TEST_CASE("path guider: statistics count fields that are made or refreshed,
   CHECK(transient.guider.statistics().kept.allocated == 0);
 }
 
-WFPG_TEST_CASE("path guider: kept fields tell of which node and orientation they are", "[path_guider]") {
+WFPG_TEST_CASE("path guider: kept fields report their node and orientation", "[path_guider]") {
   guided_box<Exec> box;
   box.learn();
   box.sample_again(wall_surfaces(600, 7));
@@ -303,7 +303,7 @@ WFPG_TEST_CASE("path guider: kept fields tell of which node and orientation they
   CHECK(guided_box<Exec>(field_lifetime::transient).guider.guide().field_keys(box.exec).empty());
 }
 
-WFPG_TEST_CASE("path guider: a build report tells what of the mesh was left out", "[path_guider]") {
+WFPG_TEST_CASE("path guider: a build report counts the skipped triangles", "[path_guider]") {
   const Exec exec;
   auto positions = box_positions();
   auto triangles = box_triangles();
@@ -320,14 +320,14 @@ WFPG_TEST_CASE("path guider: a build report tells what of the mesh was left out"
   CHECK(build.degenerate == 1);
 }
 
-/// Until the clock has gone on by so much.
+/// Waits until the clock has advanced by that many seconds.
 void wait(double seconds) {
   const auto begin = std::chrono::steady_clock::now();
   while (std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() < seconds) {
   }
 }
 
-TEST_CASE("a stage inside another one has its time to itself", "[path_guider]") {
+TEST_CASE("a nested stage's time does not count for the outer stage", "[path_guider]") {
   namespace stage = wfpg::stage;
   wfpg::stage_clock clock;
   const auto begin = std::chrono::steady_clock::now();

@@ -1,5 +1,5 @@
-// What directions a guider draws: the same on any number of threads, with densities that are the mixture's,
-// and without bias.
+// The directions of a guider. They do not depend on the number of threads, have the mixture's density, and
+// are unbiased.
 #include "support/guiding.hpp"
 #include "support/kinds_of_guiding.hpp"
 #include "support/policies.hpp"
@@ -36,7 +36,7 @@ struct stored_queries {
   WFPG_HD vec3 operator()(std::uint32_t ray) const { return queries[ray]; }
 };
 
-/// As same_draws() has it.
+/// Equality of floats as in same_draws().
 bool nearly(float a, float b) {
   return same_operations_same_bits ? a == b : std::fabs(a - b) <= 1.0e-3f * b;
 }
@@ -44,7 +44,7 @@ std::size_t excepted(std::size_t rays) {
   return same_operations_same_bits ? 0 : rays / 100;
 }
 
-WFPG_TEST_CASE("path guider: queries are answered with the density that sampling has", "[path_guider]") {
+WFPG_TEST_CASE("path guider: queries return the density that sampling has", "[path_guider]") {
   for (const guider_options& options : kinds_of_guiding()) {
     INFO(describe(options));
     guided_box<Exec> box(options);
@@ -80,13 +80,13 @@ WFPG_TEST_CASE("path guider: queries are answered with the density that sampling
   }
 }
 
-/// The share of guided samples by default: less for few rays of a transient field.
-float default_share(const guider_options& options, bool many_rays) {
+/// The default fraction of guided directions. Smaller for transient fields with few rays.
+float default_fraction(const guider_options& options, bool many_rays) {
   if (options.mode == guiding_mode::plain) return 0.5f;
   return many_rays || options.fields == field_lifetime::kept ? 0.7f : 0.5f;
 }
 
-/// What a ray's field says of a direction, and of one that it draws.
+/// Densities of a ray's field for a given direction, and for one that it samples.
 struct asked_of_field {
   float pdf;
   sampled_direction alone;
@@ -103,7 +103,7 @@ struct ask_field {
   }
 };
 
-WFPG_TEST_CASE("path guider: densities are the mixture's of field and BSDF", "[path_guider]") {
+WFPG_TEST_CASE("path guider: densities are those of the mixture of field and BSDF", "[path_guider]") {
   for (guider_options options : kinds_of_guiding())
     for (float fraction : {0.0f, 0.25f, 1.0f}) {
       INFO(describe(options) << ", fraction " << fraction);
@@ -118,11 +118,11 @@ WFPG_TEST_CASE("path guider: densities are the mixture's of field and BSDF", "[p
       const wave_of_surfaces<Exec> wave(box.exec, surfaces);
       const wfpg::guide_view view = box.guider.prepare(wave.get(), box_caster{});
       for (std::uint32_t ray : {0u, 7u, 455u}) {
-        const float share = fraction > 0.0f ? fraction : default_share(options, ray < 450);
+        const float expected_fraction = fraction > 0.0f ? fraction : default_fraction(options, ray < 450);
         const vec3 d = drawn[ray].direction;
         const float of_bsdf = surfaces[ray].bsdf.pdf(surfaces[ray].outgoing, d);
         const asked_of_field asked = evaluate(box.exec, ask_field{view, ray, d});
-        CHECK(drawn[ray].pdf == Approx(share * asked.pdf + (1.0f - share) * of_bsdf));
+        CHECK(drawn[ray].pdf == Approx(expected_fraction * asked.pdf + (1.0f - expected_fraction) * of_bsdf));
         CHECK(asked.alone.pdf == asked.pdf_of_alone);
         CHECK(asked.alone.technique == sampling_technique::guide);
       }
@@ -130,7 +130,7 @@ WFPG_TEST_CASE("path guider: densities are the mixture's of field and BSDF", "[p
     }
 }
 
-/// How probable a direction of a ray's field is to meet the patch: a midpoint rule over the patch.
+/// The probability that a direction of a ray's field hits the patch, by a midpoint rule over the patch.
 struct patch_probability {
   wfpg::guide_view view;
   stored_surfaces surfaces;
@@ -150,7 +150,7 @@ struct patch_probability {
   }
 };
 
-/// Mean of a ray's probability over samples, after a few to settle, and over seeds: kept cells change slowly.
+/// Mean of a ray's probability over samples after warm-up, and over seeds. Kept cells change slowly.
 template <class Exec>
 std::vector<double> mean_patch_probability(guider_options options, const std::vector<test_surface>& surfaces,
                                            std::uint32_t rays) {
@@ -181,7 +181,7 @@ WFPG_TEST_CASE("path guider: transient fields are cast anew in each sample", "[p
   CHECK(!same_draws(box.sample(surfaces), drawn));
 }
 
-WFPG_TEST_CASE("path guider: kept fields find the patch as transient ones do", "[path_guider]") {
+WFPG_TEST_CASE("path guider: kept fields find the patch as transient fields do", "[path_guider]") {
   const vec3 places[] = {{0.2f, 0, 0.3f}, {0.6f, 0, 0.7f}, {0.0f, 0.3f, 0.6f}, {0.4f, 0.2f, 0.0f}};
   const vec3 normals[] = {{0, 1, 0}, {0, 1, 0}, {1, 0, 0}, {0, 0, 1}};
   std::vector<test_surface> surfaces;
@@ -193,7 +193,7 @@ WFPG_TEST_CASE("path guider: kept fields find the patch as transient ones do", "
         mean_patch_probability<Exec>(box_options(mode, field_lifetime::transient), surfaces, 4);
     for (std::size_t i = 0; i < 4; ++i) {
       INFO("place " << i << ", " << kept[i] << " kept, " << transient[i] << " transient");
-      CHECK(kept[i] > 0.03);  // of uniform directions 0.003 and less
+      CHECK(kept[i] > 0.03);  // at most 0.003 of uniform directions
       CHECK(kept[i] == Approx(transient[i]).epsilon(0.25));
     }
   }
@@ -204,7 +204,7 @@ struct estimate {
   double variance = 0.0;  ///< of one sample, around the exact value of its point
 };
 
-/// The patch's irradiance at points of the floor, by guided samples.
+/// The patch's irradiance at points on the floor, estimated with guided samples.
 template <class Exec>
 estimate estimate_irradiance(guided_box<Exec>& box, bsdf_kind kind) {
   const vec3 points[] = {{0.5f, 0, 0.5f}, {0.1f, 0, 0.2f}, {0.8f, 0, 0.8f}, {0.95f, 0, 0.3f}};
@@ -274,7 +274,7 @@ mean_radiance trace_mean(guider_options options, bool guided) {
   return {mean, std::sqrt((squares / n - mean * mean) / n)};
 }
 
-WFPG_TEST_CASE("path guider: paths that learn as they go agree with unguided ones", "[path_guider]") {
+WFPG_TEST_CASE("path guider: paths that learn on the way have the mean of unguided ones", "[path_guider]") {
   const mean_radiance unguided = trace_mean<Exec>(tracing_options(256), false);
   for (guiding_mode mode : modes)
     for (field_lifetime lifetime : lifetimes) {
@@ -283,18 +283,18 @@ WFPG_TEST_CASE("path guider: paths that learn as they go agree with unguided one
            << ": " << guided.mean << " +- " << guided.error << " guided, " << unguided.mean << " +- "
            << unguided.error << " not");
       CHECK(std::abs(guided.mean - unguided.mean) < 4.0 * std::hypot(guided.error, unguided.error));
-      // Plain transient fields hardly gain where so few rays share a bin.
+      // Plain transient fields gain little where so few rays share a bin.
       CHECK(guided.error < (mode == guiding_mode::plain ? 1.2 : 1.0) * unguided.error);
     }
 }
 
-/// What a guider does over samples and depths, from a seed.
+/// Results of a guider over samples and depths, for a seed.
 template <class Exec>
 std::vector<float> picture(std::uint64_t seed, field_lifetime lifetime, bool batch = false) {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   guider_options options = tracing_options(800, guiding_mode::oriented, lifetime);
-  options.octree_resolution = 4;  // many deposits in one voxel, whose order threads change
+  options.octree_resolution = 4;  // many deposits per voxel, whose order depends on threads
   options.seed = seed;
   octree_guider<Exec> guider(exec, mesh.view(), options);
   batch_box_caster::log log;
@@ -334,7 +334,7 @@ TEST_CASE("path guider: policies of one warp width give the same bits", "[path_g
   }
 }
 
-TEST_CASE("path guider: guiders of several policies live side by side", "[path_guider]") {
+TEST_CASE("path guider: guiders of several policies work side by side", "[path_guider]") {
   for (field_lifetime lifetime : lifetimes) {
     guided_box<wfpg::exec::seq> serial(lifetime);
     guided_box<wfpg::exec::omp> openmp(lifetime);

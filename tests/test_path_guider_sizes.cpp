@@ -1,5 +1,5 @@
-// Sizes at which 32 bits end: what a sample may have is refused by name before memory is asked for, and what
-// is asked for is asked for whole.
+// Sizes near the end of 32 bits. Too large samples are refused by name before any allocation. Other
+// allocations have the right size.
 #include "support/catch.hpp"
 #include "support/evaluate.hpp"
 #include "support/guiding.hpp"
@@ -20,7 +20,7 @@ using namespace wfpg_test;
 
 constexpr std::size_t billions = std::size_t(1) << 31;
 
-/// Has no more than 1 MiB for anyone.
+/// A memory resource of at most 1 MiB.
 class small_resource : public wfpg::memory_resource {
   void* do_allocate(std::size_t bytes, std::size_t alignment) override {
     if (bytes > std::size_t(1) << 20) throw std::bad_alloc();
@@ -32,7 +32,7 @@ class small_resource : public wfpg::memory_resource {
   bool do_is_equal(const wfpg::memory_resource& other) const noexcept override { return this == &other; }
 };
 
-/// What becomes of a guider with so little memory: the bytes that are missing, or what is refused.
+/// How a guider fails with so little memory: the missing bytes, or the message of a refusal.
 struct outcome {
   std::size_t missing = 0;
   std::string refused;
@@ -82,7 +82,7 @@ WFPG_TEST_CASE("path guider: deposits and vertices beyond 2^31 are refused by na
   }
 }
 
-WFPG_TEST_CASE("path guider: what is not refused is asked for whole", "[path_guider][sizes]") {
+WFPG_TEST_CASE("path guider: accepted sizes are allocated as a whole", "[path_guider][sizes]") {
   for (const field_lifetime lifetime : lifetimes) {
     guider_options options = options_of(lifetime);
     options.deposit_capacity = billions;
@@ -108,7 +108,7 @@ struct reserve_beyond {
   }
 };
 
-WFPG_TEST_CASE("a full queue stays full, however much more comes", "[path_guider][sizes]") {
+WFPG_TEST_CASE("a full queue stays full after any number of further values", "[path_guider][sizes]") {
   const Exec exec;
   wfpg::detail::value_queue<Exec> queue(exec, 4, 4);
   CHECK(evaluate(exec, 1, reserve_beyond{queue.view()})[0] != 0);

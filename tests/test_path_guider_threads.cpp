@@ -1,5 +1,5 @@
-// Guiders that work at the same time on threads of their own, as in a renderer of several pictures: each as
-// if it were alone. And one octree and cache that many threads read.
+// Guiders that run at the same time on their own threads, as in a renderer of several pictures. Also one
+// octree and cache that many threads read.
 #include "support/catch.hpp"
 #include "support/guiding.hpp"
 #include "support/policies.hpp"
@@ -24,7 +24,7 @@ constexpr std::size_t threads = 4, paths = 100;  // racecheck takes minutes for 
 constexpr std::size_t threads = 8, paths = 400;
 #endif
 
-/// f(i) for i below `threads`, each on a thread of its own; what one throws is thrown here.
+/// Calls f(i) for each i below `threads`, each in its own thread. Rethrows an exception here.
 template <class F>
 void at_the_same_time(const F& f) {
   std::exception_ptr failure;
@@ -43,7 +43,7 @@ void at_the_same_time(const F& f) {
   if (failure) std::rethrow_exception(failure);
 }
 
-/// The picture of the i-th guider: all have other options, the first four both of each.
+/// The picture of the i-th guider. All have other options; the first four have both values of each.
 template <class Exec>
 std::vector<float> picture_of(std::size_t i) {
   const Exec exec;
@@ -57,7 +57,7 @@ std::vector<float> picture_of(std::size_t i) {
   return trace_paths(exec, guider, 3, paths, box_caster());
 }
 
-WFPG_TEST_CASE("path guider: guiders on threads of their own draw what they draw alone",
+WFPG_TEST_CASE("path guider: guiders on several threads give the same directions as alone",
                "[path_guider][threads]") {
   std::vector<std::vector<float>> together(threads);
   at_the_same_time([&](std::size_t i) { together[i] = picture_of<Exec>(i); });
@@ -68,7 +68,7 @@ WFPG_TEST_CASE("path guider: guiders on threads of their own draw what they draw
 }
 
 #if !defined(__CUDACC__)
-/// What the cache's view answers along rays through the box.
+/// The cache's radiance along rays through the box.
 std::vector<float> read_all(const wfpg::exitance_cache_view& cache) {
   std::vector<float> result;
   const wfpg::svo_ray_caster caster(cache.octree());
@@ -85,7 +85,7 @@ std::vector<float> read_all(const wfpg::exitance_cache_view& cache) {
   return result;
 }
 
-WFPG_TEST_CASE("one octree and cache are read by many threads", "[path_guider][threads]") {
+WFPG_TEST_CASE("many threads may read one octree and cache", "[path_guider][threads]") {
   guided_box<Exec> box;
   box.learn();
   const wfpg::exitance_cache_view cache = box.guider.guide().cache();

@@ -23,12 +23,12 @@ constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 constexpr float infinity = std::numeric_limits<float>::infinity();
 const vec3 up(0.0f, 0.0f, 1.0f);
 
-/// Where vertices lie: the centre of the k-th voxel along x, whose normal is up.
+/// Place of a vertex: the centre of the k-th voxel along x. Its normal is up.
 WFPG_HD vec3 place(std::uint32_t k) {
   return {static_cast<float>(k) + 0.5f, 0.5f, 0.5f};
 }
 
-/// Eight voxels in a row with a recorder; a path is written call by call.
+/// Eight voxels in a row with a recorder. Tests write paths call by call.
 template <class Exec>
 struct recording {
   cached_scene<Exec> scene;
@@ -61,15 +61,15 @@ struct recording {
     wfpg::deposit_paths(scene.exec, recorder, scene.view());
     scene.cache.update(scene.exec);
   }
-  /// Radiance that leaves voxel k upward; negative where nothing was deposited.
+  /// Radiance that leaves voxel k upward. Negative without deposits.
   float leaving(std::uint32_t k, std::uint32_t side = 0) const {
     return scene.radiance(scene.leaf_at(place(k)), side);
   }
   std::uint32_t dropped() const { return recorder.dropped(scene.exec); }
 };
 
-/// A recording for one path that fields learn from: 16 fields over the sphere, each of 2 x 2 cells, of which
-/// up is one.
+/// Records one path that fields learn from. There are 16 fields over the sphere, each of 2 x 2 cells; up is
+/// in one of them.
 template <class Exec>
 struct learning : recording<Exec> {
   static constexpr std::uint32_t fields = 16, cells = 4;
@@ -99,7 +99,7 @@ struct learning : recording<Exec> {
     this->scene.cache.update(this->scene.exec);
     queue.sum(this->scene.exec);
   }
-  /// Sum and number of what a field has learnt in all of its cells.
+  /// Sum and number of the values that a field has learnt in all cells.
   std::pair<double, std::uint32_t> learnt(std::uint32_t field) const {
     const wfpg::detail::value_queue_view values = queue.view();
     std::pair<double, std::uint32_t> all{0.0, 0};
@@ -118,14 +118,14 @@ struct learning : recording<Exec> {
 };
 using values = std::pair<double, std::uint32_t>;
 
-/// A path of vertices at places 0, 1, ... with these throughputs.
+/// Writes a path of vertices at places 0, 1, ... with these throughputs.
 template <class Exec>
 void write_vertices(const recording<Exec>& r, std::size_t path, const std::vector<vec3>& throughputs) {
   for (std::uint32_t depth = 0; depth < throughputs.size(); ++depth)
     r.vertex(path, depth, place(depth), up, throughputs[depth]);
 }
 
-WFPG_TEST_CASE("radiance at each vertex is what arrives over the throughput", "[path_recorder]") {
+WFPG_TEST_CASE("radiance at a vertex is the later radiance over the throughput", "[path_recorder]") {
   recording<Exec> r(1, 4, true);
   write_vertices(r, 0, {vec3(1.0f), vec3(0.5f), vec3(0.25f)});
   r.radiance(0, 0, vec3(1.0f));
@@ -141,19 +141,19 @@ WFPG_TEST_CASE("radiance at each vertex is what arrives over the throughput", "[
   CHECK(r.dropped() == 0);
 }
 
-WFPG_TEST_CASE("colours are divided one by one and reduced to luminance", "[path_recorder]") {
+WFPG_TEST_CASE("colours are divided per channel and reduced to luminance", "[path_recorder]") {
   recording<Exec> r(1, 3, true);
   write_vertices(r, 0, {vec3(1.0f), {0.5f, 0.25f, 0.125f}, {0.5f, 0.0f, 0.125f}});
   r.radiance(0, 1, {1.0f, 2.0f, 3.0f});
   r.radiance(0, 2, {0.5f, 0.0f, 0.25f});
   r.finish();
-  CHECK(r.leaving(2) == Approx(wfpg::luminance({1.0f, 0.0f, 2.0f})));  // a channel that is zero gives none
+  CHECK(r.leaving(2) == Approx(wfpg::luminance({1.0f, 0.0f, 2.0f})));  // a zero channel gives none
   CHECK(r.leaving(1) == Approx(wfpg::luminance({1.5f / 0.5f, 2.0f / 0.25f, 3.25f / 0.125f})));
   CHECK(r.leaving(0) == Approx(wfpg::luminance({1.5f, 2.0f, 3.25f})));
   CHECK(r.scene.cache.dropped(r.scene.exec).total() == 0);
 }
 
-WFPG_TEST_CASE("emission leaves the emitter where it is included", "[path_recorder]") {
+WFPG_TEST_CASE("emission leaves the emitter if it is included", "[path_recorder]") {
   for (const bool included : {true, false}) {
     recording<Exec> r(1, 4, included);
     write_vertices(r, 0, {vec3(1.0f), vec3(0.5f), vec3(0.25f)});
@@ -167,7 +167,7 @@ WFPG_TEST_CASE("emission leaves the emitter where it is included", "[path_record
   }
 }
 
-WFPG_TEST_CASE("an emitter seen by the camera", "[path_recorder]") {
+WFPG_TEST_CASE("an emitter that the camera sees is recorded", "[path_recorder]") {
   for (const bool included : {true, false}) {
     recording<Exec> r(1, 4, included);
     write_vertices(r, 0, {vec3(1.0f)});
@@ -178,12 +178,12 @@ WFPG_TEST_CASE("an emitter seen by the camera", "[path_recorder]") {
   }
 }
 
-WFPG_TEST_CASE("the environment counts as scattered by the last vertex", "[path_recorder]") {
+WFPG_TEST_CASE("the last vertex scatters the environment's radiance", "[path_recorder]") {
   for (const bool included : {true, false}) {
     recording<Exec> r(2, 2, included);
     write_vertices(r, 0, {vec3(1.0f), vec3(0.5f)});
     r.emission(0, 2, vec3(3.0f));  // the path's length, and the recorder's capacity
-    r.emission(1, 0, vec3(7.0f));  // a camera ray into the environment touches nothing
+    r.emission(1, 0, vec3(7.0f));  // a camera ray into the environment hits nothing
     r.finish();
     CHECK(r.leaving(1) == Approx(6.0f));
     CHECK(r.leaving(0) == Approx(3.0f));
@@ -195,7 +195,7 @@ WFPG_TEST_CASE("the environment counts as scattered by the last vertex", "[path_
   }
 }
 
-WFPG_TEST_CASE("what is out of range is dropped and counted", "[path_recorder]") {
+WFPG_TEST_CASE("calls out of range are dropped and counted", "[path_recorder]") {
   recording<Exec> r(2, 2, true);
   const auto view = r.view();
   CHECK(view.paths() == 2);
@@ -228,7 +228,7 @@ WFPG_TEST_CASE("what is out of range is dropped and counted", "[path_recorder]")
   CHECK(nothing.dropped() == 2);
 }
 
-WFPG_TEST_CASE("a deposit forgets the paths, a clear drops them", "[path_recorder]") {
+WFPG_TEST_CASE("a deposit and a clear both forget the paths", "[path_recorder]") {
   recording<Exec> r(1, 3, true);
   write_vertices(r, 0, {vec3(1.0f), vec3(1.0f)});
   r.radiance(0, 1, vec3(4.0f));
@@ -246,7 +246,7 @@ WFPG_TEST_CASE("a deposit forgets the paths, a clear drops them", "[path_recorde
   CHECK(r.dropped() == 0);
 }
 
-TEST_CASE("of each group of runs one is recorded, another in each sample", "[path_recorder]") {
+TEST_CASE("one run of each group is recorded, another in each sample", "[path_recorder]") {
   constexpr std::size_t paths = 5000;
   constexpr std::uint32_t run = wfpg::detail::recorded_runs::run, samples = 400;
   for (const std::uint32_t shift : {0u, 1u, 3u}) {
@@ -264,8 +264,8 @@ TEST_CASE("of each group of runs one is recorded, another in each sample", "[pat
       }
       CHECK(wrong == 0);
     }
-    const double share = 1.0 / (1 << shift), mean = samples * share;
-    const double deviation = std::sqrt(mean * (1.0 - share));
+    const double fraction = 1.0 / (1 << shift), mean = samples * fraction;
+    const double deviation = std::sqrt(mean * (1.0 - fraction));
     INFO("one of " << (1 << shift));
     for (std::size_t path = 0; path < paths; path += run) {
       const auto count = std::count(times.begin() + std::ptrdiff_t(path),
@@ -276,7 +276,8 @@ TEST_CASE("of each group of runs one is recorded, another in each sample", "[pat
   }
 }
 
-WFPG_TEST_CASE("a share of the paths is deposited, and the others are not missed", "[path_recorder]") {
+WFPG_TEST_CASE("a fraction of the paths is deposited, and the rest counts as not dropped",
+               "[path_recorder]") {
   constexpr std::size_t paths = 300;
   recording<Exec> all(paths, 2, true), r(paths, 2, true, 2);
   CHECK(r.recorder.recorded() == 3 * 32);
@@ -309,7 +310,7 @@ WFPG_TEST_CASE("a share of the paths is deposited, and the others are not missed
   }
 }
 
-WFPG_TEST_CASE("a sample may record no paths, which are not missed either", "[path_recorder]") {
+WFPG_TEST_CASE("a sample may record no paths, and none counts as dropped", "[path_recorder]") {
   constexpr std::size_t paths = 300;
   recording<Exec> r(paths, 1, true, 2);
   const auto record_all = [&] {
@@ -321,7 +322,7 @@ WFPG_TEST_CASE("a sample may record no paths, which are not missed either", "[pa
   };
   const std::size_t most = r.recorder.recorded(), bytes = r.recorder.bytes();
   record_all();
-  r.recorder.begin_sample(r.scene.exec, 7, false);  // forgets what was not deposited, too
+  r.recorder.begin_sample(r.scene.exec, 7, false);  // also forgets paths that were not deposited
   CHECK(r.recorder.recorded() == 0);
   CHECK(r.recorder.bytes() == bytes);
   record_all();
@@ -339,7 +340,7 @@ WFPG_TEST_CASE("a sample may record no paths, which are not missed either", "[pa
   CHECK(r.dropped() == 1);
 }
 
-WFPG_TEST_CASE("radiance that is no number is dropped by the cache", "[path_recorder]") {
+WFPG_TEST_CASE("the cache drops radiance that is not finite", "[path_recorder]") {
   recording<Exec> r(5, 2, true);
   for (std::size_t path = 0; path < 5; ++path) write_vertices(r, path, {vec3(1.0f), vec3(0.5f)});
   r.radiance(0, 1, {nan, 0.0f, 0.0f});
@@ -348,11 +349,11 @@ WFPG_TEST_CASE("radiance that is no number is dropped by the cache", "[path_reco
   r.radiance(3, 1, vec3(1.0f));
   r.finish();
   CHECK(r.scene.cache.dropped(r.scene.exec).invalid == 6);
-  CHECK(r.leaving(1) == 1.0f);  // of 2 and 0
+  CHECK(r.leaving(1) == 1.0f);  // the mean of 2 and 0
   CHECK(r.leaving(0) == 0.5f);
 }
 
-/// Writes a path of the given length; every vertex scatters one unit.
+/// Writes a path of the given length. Every vertex scatters one unit.
 struct write_path {
   wfpg::path_recorder_view paths;
   std::uint32_t length;
@@ -367,7 +368,7 @@ struct write_path {
   }
 };
 
-WFPG_TEST_CASE("paths are recorded in parallel, by kernels", "[path_recorder]") {
+WFPG_TEST_CASE("kernels record paths in parallel", "[path_recorder]") {
   const std::uint32_t length = 4;
   recording<Exec> r(200, length, true);
   r.scene.exec.for_each(200, write_path{r.view(), length});
@@ -379,8 +380,7 @@ WFPG_TEST_CASE("paths are recorded in parallel, by kernels", "[path_recorder]") 
   CHECK(r.recorder.bytes() <= 200 * length * 40 + 200 * 4 + 64);
 }
 
-WFPG_TEST_CASE("fields learn what leaves the next vertex, and no more than the path tells",
-               "[path_recorder]") {
+WFPG_TEST_CASE("fields learn what leaves the next vertex, and nothing beyond the path", "[path_recorder]") {
   learning<Exec> r;
   write_vertices(r, 0, {vec3(1.0f), vec3(0.5f)});
   r.scatter(1, 3, up);
@@ -390,7 +390,7 @@ WFPG_TEST_CASE("fields learn what leaves the next vertex, and no more than the p
   r.radiance(0, 1, vec3(8.0f));
   r.finish();
   CHECK(r.learnt(3) == values{4.0, 1});
-  CHECK(r.learnt(5) == values{0.0, 0});  // nothing tells what arrives from there
+  CHECK(r.learnt(5) == values{0.0, 0});  // no vertex tells what arrives from there
   CHECK(r.learnt(0) == values{0.0, 0});  // vertex 0 had no field
   CHECK(r.leaving(1) == Approx(18.0f));
   CHECK(r.dropped() == 0);
@@ -457,13 +457,13 @@ WFPG_TEST_CASE("fields learn the environment, dark or not", "[path_recorder]") {
   CHECK(r.dropped() == 0);
 }
 
-/// What a recorded path is, and the z of the direction that leads on from its vertex 1.
+/// A recorded path as numbers, and the z of the direction after its vertex 1.
 struct path_in_numbers {
   std::uint32_t vertices, surfaces;
   float z;
 };
 
-WFPG_TEST_CASE("the environment is no surface, and the cache gets nothing for it", "[path_recorder]") {
+WFPG_TEST_CASE("the cache gets no deposit for the environment", "[path_recorder]") {
   for (const bool included : {true, false}) {
     learning<Exec> r(included);
     write_vertices(r, 0, {vec3(1.0f), vec3(0.5f), vec3(0.25f)});  // three surfaces
@@ -496,7 +496,7 @@ WFPG_TEST_CASE("the environment is no surface, and the cache gets nothing for it
   }
 }
 
-WFPG_TEST_CASE("fields learn no emission where it is left out", "[path_recorder]") {
+WFPG_TEST_CASE("fields learn no emission if it is left out", "[path_recorder]") {
   learning<Exec> r(false);
   write_vertices(r, 0, {vec3(1.0f)});
   r.scatter(0, 1, up);
@@ -506,7 +506,7 @@ WFPG_TEST_CASE("fields learn no emission where it is left out", "[path_recorder]
   r.escape(2, vec3(0.25f));
   r.emission(0, 2, vec3(5.0f));
   r.finish();
-  CHECK(r.learnt(1) == values{10.0, 1});  // of the environment, scattered by vertex 1
+  CHECK(r.learnt(1) == values{10.0, 1});  // from the environment, scattered by vertex 1
   CHECK(r.learnt(2) == values{0.0, 1});
   CHECK(r.leaving(0) == Approx(12.0f));
 }
@@ -522,7 +522,7 @@ WFPG_TEST_CASE("directions out of order are dropped and counted", "[path_recorde
   CHECK(r.dropped() == 3);
   r.escape(1, vec3(1.0f));  // there is a surface
   CHECK(r.dropped() == 4);
-  r.escape(2, vec3(1.0f));  // beyond what is recorded: known to come, and not learnt from
+  r.escape(2, vec3(1.0f));  // beyond the recorded length: legal, but not learnt from
   r.emission(0, 2, vec3(1.0f));
   r.scatter(1, wfpg::no_field, up);
   CHECK(r.dropped() == 4);
@@ -531,8 +531,7 @@ WFPG_TEST_CASE("directions out of order are dropped and counted", "[path_recorde
   CHECK(r.leaving(1) == Approx(2.0f));
 }
 
-WFPG_TEST_CASE("a recorder that no field learns from takes directions and escapes for nothing",
-               "[path_recorder]") {
+WFPG_TEST_CASE("a recorder without learning fields ignores directions and escapes", "[path_recorder]") {
   const recording<Exec> r(1, 3, true);
   const wfpg::path_recorder_view paths = r.view();
   r.vertex(0, 0, place(0), up, vec3(1.0f));

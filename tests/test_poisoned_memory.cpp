@@ -1,4 +1,4 @@
-// Memory that is not zero: voxelizer, octree and cache write all that they read.
+// Memory that is not zero: voxelizer, octree and cache write before they read.
 #include "support/cached_scene.hpp"
 #include "support/poisoning_resource.hpp"
 #include "support/policies.hpp"
@@ -16,8 +16,7 @@ using wfpg::vec3;
 
 constexpr unsigned char poisons[] = {0x00, 0xcd, 0xff};
 
-/// Triangles whose corners lie as far from voxels' faces as still counts as touching, so that rounding
-/// decides whether a voxel is touched.
+/// Triangles whose corners just touch voxels' faces, so that rounding decides which voxels they touch.
 test_mesh undecided_triangles(std::size_t n, std::uint32_t resolution) {
   const float side = 1.0f + 1.0f / static_cast<float>(resolution);  // of the cube around the unit box
   const float voxel = side / static_cast<float>(resolution), origin = 0.5f - 0.5f * side;
@@ -33,7 +32,7 @@ test_mesh undecided_triangles(std::size_t n, std::uint32_t resolution) {
   return mesh;
 }
 
-/// What an octree and its cache are, as far as a host can copy it.
+/// A host copy of an octree and its cache.
 struct copied_scene {
   std::vector<morton_code> codes;
   std::vector<std::uint32_t> normals;
@@ -45,7 +44,7 @@ struct copied_scene {
   }
 };
 
-/// Both sides of a node.
+/// Radiance of both sides of a node.
 struct radiance_of_sides {
   wfpg::exitance_cache_view cache;
   WFPG_HD float operator()(std::size_t i) const {
@@ -76,7 +75,7 @@ copied_scene scene_with(unsigned char poison, const test_mesh& mesh, std::uint32
   return copied;
 }
 
-WFPG_TEST_CASE("fragments, octree and cache read nothing that they have not written", "[poison]") {
+WFPG_TEST_CASE("fragments, octree and cache read only memory that they have written", "[poison]") {
   for (const std::uint32_t resolution : {32u, 256u}) {
     const test_mesh mesh = undecided_triangles(1500, resolution);
     const copied_scene first = scene_with<Exec>(poisons[0], mesh, resolution);

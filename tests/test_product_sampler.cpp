@@ -1,5 +1,5 @@
-// The product sampler: frequencies against the product's own cells, densities that integrate to one and are
-// the sampler's own. tests/test_renderer_products.cpp does the same for many more BSDFs.
+// The product sampler. Compares frequencies with the product's cells. Densities integrate to one and equal
+// the sampler's. tests/test_renderer_products.cpp tests many more BSDFs.
 #include "support/products.hpp"
 
 #include <wfpg/sampling/product_sampler.hpp>
@@ -29,7 +29,7 @@ made_product<Exec, test_bsdf> make(const product_size& size, bool hemisphere, bs
           samples};
 }
 
-WFPG_TEST_CASE("product sampler: densities are frequencies, integrate to one, and answer queries",
+WFPG_TEST_CASE("product sampler: densities match frequencies, integrate to one, and answer queries",
                "[product_sampler]") {
   product_family family;
   for (const product_size& size : product_sizes)
@@ -42,7 +42,7 @@ WFPG_TEST_CASE("product sampler: densities are frequencies, integrate to one, an
   CHECK(family.frequencies().accepted());
 }
 
-WFPG_TEST_CASE("product sampler: nothing is left of black and of delta BSDFs", "[product_sampler]") {
+WFPG_TEST_CASE("product sampler: black and delta BSDFs give an empty product", "[product_sampler]") {
   for (const bsdf_kind kind : {bsdf_kind::black, bsdf_kind::mirror}) {
     const auto made = make<Exec>({16, 8}, true, kind, 1);
     CHECK(made.empty());
@@ -50,10 +50,10 @@ WFPG_TEST_CASE("product sampler: nothing is left of black and of delta BSDFs", "
   }
 }
 
-/// What `light` is of a direction, over each block of a field: probabilities.
+/// Probability of each block of a field, if the density is proportional to `light`.
 template <class Light>
 std::vector<double> shares_of_blocks(const directional_field& field, std::uint32_t p, const Light& light) {
-  constexpr std::uint32_t n = 32;  // of the midpoint rule, along a block's side
+  constexpr std::uint32_t n = 32;  // points of the midpoint rule along a block's side
   std::vector<double> blocks(p * p, 0.0);
   double sum = 0.0;
   for (std::uint32_t i = 0; i < p * p * n * n; ++i) {
@@ -71,8 +71,7 @@ double cosine_above(vec3 d, vec3 normal) {
   return std::max(double(glm::dot(d, normal)), 0.0);
 }
 
-WFPG_TEST_CASE("product sampler: of light everywhere and a Lambertian cosines are left",
-               "[product_sampler]") {
+WFPG_TEST_CASE("product sampler: a Lambertian under uniform light samples the cosine", "[product_sampler]") {
   constexpr product_size size{16, 8};
   const made_product<Exec, test_bsdf> made(Exec(), size, field_values(field_kind::uniform, size.field, 1),
                                            false, make_surface({}, up, toward_eye), 1, 10);
@@ -88,7 +87,7 @@ WFPG_TEST_CASE("product sampler: of light everywhere and a Lambertian cosines ar
   }
 }
 
-/// Lambertian, and tells that no part of it is narrow.
+/// A Lambertian that reports that no part of it is narrow.
 struct matte_bsdf : test_bsdf {
   WFPG_HD wfpg::glossy_part glossy(vec3) const { return {}; }
 };
@@ -99,8 +98,8 @@ double glow(vec3 d) {
   return 0.2 + along * along;
 }
 
-/// What cells of a field over the hemisphere above `up`, or over the sphere, hold of it: with the cosine over
-/// a hemisphere, as the guide's fields do.
+/// Cell values of a field over the hemisphere above `up`, or over the sphere. Values over a hemisphere
+/// include the cosine, as in the guide's fields.
 std::vector<float> cells_of_glow(std::uint32_t n, bool hemisphere) {
   const directional_field domain = hemisphere ? directional_field(wfpg::grid_distribution(nullptr, n), up)
                                               : directional_field(wfpg::grid_distribution(nullptr, n));
@@ -112,7 +111,7 @@ std::vector<float> cells_of_glow(std::uint32_t n, bool hemisphere) {
   return values;
 }
 
-/// By how much a product's blocks differ from that: the share of directions that are drawn elsewhere.
+/// The fraction of directions that a product samples in other blocks than the exact product.
 template <class Exec, class Bsdf>
 double misplaced(bool hemisphere, vec3 normal) {
   constexpr product_size size{32, 8};
@@ -122,7 +121,7 @@ double misplaced(bool hemisphere, vec3 normal) {
   surface.bsdf.normal = normal;
   const made_product<Exec, Bsdf> made(Exec(), size, cells_of_glow(size.field, hemisphere), hemisphere,
                                       surface, 1, 10);
-  // What a Lambertian surface reflects.
+  // Light that a Lambertian surface reflects.
   std::vector<double> difference =
       shares_of_blocks(made.field(), size.product, [&](vec3 d) { return glow(d) * cosine_above(d, normal); });
   const std::vector<double> cells = made.cells();
@@ -134,20 +133,20 @@ double misplaced(bool hemisphere, vec3 normal) {
   return sum;
 }
 
-WFPG_TEST_CASE("product sampler: the cosine counts once, also where the field has it", "[product_sampler]") {
+WFPG_TEST_CASE("product sampler: the cosine counts once, even if the field has it", "[product_sampler]") {
   for (const bool hemisphere : {false, true})
     for (const vec3 normal : {up, glm::normalize(up + vec3(0.4f, 0.0f, -0.3f))}) {
       const double lambert = misplaced<Exec, test_bsdf>(hemisphere, normal);
       const double matte = misplaced<Exec, matte_bsdf>(hemisphere, normal);
       INFO("hemisphere " << hemisphere << ", the field's normal " << (normal == up) << ": misplaced "
-                         << lambert << ", told as matte " << matte);
+                         << lambert << ", reported as matte " << matte);
       CHECK(lambert < 0.02);
       CHECK(matte < 0.02);
     }
 }
 
-/// Reflects and transmits alike, where a direction lies in the far half of its block; P blocks along a side
-/// of the sphere's square.
+/// Reflects and transmits equally where a direction lies in the far half of its block. `blocks` is their
+/// number along a side of the sphere's square.
 struct half_black_bsdf : test_bsdf {
   std::uint32_t blocks = 8;
 
@@ -158,7 +157,8 @@ struct half_black_bsdf : test_bsdf {
   }
 };
 
-WFPG_TEST_CASE("product sampler: a block that is black at one point alone is drawn", "[product_sampler]") {
+WFPG_TEST_CASE("product sampler: a block that is black at one of its points is still sampled",
+               "[product_sampler]") {
   constexpr product_size size{16, 8};
   wfpg::surface<half_black_bsdf> surface;
   surface.geometric_normal = surface.normal = up;
@@ -167,12 +167,12 @@ WFPG_TEST_CASE("product sampler: a block that is black at one point alone is dra
     const made_product<Exec, half_black_bsdf> made(
         Exec(), size, field_values(field_kind::uniform, size.field, 1), false, surface, seed, 10);
     std::size_t black = 0;
-    for (const double share : made.cells()) black += share > 0.0 ? 0 : 1;
-    CHECK(black == 0);  // of a block's two points one is in the half that is not
+    for (const double fraction : made.cells()) black += fraction > 0.0 ? 0 : 1;
+    CHECK(black == 0);  // one of a block's two points is in the reflecting half
   }
 }
 
-/// Scatters to both sides of the surface as a Lambertian one does to its own.
+/// Scatters to both sides of the surface as a Lambertian to one.
 struct two_sided_bsdf : test_bsdf {
   WFPG_HD bool transmits() const { return true; }
   WFPG_HD float eval(vec3, vec3 incident) const {
@@ -180,8 +180,7 @@ struct two_sided_bsdf : test_bsdf {
   }
 };
 
-WFPG_TEST_CASE("product sampler: what goes through a surface counts as what it reflects",
-               "[product_sampler]") {
+WFPG_TEST_CASE("product sampler: transmitted light counts as reflected light does", "[product_sampler]") {
   constexpr product_size size{32, 8};
   wfpg::surface<two_sided_bsdf> surface;
   surface.geometric_normal = surface.normal = surface.bsdf.normal = up;

@@ -1,5 +1,5 @@
-// The parts of wfpg-quality: statistics, pictures, its cache, references, progress, samples alone. Its
-// options are test_quality_options.cpp's, whole runs test_quality_program.cpp's.
+// The parts of wfpg-quality: statistics, pictures, cache, references, progress, single samples.
+// test_quality_options.cpp tests its options, test_quality_program.cpp whole runs.
 #include "cache.hpp"
 #include "flip.hpp"
 #include "pictures.hpp"
@@ -48,7 +48,7 @@ quality::measured_run hand_made(std::size_t method, int seed, double error, doub
 
 }  // namespace
 
-TEST_CASE("statistics of hand-made values", "[quality]") {
+TEST_CASE("statistics of hand-made values are right", "[quality]") {
   const quality::statistic one = quality::statistic_of({3.0});
   CHECK(one.mean == 3.0);
   CHECK_FALSE(one.deviation.has_value());
@@ -56,7 +56,7 @@ TEST_CASE("statistics of hand-made values", "[quality]") {
   CHECK(three.mean == Approx(3.0));
   CHECK(three.deviation.value() == Approx(std::sqrt(7.0)));
   CHECK(three.standard_error.value() == Approx(std::sqrt(7.0 / 3.0)));
-  // 10% and 20% beside one another are sqrt(5)% of ten.
+  // 10% and 20% side by side give sqrt(5)% of ten.
   const quality::ratio gain = quality::ratio_of({8.0, 1.6, 0.8}, {2.0, 0.8, 0.4}).value();
   CHECK(gain.value == Approx(4.0));
   CHECK(gain.standard_error.value() == Approx(4.0 * std::sqrt(0.05)));
@@ -65,7 +65,7 @@ TEST_CASE("statistics of hand-made values", "[quality]") {
   CHECK_FALSE(quality::ratio_of({infinite, {}, {}}, one).has_value());
 }
 
-TEST_CASE("summaries: noise, gains and equal time by hand", "[quality]") {
+TEST_CASE("summaries: noise, gains and equal time match values by hand", "[quality]") {
   const quality::settings given = parsed({"--methods", "pt,wfpg", "--spp", "4", "--seeds", "2"});
   quality::reference_noise noise{{}, std::nullopt};
   noise.error.mse_reinhard = 1.0;
@@ -94,7 +94,7 @@ TEST_CASE("summaries: noise, gains and equal time by hand", "[quality]") {
   const json& mae = summary[0]["methods"][1]["errors"]["mae"];
   CHECK((mae["mean"].get<double>() == Approx(6.0) && mae["ratio"].get<double>() == Approx(41.0 / 6.0)));
   CHECK(summary[0]["methods"][1]["light_hits_per_path"].get<double>() == Approx(0.5));
-  // All that the reference's noise hides.
+  // The reference's noise hides all of the error.
   noise.error.mse_reinhard = 6.5;
   const json hidden =
       quality::summary_of(given, {hand_made(0, 1, 40.0, 1.0), hand_made(1, 1, 6.0, 2.0)}, noise);
@@ -103,7 +103,7 @@ TEST_CASE("summaries: noise, gains and equal time by hand", "[quality]") {
   CHECK(hidden[0]["methods"][1]["errors"]["mse_reinhard"]["noise_is_large"].get<bool>());
 }
 
-TEST_CASE("records survive JSON, infinite errors too", "[quality]") {
+TEST_CASE("records survive JSON, with infinite errors too", "[quality]") {
   quality::run_record record;
   render::image_error error;
   error.mse = infinite;
@@ -120,7 +120,7 @@ TEST_CASE("records survive JSON, infinite errors too", "[quality]") {
   CHECK_THROWS_AS(quality::record_from_json(json::object()), json::exception);
 }
 
-TEST_CASE("pictures: the crop is where errors are greatest", "[quality]") {
+TEST_CASE("pictures: the crop is where errors are largest", "[quality]") {
   std::vector<double> errors(128 * 96, 0.0);
   errors[50 * 128 + 100] = infinite;
   errors[52 * 128 + 110] = 1.0;
@@ -132,7 +132,7 @@ TEST_CASE("pictures: the crop is where errors are greatest", "[quality]") {
   CHECK((whole.left == 0 && whole.top == 0 && whole.width == 4 && whole.height == 3));
 }
 
-TEST_CASE("pictures: exposure, error maps, frames", "[quality]") {
+TEST_CASE("pictures: exposure, error maps and frames are right", "[quality]") {
   image grey = render::make_image(10, 10);
   CHECK(quality::exposure_for(grey) == 1.0f);
   for (vec3& pixel : grey.pixels) pixel = vec3(4.0f);
@@ -151,7 +151,7 @@ TEST_CASE("pictures: exposure, error maps, frames", "[quality]") {
   CHECK(quality::enlarged_to(grey, 25).width == 30);
 }
 
-TEST_CASE("cache: what is stored is found, what is damaged is not", "[quality]") {
+TEST_CASE("cache: stored entries are found, damaged ones are not", "[quality]") {
   temporary_folder folder;
   std::ostringstream log;
   const quality::run_cache cache(folder.file("cache"), log);
@@ -182,7 +182,7 @@ TEST_CASE("cache: what is stored is found, what is damaged is not", "[quality]")
   CHECK_THROWS_AS(quality::run_cache("/proc/none", log), std::invalid_argument);
 }
 
-TEST_CASE("references: halves in chunks, and all that tells them apart", "[quality]") {
+TEST_CASE("references: halves have chunks, and each setting changes their key", "[quality]") {
   const quality::settings given = parsed({"--scenes", "ajar", "ajar --nee off", "ajar --roulette-depth 8",
                                           "--size", "16x16", "--max-depth", "4"});
   const quality::reference_plan plan = quality::plan_reference(given.scenes[0], "x", 11, 4);
@@ -197,12 +197,12 @@ TEST_CASE("references: halves in chunks, and all that tells them apart", "[quali
   CHECK(plan.hash() != quality::plan_reference(given.scenes[0], "x", 12, 4).hash());
   CHECK(plan.hash() != quality::plan_reference(given.scenes[1], "x", 11, 4).hash());
   CHECK(plan.hash() != quality::plan_reference(given.scenes[2], "x", 11, 4).hash());
-  // A longer one begins with the same chunks.
+  // A longer reference begins with the same chunks.
   CHECK(plan.halves[0][0].key.hash() ==
         quality::plan_reference(given.scenes[0], "x", 64, 4).halves[0][0].key.hash());
 }
 
-TEST_CASE("scenes are told apart by what is in their files", "[quality]") {
+TEST_CASE("the content of a scene's files identifies it", "[quality]") {
   temporary_folder folder;
   const auto identity = [](const std::string& source) {
     return quality::identity_of({source, source, "", {}});
@@ -222,7 +222,7 @@ TEST_CASE("scenes are told apart by what is in their files", "[quality]") {
   CHECK_THROWS_AS(identity(folder.file("none.glb")), std::runtime_error);
 }
 
-TEST_CASE("progress: what is left, and how long from what the same took", "[quality]") {
+TEST_CASE("progress: remaining work and time follow from finished work", "[quality]") {
   temporary_folder folder;
   std::ostringstream log;
   const quality::run_cache cache(folder.file("cache"), log);
@@ -248,7 +248,7 @@ TEST_CASE("progress: what is left, and how long from what the same took", "[qual
   CHECK(contains(log.str(), "run 4: in the cache"));
 }
 
-TEST_CASE("single samples add up to what the renderer combines itself", "[quality]") {
+TEST_CASE("single samples add up to the renderer's combined picture", "[quality]") {
   const render::scene box = render::make_builtin_scene("cornell-box");
   render::render_options options;
   options.width = options.height = 8;
@@ -287,7 +287,7 @@ TEST_CASE("single samples add up to what the renderer combines itself", "[qualit
   CHECK(quality::mean_of({one, two}).alone.by_measure.at("smape") == std::vector<double>{2.0, 4.0});
 }
 
-TEST_CASE("HDR-FLIP: nothing where it cannot be had, zero of a picture against itself", "[quality]") {
+TEST_CASE("HDR-FLIP: no result if not installed, and zero for equal pictures", "[quality]") {
   temporary_folder folder;
   image picture = render::make_image(16, 16);
   for (std::size_t i = 0; i < picture.pixels.size(); ++i) picture.pixels[i] = vec3(float(i % 7) * 0.1f);
@@ -306,7 +306,7 @@ TEST_CASE("HDR-FLIP: nothing where it cannot be had, zero of a picture against i
     CHECK((*errors)[1].value() > 0.01);
     CHECK((*errors)[1].value() < 1.0);
   }
-  // The script and its files are gone.
+  // The script and its files are deleted.
   std::size_t files = 0;
   for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder.file(""))) ++files;
   CHECK(files == 2);

@@ -1,4 +1,4 @@
-// The command line of wfpg-quality: presets, scenes, methods, and what is refused.
+// The command line of wfpg-quality: presets, scenes, methods, and refused arguments.
 #include "progress.hpp"
 #include "runs.hpp"
 #include "settings.hpp"
@@ -14,7 +14,7 @@ namespace {
 
 using namespace render_test;
 
-/// The message of arguments that cannot be right.
+/// The message for invalid arguments.
 std::string refused(const strings& arguments) {
   try {
     parsed(arguments);
@@ -26,7 +26,7 @@ std::string refused(const strings& arguments) {
 
 }  // namespace
 
-TEST_CASE("options: presets hold where nothing is given", "[quality]") {
+TEST_CASE("options: presets apply where no option is given", "[quality]") {
   const quality::settings quick = parsed({"--preset", "quick"});
   CHECK(quick.scenes.size() == 6);
   CHECK(quick.methods.size() == 3);
@@ -55,7 +55,7 @@ TEST_CASE("options: presets hold where nothing is given", "[quality]") {
   CHECK(options.nee);
 }
 
-TEST_CASE("options: methods are known, one's own, or wfpg-render's", "[quality]") {
+TEST_CASE("options: methods are known names, own names, or wfpg-render's options", "[quality]") {
   const quality::settings given = parsed({"--methods", "pt,small,wfpg-transient-plain", "--method",
                                           "small=--method wfpg --slot-resolution 16 --nee off --device seq",
                                           "--method", "more=--recast 4"});
@@ -67,13 +67,13 @@ TEST_CASE("options: methods are known, one's own, or wfpg-render's", "[quality]"
   CHECK_FALSE(small.nee);
   CHECK(small.where == render::device::seq);
   CHECK(quality::options_of(given.scenes[0], given.methods[2]).mode == render::guiding::plain);
-  // Beside path tracing where no others are named.
+  // If no others are named, path tracing is added.
   const quality::settings own = parsed({"--method", "more=--recast 4"});
   REQUIRE(own.methods.size() == 2);
   CHECK(own.methods[0].name == "pt");
 }
 
-TEST_CASE("options: what cannot be right is said", "[quality]") {
+TEST_CASE("options: invalid arguments are named", "[quality]") {
   CHECK(contains(refused({"--preset", "best"}), "best"));
   CHECK(contains(refused({"--spp", "0"}), "0"));
   CHECK(contains(refused({"--seconds", "-1"}), "seconds"));
@@ -146,11 +146,11 @@ TEST_CASE("options: values out of range are refused by a line that names the ran
   CHECK(parsed({"--seeds", "010", "--spp", "010"}).budgets[0].spp == 10);
   CHECK(parsed({"--reference-chunk", "2", "--reference-spp", "4000000"}).reference_chunk == 2);
   CHECK(parsed({"--seeds", "5", "--method", "a=--method pt --seed 999995"}).seeds == 5);
-  // A method that chooses lights may be measured in a scene without next-event estimation too.
+  // A method with light groups may be measured in a scene without next-event estimation too.
   CHECK(parsed({"--scenes", "ajar", "cornell-box --nee off", "--method", "a=--light-groups 4"}).seeds == 3);
 }
 
-TEST_CASE("options: a method may have seeds of its own", "[quality]") {
+TEST_CASE("options: a method may have its own number of seeds", "[quality]") {
   const quality::settings given =
       parsed({"--scenes", "ajar", "--method", "pt=--method pt", "--method", "other=--method pt --seed 1000"});
   const auto seed = [&](std::size_t method, int number) {
@@ -163,7 +163,7 @@ TEST_CASE("options: a method may have seeds of its own", "[quality]") {
   CHECK(seed(1, 7) == 1007);
 }
 
-TEST_CASE("options: scenes in files", "[quality]") {
+TEST_CASE("options: scenes may be files", "[quality]") {
   temporary_folder folder;
   const std::string spaced = folder.write("a room --nee off.glb", "");
   const quality::settings given = parsed({"--scenes", "a/b/room.glb --nee off", "c/hall.gltf", spaced});
@@ -176,7 +176,7 @@ TEST_CASE("options: scenes in files", "[quality]") {
   CHECK(given.scenes[2].options.nee);
 }
 
-TEST_CASE("options: names of files", "[quality]") {
+TEST_CASE("options: names of files and titles of times are readable", "[quality]") {
   CHECK(quality::file_name_of("ajar --nee off") == "ajar-nee-off");
   CHECK(quality::file_name_of("a/b: c*") == "a-b-c-");
   CHECK(quality::title_of_seconds(3.2) == "4 s");

@@ -1,4 +1,4 @@
-// Whole runs of wfpg-quality on tiny pictures: what they leave behind, interruptions, damage, failures.
+// Whole runs of wfpg-quality on tiny pictures: output files, interruptions, damage, failures.
 #include "program.hpp"
 #include "summary.hpp"
 #include "support/catch.hpp"
@@ -16,7 +16,7 @@ namespace {
 using namespace render_test;
 using quality::json;
 
-/// Runs the program in a folder and says what it logged.
+/// Runs the program in a folder and keeps its log.
 struct outcome {
   int code = 0;
   std::string out, log;
@@ -34,7 +34,7 @@ std::size_t count_of(const std::string& text, const std::string& part) {
   return count;
 }
 
-/// A tiny measurement: a reference in two chunks a half, two methods, two seeds.
+/// Arguments of a tiny measurement: a reference in two chunks a half, two methods, two seeds.
 strings tiny(const temporary_folder& folder, const strings& more = {}, const std::string& size = "16x16",
              const std::string& scene = "cornell-box") {
   strings arguments{"--scenes",
@@ -65,7 +65,7 @@ json results_of(const temporary_folder& folder) {
 
 }  // namespace
 
-TEST_CASE("a whole run, and one after it that renders nothing", "[quality]") {
+TEST_CASE("a whole run works, and a second run renders nothing", "[quality]") {
   temporary_folder folder;
   const outcome first = run(tiny(folder, {"--per-sample", "3"}));
   INFO(first.log);
@@ -104,7 +104,7 @@ TEST_CASE("a whole run, and one after it that renders nothing", "[quality]") {
   CHECK(content_of(folder.file("out/results.md")) == markdown);
 }
 
-TEST_CASE("an interrupted run goes on, and damage is rendered again", "[quality]") {
+TEST_CASE("an interrupted run continues, and damaged files are rendered again", "[quality]") {
   temporary_folder folder;
   REQUIRE(run(tiny(folder)).code == 0);
   const auto errors = [&folder] {
@@ -115,7 +115,7 @@ TEST_CASE("an interrupted run goes on, and damage is rendered again", "[quality]
     return values;
   };
   const std::vector<double> before = errors();
-  // As if interrupted: one chunk of the reference and one rendering are not there yet.
+  // As after an interruption: one chunk of the reference and one rendering are missing.
   std::filesystem::remove(cached(folder, "reference-", ".json").at(2));
   std::filesystem::remove(cached(folder, "cornell-box-small-2-samples-2", ".json").at(0));
   outcome again = run(tiny(folder));
@@ -139,7 +139,7 @@ TEST_CASE("an interrupted run goes on, and damage is rendered again", "[quality]
   CHECK(count_of(again.log, "in the cache") == 0);
 }
 
-TEST_CASE("failures are one message and exit code 2", "[quality]") {
+TEST_CASE("failures print one message and return exit code 2", "[quality]") {
   temporary_folder folder;
   const auto message_of = [&folder](const strings& more, const std::string& scene = "cornell-box") {
     const outcome failed = run(tiny(folder, more, "16x16", scene));
@@ -155,7 +155,7 @@ TEST_CASE("failures are one message and exit code 2", "[quality]") {
   CHECK(run({}).code == 2);
 }
 
-TEST_CASE("folders that cannot be written to and crops are refused before the first sample", "[quality]") {
+TEST_CASE("unwritable folders and invalid crops are refused before the first sample", "[quality]") {
   temporary_folder folder;
   const std::string file = folder.write("file", "x");
   std::filesystem::create_directories(folder.file("taken/results.md"));
@@ -177,7 +177,7 @@ TEST_CASE("folders that cannot be written to and crops are refused before the fi
   CHECK(contains(with("--output", folder.file("taken")), "results.md is there and is not a file"));
 }
 
-TEST_CASE("seconds are a budget too", "[quality]") {
+TEST_CASE("a budget in seconds works too", "[quality]") {
   temporary_folder folder;
   const outcome timed = run(tiny(folder, {"--seconds", "0.02"}));
   INFO(timed.log);

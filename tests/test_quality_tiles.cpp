@@ -1,4 +1,4 @@
-// Agreement of means by tiles: none is missed, and none is seen where there is none.
+// Agreement of means by tiles: a bias is found, and none is reported without one.
 #include "support/catch.hpp"
 #include "tiles.hpp"
 
@@ -11,7 +11,7 @@ namespace {
 
 using seeds_of_tiles = std::vector<std::vector<double>>;
 
-/// Tiles around 1, with noise that both methods of a seed have and noise of their own.
+/// Tiles around 1. Both methods of a seed share one noise, and each has its own.
 seeds_of_tiles noisy_tiles(std::uint32_t method, std::size_t seeds, std::size_t tiles, double bias) {
   seeds_of_tiles result;
   for (std::size_t seed = 0; seed < seeds; ++seed) {
@@ -27,7 +27,7 @@ seeds_of_tiles noisy_tiles(std::uint32_t method, std::size_t seeds, std::size_t 
 
 }  // namespace
 
-TEST_CASE("tiles of a picture whose sides are no multiples of theirs", "[quality]") {
+TEST_CASE("tiles at the edges of a picture are smaller", "[quality]") {
   render::image picture = render::make_image(6, 5);
   for (int i = 0; i < 30; ++i)
     picture.pixels[static_cast<std::size_t>(i)] =
@@ -38,7 +38,7 @@ TEST_CASE("tiles of a picture whose sides are no multiples of theirs", "[quality
   for (std::size_t i = 0; i < 4; ++i) CHECK(std::fabs(tiles[i] - expected[i]) < 1e-5);
 }
 
-TEST_CASE("tiles of one mean: z is normally distributed", "[quality]") {
+TEST_CASE("tiles of one mean have a normally distributed z", "[quality]") {
   const quality::tile_agreement found =
       quality::agreement_of(noisy_tiles(1, 32, 20000, 0.0), noisy_tiles(2, 32, 20000, 0.0));
   CHECK(found.tiles == 20000);
@@ -46,7 +46,7 @@ TEST_CASE("tiles of one mean: z is normally distributed", "[quality]") {
   CHECK(std::fabs(found.mean_square - 1.0) < 4.0 * std::sqrt(2.0 / 20000.0));
 }
 
-TEST_CASE("tiles: a bias below shared noise is seen, in one tile and in all together", "[quality]") {
+TEST_CASE("tiles: a bias below the shared noise is found, in one tile and in all", "[quality]") {
   // A standard error is 0.1 sqrt(2 / 32) = 0.025.
   seeds_of_tiles one = noisy_tiles(1, 32, 1000, 0.0);
   for (std::vector<double>& tiles : one) tiles[7] -= 0.25;
@@ -58,7 +58,7 @@ TEST_CASE("tiles: a bias below shared noise is seen, in one tile and in all toge
   CHECK(in_all.mean_square > 1.0 + 4.0 * std::sqrt(2.0 / 1000.0));
 }
 
-TEST_CASE("tiles without noise: rounding is none, a difference is certain", "[quality]") {
+TEST_CASE("tiles without noise: rounding is ignored, a difference is certain", "[quality]") {
   const seeds_of_tiles truth(20, {1.0, 2.0, 0.0, 4.0}), rounded(20, {1.000001, 2.0, 0.0, 4.1});
   const quality::tile_agreement found = quality::agreement_of(rounded, truth);
   CHECK(found.tiles == 1);

@@ -1,5 +1,5 @@
-// Fields of bins in a box whose light is known: what cells see, and that the form of the
-// caster and the size of its buffer change nothing. Filter and floor are test_radiance_field_filter.cpp's.
+// Fields of bins in a box with known light. Cells see the right radiance. Forms of casters and buffer sizes
+// change nothing. test_radiance_field_filter.cpp tests filter and floor.
 #include "support/evaluate.hpp"
 #include "support/fields.hpp"
 #include "support/lit_box.hpp"
@@ -29,7 +29,7 @@ float constant_walls(std::uint32_t face, float, float) {
   return wall_radiance[face];
 }
 
-/// Copies out the cells of a field before anything is done to them.
+/// Copies the cells of a field before filter and floor.
 struct raw_cells {
   wfpg::field_cells cells;
   wfpg::exitance_cache_view cache;
@@ -59,7 +59,7 @@ seen_cells look(const lit_box<Exec>& box, const wfpg::field_origin& origin, std:
   return {values.to_host(box.exec), cones.to_host(box.exec)};
 }
 
-/// The face that a ray from inside meets, and how far from the face's rim.
+/// The face that a ray from inside hits, and the distance of the hit from the face's rim.
 std::uint32_t face_hit(const wfpg::ray& r, float& from_rim) {
   const vec3 p = r.origin + box_caster()(r).distance * r.direction;
   std::uint32_t face = 0;
@@ -76,12 +76,12 @@ std::uint32_t face_hit(const wfpg::ray& r, float& from_rim) {
   return face;
 }
 
-WFPG_TEST_CASE("radiance field: cells see the radiance of the wall they look at", "[radiance_field]") {
+WFPG_TEST_CASE("radiance field: cells see the radiance of the wall that they look at", "[radiance_field]") {
   const lit_box<Exec> box(constant_walls);
   wfpg::field_origin origin;
   origin.position = {0.45f, 0.4f, 0.55f};
   const seen_cells seen = look(box, origin, 32);
-  const float node = 0.1f;  // cones read nodes of about their own width: away from the rim only one wall's
+  const float node = 0.1f;  // cones read nodes of about their own width, so one wall's only away from the rim
   int checked = 0, wrong = 0;
   for (std::size_t i = 0; i < seen.values.size(); ++i) {
     float from_rim;
@@ -94,7 +94,7 @@ WFPG_TEST_CASE("radiance field: cells see the radiance of the wall they look at"
   CHECK(wrong == 0);
 }
 
-WFPG_TEST_CASE("radiance field: a uniform furnace is uniform, to the rim and at any resolution",
+WFPG_TEST_CASE("radiance field: a furnace's field is uniform, to the rim and at any resolution",
                "[radiance_field]") {
   const lit_box<Exec> box([](std::uint32_t, float, float) { return 2.5f; });
   for (std::uint32_t resolution : {2u, 16u, 31u}) {
@@ -120,8 +120,7 @@ struct direction_of_cone {
   }
 };
 
-WFPG_TEST_CASE("radiance field: cones are jittered inside their cells, anew with the seed",
-               "[radiance_field]") {
+WFPG_TEST_CASE("radiance field: cones are jittered inside their cells, by the seed", "[radiance_field]") {
   wfpg::field_origin origin;
   const wfpg::field_cells first(origin, 16);
   origin.seed = 1;
@@ -142,7 +141,7 @@ WFPG_TEST_CASE("radiance field: cones are jittered inside their cells, anew with
   CHECK(outside == 0);
 }
 
-WFPG_TEST_CASE("radiance field: the environment where a cone misses", "[radiance_field]") {
+WFPG_TEST_CASE("radiance field: cones that miss see the environment", "[radiance_field]") {
   const lit_box<Exec> box([](std::uint32_t, float, float) { return 0.0f; });
   wfpg::field_origin origin;
   origin.position = {0.5f, 0.5f, 0.5f};
@@ -156,7 +155,7 @@ WFPG_TEST_CASE("radiance field: the environment where a cone misses", "[radiance
   CHECK(std::abs(sky - 1024 / 6) < 20);
 }
 
-WFPG_TEST_CASE("radiance field: what is not finite or negative from a caster counts as nothing or bounded",
+WFPG_TEST_CASE("radiance field: invalid radiance counts as 0, and large radiance is clamped",
                "[radiance_field]") {
   const lit_box<Exec> box(constant_walls);
   const wfpg::field_cells cells({}, 4);
@@ -176,7 +175,7 @@ WFPG_TEST_CASE("radiance field: what is not finite or negative from a caster cou
   CHECK(far == std::vector<float>(3, 0.0f));
 }
 
-/// The resident fields of one wave, as bits, and of each ray which is its.
+/// The resident fields of one wave as bits, and the field of each ray.
 struct made_fields {
   std::vector<std::uint32_t> words, field_of_ray;
   std::vector<wfpg::resident_field> fields;
@@ -205,7 +204,7 @@ made_fields make_fields(const lit_box<Exec>& box, const std::vector<test_surface
   return {words.to_host(exec), field_of_ray.to_host(exec), resident.to_host(exec)};
 }
 
-WFPG_TEST_CASE("radiance field: casters of both forms, and buffers of any size, give the same bits",
+WFPG_TEST_CASE("radiance field: both forms of casters and any buffer size give the same bits",
                "[radiance_field]") {
   const lit_box<Exec> box(constant_walls);
   const auto wave = wall_surfaces(300, 1);
@@ -225,7 +224,7 @@ WFPG_TEST_CASE("radiance field: casters of both forms, and buffers of any size, 
   }
 }
 
-WFPG_TEST_CASE("radiance field: every ray gets a field, above its own horizon where surfaces reflect",
+WFPG_TEST_CASE("radiance field: every ray has a field, above its horizon if surfaces reflect",
                "[radiance_field]") {
   const lit_box<Exec> box(constant_walls);
   auto wave = wall_surfaces(400, 2);
@@ -244,7 +243,8 @@ WFPG_TEST_CASE("radiance field: every ray gets a field, above its own horizon wh
       const directional_field field(grid, f.normal);
       for (std::uint32_t i = 0; i < 20; ++i) {
         const vec3 d = field.sample(hashed_numbers{ray}(i, 0));
-        below += glm::dot(d, wave[ray].normal) < -1e-6f;  // walls are flat: a bin's rays share their normal
+        below +=
+            glm::dot(d, wave[ray].normal) < -1e-6f;  // walls are flat, so a bin's rays share their normal
       }
     }
     CHECK(below == 0);
@@ -256,7 +256,7 @@ float equal_walls(std::uint32_t, float, float) {
   return 2.0f;
 }
 
-WFPG_TEST_CASE("radiance field: of light everywhere hemispheres carry the cosine, and spheres do not",
+WFPG_TEST_CASE("radiance field: under uniform light hemispheres have the cosine, spheres not",
                "[radiance_field]") {
   const lit_box<Exec> box(equal_walls);
   auto wave = wall_surfaces(400, 2);
@@ -265,7 +265,7 @@ WFPG_TEST_CASE("radiance field: of light everywhere hemispheres carry the cosine
   for (std::size_t i = 0; i < made.fields.size(); ++i) {
     const wfpg::grid_distribution grid(made.words.data() + i * wfpg::grid_distribution::words(8), 8);
     const bool hemisphere = made.fields[i].hemisphere();
-    double high = 0.0, expected = 0.0, all = 0.0;  // above 30 degrees, of all above the horizon
+    double high = 0.0, expected = 0.0, all = 0.0;  // above 30 degrees; of all above the horizon
     for (std::uint32_t cell = 0; cell < 64; ++cell) {
       const double z = wfpg::square_to_hemisphere_z((vec2(float(cell % 8), float(cell / 8)) + 0.5f) / 8.0f);
       const double light = hemisphere ? z : 1.0;
@@ -275,7 +275,8 @@ WFPG_TEST_CASE("radiance field: of light everywhere hemispheres carry the cosine
       high += double(grid.weight(cell % 8, cell / 8)) / double(grid.total());
     }
     INFO("hemisphere " << hemisphere);
-    CHECK(high == Approx(expected / all).margin(0.1));  // the filter blurs; the other would be 0.2 away
+    CHECK(high ==
+          Approx(expected / all).margin(0.1));  // the filter blurs; without the cosine it would be 0.2 away
   }
 }
 

@@ -1,5 +1,5 @@
-// What the filter and the floor make of a field's cells: a Gaussian that crosses the square's edges as the
-// sphere does, keeps energy and symmetry; floors relative and absolute.
+// The filter and the floor of a field's cells. The Gaussian crosses the square's edges as the sphere does,
+// and keeps energy and symmetry. Floors are relative or absolute.
 #include "support/fields.hpp"
 #include "support/policies.hpp"
 
@@ -59,13 +59,13 @@ double largest_difference(const std::vector<double>& a, const std::vector<double
   return largest;
 }
 
-WFPG_TEST_CASE("radiance field filter: a Gaussian of one angle, 0.8 cells of a sphere", "[radiance_field]") {
+WFPG_TEST_CASE("radiance field filter: it is a Gaussian of 0.8 cells of a sphere", "[radiance_field]") {
   constexpr std::uint32_t n = 16;
   std::vector<float> values(n * n, 0.0f);
   values[7 * n + 8] = 3.0f;
   for (bool hemisphere : {false, true}) {
     const double alpha =
-        hemisphere ? 0.8 * std::sqrt(2.0) : 0.8;  // hemispheres have twice the cells an angle²
+        hemisphere ? 0.8 * std::sqrt(2.0) : 0.8;  // a hemisphere has twice the cells per angle²
     double tap[3], sum = 0.0;
     for (int i = 0; i < 3; ++i) sum += (i ? 2.0 : 1.0) * (tap[i] = std::exp(-i * i / (alpha * alpha)));
     const auto p = finished<Exec>(values, n, hemisphere, only_filter());
@@ -81,8 +81,7 @@ WFPG_TEST_CASE("radiance field filter: a Gaussian of one angle, 0.8 cells of a s
   }
 }
 
-/// How far, in units of a cell's width, light of cell `from` spreads over the sphere; and over how many
-/// cells.
+/// How far the light of cell `from` spreads over the sphere, in widths of a cell, and over how many cells.
 struct spread {
   double distance = 0.0;
   int cells = 0;
@@ -100,7 +99,7 @@ spread spread_of(const std::vector<double>& p, std::size_t from, std::uint32_t r
   return result;
 }
 
-WFPG_TEST_CASE("radiance field filter: light crosses the square's edges to where the sphere goes on",
+WFPG_TEST_CASE("radiance field filter: light crosses the square's edges as on the sphere",
                "[radiance_field]") {
   constexpr std::uint32_t n = 16;
   for (std::size_t from = 0; from < n * n; ++from) {
@@ -112,8 +111,8 @@ WFPG_TEST_CASE("radiance field filter: light crosses the square's edges to where
     INFO("cell " << x << ' ' << y);
     const spread s = spread_of(p, from, n);
     CHECK(s.distance < 5.0);  // 2.8 cells in the square, stretched by the map; the far side is 14 away
-    // Everything crosses an edge: as many cells as inside. Not so around corners and the middles of edges,
-    // the points about which the edges fold.
+    // Light near an edge spreads over as many cells as inside. Exceptions are corners and the middles of
+    // edges, about which the edges fold.
     const bool left_right = x < 2 || x >= n - 2, up_down = y < 2 || y >= n - 2;
     const auto near_fold = [](std::size_t along) { return along == std::clamp<std::size_t>(along, 6, 9); };
     if ((left_right && up_down) || near_fold(left_right ? y : x)) continue;
@@ -123,15 +122,14 @@ WFPG_TEST_CASE("radiance field filter: light crosses the square's edges to where
   }
 }
 
-WFPG_TEST_CASE("radiance field filter: energy is kept, symmetric inputs stay so, constants stay constant",
-               "[radiance_field]") {
+WFPG_TEST_CASE("radiance field filter: it keeps energy, symmetry and constants", "[radiance_field]") {
   for (std::uint32_t n : {16u, 31u})
     for (bool hemisphere : {false, true}) {
       const auto flat = finished<Exec>(std::vector<float>(n * n, 2.0f), n, hemisphere, only_filter());
       CHECK(largest_difference(flat, std::vector<double>(n * n, 1.0 / (n * n))) < 1e-8);
 
-      // Each cell gives away as much as it has: the filter's columns sum to one. A floor that is known makes
-      // it visible, since distributions are normalised.
+      // Each cell keeps its energy if the filter's columns sum to one. Distributions are normalised, so a
+      // known floor makes this visible.
       std::vector<float> values(n * n, 0.0f);
       random_numbers random(n);
       for (std::size_t cell : {std::size_t(0), std::size_t(n - 1), std::size_t(n * n - n), std::size_t(n / 2),
@@ -140,11 +138,11 @@ WFPG_TEST_CASE("radiance field filter: energy is kept, symmetric inputs stay so,
         values[cell] = 1.0f;
         const float floor = 1.0f / float(n * n);
         const auto p = finished<Exec>(values, n, hemisphere, {0.8f, floor, true});
-        const double least = *std::min_element(p.begin(), p.end());  // a cell that received nothing but floor
-        CHECK(double(floor) / least == Approx(2.0).epsilon(1e-4));   // = the sum: energy 1, and floors 1
+        const double least = *std::min_element(p.begin(), p.end());  // a cell with only the floor
+        CHECK(double(floor) / least == Approx(2.0).epsilon(1e-4));   // the sum of energy 1 and floors 1
       }
 
-      // Half a turn about the pole, and reflections, map cells onto cells: what has these symmetries keeps
+      // Half a turn about the pole, and reflections, map cells onto cells. Inputs with these symmetries keep
       // them.
       for (std::uint32_t y = 0; y < n; ++y)
         for (std::uint32_t x = 0; x < n; ++x) {
@@ -162,7 +160,7 @@ WFPG_TEST_CASE("radiance field filter: energy is kept, symmetric inputs stay so,
     }
 }
 
-WFPG_TEST_CASE("radiance field: floors are relative to the mean, or absolute; black becomes uniform",
+WFPG_TEST_CASE("radiance field filter: floors are relative or absolute, and black becomes uniform",
                "[radiance_field]") {
   constexpr std::uint32_t n = 8;
   std::vector<float> values(n * n, 0.0f);

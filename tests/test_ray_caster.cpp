@@ -1,5 +1,5 @@
-// What a ray caster has to look like, and the one that needs no host: marching through the octree against
-// brute force over its voxels.
+// The requirements on ray casters, and the caster that needs no host. It marches through the octree and is
+// compared with brute force over the voxels.
 #include "support/octree_nodes.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
@@ -62,7 +62,7 @@ wfpg::sparse_voxel_octree<Exec> scattered(const Exec& exec, int samples, std::ui
   return wfpg::sparse_voxel_octree<Exec>(exec, fragments);
 }
 
-/// The part of a ray inside a box, empty where enter > leave.
+/// The part of a ray inside a box. Empty if enter > leave.
 struct interval {
   double enter, leave;
 };
@@ -82,7 +82,7 @@ interval inside(const ray& r, const wfpg::bounds3& box) {
   return result;
 }
 
-/// The first voxel beyond `start` that the ray crosses by at least `chord`: its distance, or 1e300.
+/// The distance of the first voxel beyond `start` that the ray crosses by at least `chord`, or 1e300.
 double first_voxel(const std::vector<wfpg::bounds3>& leaves, const ray& r, double start, double chord) {
   double nearest = 1e300;
   for (const wfpg::bounds3& leaf : leaves) {
@@ -120,7 +120,7 @@ struct comparison {
   int hits = 0, misses = 0, wrong = 0;
 };
 
-/// The caster may pass voxels that it only grazes; it must not pass others, nor hit where nothing is.
+/// The caster may miss voxels that it only grazes. It must hit all others, and nothing where none is.
 template <class Exec>
 comparison compare(const Exec& exec, const sparse_voxel_octree_view& tree, const std::vector<ray>& rays,
                    float clearance) {
@@ -157,7 +157,7 @@ ray make_ray(vec3 origin, vec3 direction) {
   return r;
 }
 
-WFPG_TEST_CASE("SVO ray caster: random rays from inside against brute force", "[ray_caster]") {
+WFPG_TEST_CASE("SVO ray caster: random rays from inside agree with brute force", "[ray_caster]") {
   const Exec exec;
   random_numbers random(1);
   std::vector<ray> rays;
@@ -175,7 +175,7 @@ WFPG_TEST_CASE("SVO ray caster: random rays from inside against brute force", "[
   CHECK(c.hits > 300);
 }
 
-WFPG_TEST_CASE("SVO ray caster: rays parallel to axes, through centres and along faces", "[ray_caster]") {
+WFPG_TEST_CASE("SVO ray caster: rays along axes, through centres and along faces agree", "[ray_caster]") {
   const Exec exec;
   const auto tree = scattered(exec, 150, 16, 4);
   const auto boxes = leaf_boxes(exec, tree.view());
@@ -198,7 +198,7 @@ WFPG_TEST_CASE("SVO ray caster: rays parallel to axes, through centres and along
   CHECK(c.wrong == 0);
   CHECK(c.hits > 100);
 
-  // On a face either voxel may be hit: an answer is all that can be asked.
+  // On a face either voxel may be hit. The call only has to return.
   std::vector<ray> on_faces;
   for (const wfpg::bounds3& box : boxes) {
     on_faces.push_back(make_ray({box.lower.x, box.lower.y, -1.0f}, {0, 0, 1}));
@@ -208,7 +208,7 @@ WFPG_TEST_CASE("SVO ray caster: rays parallel to axes, through centres and along
     CHECK(std::isfinite(hit.distance));
 }
 
-WFPG_TEST_CASE("SVO ray caster: origins outside, near and very far", "[ray_caster]") {
+WFPG_TEST_CASE("SVO ray caster: rays from outside, near and very far, agree", "[ray_caster]") {
   const Exec exec;
   const auto tree = scattered(exec, 1000, 16, 5);
   random_numbers random(6);
@@ -223,7 +223,7 @@ WFPG_TEST_CASE("SVO ray caster: origins outside, near and very far", "[ray_caste
     if (distance < 2.0f) CHECK(compare(exec, tree.view(), rays, 0.0f).wrong == 0);
     CHECK(std::count_if(hits.begin(), hits.end(), [](const ray_hit& h) { return h.is_hit(); }) > 150);
   }
-  // Where a float's spacing exceeds a voxel, all that can be asked is an end.
+  // If a float's spacing exceeds a voxel, the call only has to return.
   std::vector<ray> far;
   for (float distance : {1e4f, 1e6f, 1e8f, 1e20f})
     for (int i = 0; i < 20; ++i) {
@@ -234,7 +234,7 @@ WFPG_TEST_CASE("SVO ray caster: origins outside, near and very far", "[ray_caste
   for (const ray_hit& hit : cast(exec, svo_ray_caster(tree.view()), far)) CHECK(std::isfinite(hit.distance));
 }
 
-WFPG_TEST_CASE("SVO ray caster: keeps t_min, t_max and the clearance", "[ray_caster]") {
+WFPG_TEST_CASE("SVO ray caster: it respects t_min, t_max and the clearance", "[ray_caster]") {
   const Exec exec;
   const std::vector<wfpg::surface_fragment> host = {{{0.2f, 0.5f, 0.5f}, {1, 0, 0}, 1.0f},
                                                     {{0.8f, 0.5f, 0.5f}, {1, 0, 0}, 1.0f}};
@@ -257,7 +257,7 @@ WFPG_TEST_CASE("SVO ray caster: keeps t_min, t_max and the clearance", "[ray_cas
   CHECK(distance(0.2f, 0.0f, 3e38f, 2.0f) == Approx(0.6f).margin(voxel));
 }
 
-WFPG_TEST_CASE("SVO ray caster: an empty octree and one voxel", "[ray_caster]") {
+WFPG_TEST_CASE("SVO ray caster: an empty octree and one voxel work", "[ray_caster]") {
   const Exec exec;
   const wfpg::buffer<wfpg::surface_fragment, Exec> none(exec, 0);
   auto nothing = wfpg::fragments_from_samples(exec, const_view<wfpg::surface_fragment>(none), 64);
@@ -274,7 +274,7 @@ WFPG_TEST_CASE("SVO ray caster: an empty octree and one voxel", "[ray_caster]") 
   CHECK(hits[1].distance == Approx(2.5f).margin(0.1));
 }
 
-WFPG_TEST_CASE("SVO ray caster: a ray that leads nowhere ends at once", "[ray_caster]") {
+WFPG_TEST_CASE("SVO ray caster: degenerate rays end at once", "[ray_caster]") {
   const Exec exec;
   const auto tree = scattered(exec, 300, 32, 2);
   const float nan = std::nanf(""), far = 3.0e38f;

@@ -1,5 +1,5 @@
-// The path tracer without guiding: known answers, next-event estimation against none, the same picture on any
-// number of threads; and the lights that both methods share.
+// The path tracer without guiding: known answers, next-event estimation, one picture on any number of
+// threads. Also the lights that all methods share.
 #include "casters/embree_caster.hpp"
 #include "scene/builtin_scenes.hpp"
 #include "support/catch.hpp"
@@ -32,7 +32,7 @@ struct setup {
   std::uint32_t samples = 16;
 };
 
-/// Embree as casters come that work on batches between kernels.
+/// Embree as a batch caster, which runs between kernels.
 class batch_caster {
  public:
   batch_caster(const embree_caster& inner) : inner_(inner) {}
@@ -82,7 +82,7 @@ std::vector<vec3> trace(const scene& scene, const setup& with, Guider guider = G
   return tracer.picture();
 }
 
-/// Means of independent pictures, and the z score of the difference of two sets of them.
+/// Means of independent pictures, and the z score of the difference between two sets.
 struct batch {
   std::vector<double> means;
   double mean() const {
@@ -109,8 +109,8 @@ batch batch_of(const scene& scene, setup with) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("the furnace has the radiance that theory says", "[renderer]", wfpg::exec::seq,
-                   wfpg::exec::omp, wfpg::exec::tbb) {
+TEMPLATE_TEST_CASE("the furnace has its known radiance", "[renderer]", wfpg::exec::seq, wfpg::exec::omp,
+                   wfpg::exec::tbb) {
   const scene furnace = make_builtin_scene("furnace");
   for (const bool nee : {false, true})
     for (const std::uint32_t depth : {1u, 2u, 8u}) {
@@ -183,7 +183,7 @@ TEST_CASE("one seed gives one picture on any number of threads", "[renderer]") {
   CHECK_FALSE(same_bits(serial, trace<wfpg::exec::seq>(scene, other)));
 }
 
-TEST_CASE("emitters shine on one side, and the environment everywhere", "[renderer]") {
+TEST_CASE("emitters emit on one side, and the environment everywhere", "[renderer]") {
   material lamp;
   lamp.base_color = vec3(0.0f);
   lamp.emission = {1.0f, 2.0f, 3.0f};
@@ -202,7 +202,7 @@ TEST_CASE("a surface under a constant sky returns its albedo", "[renderer]") {
   grey.base_color = vec3(0.5f);
   scene s = square_of(grey);
   s.environment = vec3(1.0f);
-  // The square is all there is: every reflected path leaves.
+  // The scene has only this square, so every reflected path leaves.
   CHECK(mean_of(trace<wfpg::exec::tbb>(s, {})) == Approx(0.5).epsilon(1e-4));
   s.materials[0].kind = material_kind::mirror;
   CHECK(mean_of(trace<wfpg::exec::tbb>(s, {})) == Approx(0.5).epsilon(1e-4));
@@ -210,7 +210,7 @@ TEST_CASE("a surface under a constant sky returns its albedo", "[renderer]") {
   s.materials[0].base_color = vec3(1.0f);
   setup deep;
   deep.samples = 256;
-  // Light from below the one boundary has the radiance of its index: 0.04 + 0.96 / 1.5².
+  // Light from below the boundary has the radiance of its index: 0.04 + 0.96 / 1.5².
   CHECK(mean_of(trace<wfpg::exec::tbb>(s, deep)) == Approx(0.04 + 0.96 / 2.25).epsilon(0.01));
 }
 
@@ -246,7 +246,7 @@ TEST_CASE("light samples follow power, and report the density of a hit", "[rende
   CHECK(glm::length(centre / static_cast<float>(bright) - vec3(1.0f / 3.0f, -1.0f / 3.0f, 0.0f)) < 0.01f);
 }
 
-TEST_CASE("lights without extent light what faces them", "[renderer]") {
+TEST_CASE("lights without extent light surfaces that face them", "[renderer]") {
   material grey;
   grey.base_color = vec3(0.5f);
   scene s = square_of(grey);
@@ -261,7 +261,7 @@ TEST_CASE("lights without extent light what faces them", "[renderer]") {
     s.view.vertical_fov = 0.01f;
     return trace<wfpg::exec::seq>(s, narrow).front().x;
   };
-  // Albedo / pi times irradiance: 32 / 4².
+  // Albedo / pi times irradiance, 32 / 4².
   CHECK(radiance(light) == Approx(0.5f / pi * 2.0f).epsilon(1e-3));
   light.kind = punctual_kind::spot;
   light.cos_inner = 0.9f;
@@ -279,7 +279,7 @@ TEST_CASE("lights without extent light what faces them", "[renderer]") {
 }
 
 TEST_CASE("a solid absorbs by Beer's law, and an emitter shows its texture", "[renderer]") {
-  // A slab of glass, seen straight on, before an emitter.
+  // A slab of glass in front of an emitter, seen along its normal.
   scene s;
   for (const float z : {0.0f, -1.0f, -2.0f}) {
     const auto first = static_cast<std::uint32_t>(s.positions.size());
@@ -309,7 +309,7 @@ TEST_CASE("a solid absorbs by Beer's law, and an emitter shows its texture", "[r
 }
 
 TEST_CASE("next-event estimation finds a textured emitter's mean", "[renderer]") {
-  // A lamp of which the texture leaves half dark, above a floor.
+  // A lamp above a floor. Its texture leaves half of it dark.
   material floor;
   floor.base_color = vec3(0.7f);
   scene s = square_of(floor);
@@ -333,7 +333,7 @@ TEST_CASE("next-event estimation finds a textured emitter's mean", "[renderer]")
   CHECK(on.mean() > 0.0);
 }
 
-TEST_CASE("an environment map lights as it is sampled and as it is found", "[renderer]") {
+TEST_CASE("next-event estimation and hits agree on an environment map", "[renderer]") {
   material grey;
   grey.base_color = vec3(0.5f);
   scene s = square_of(grey);

@@ -1,4 +1,4 @@
-// What command lines share: a scene with its environment, and what is warned of.
+// Arguments that all programs share: a scene with its environment, and the warnings about it.
 #include "app/image_io.hpp"
 #include "app/render_arguments.hpp"
 #include "scene/builtin_scenes.hpp"
@@ -20,7 +20,7 @@ namespace {
 
 using namespace render_test;
 
-/// What loading a scene logs.
+/// The warnings while a scene loads.
 std::string warnings_of(const render::scene_arguments& given, bool nee = true) {
   render::render_options options;
   options.nee = nee;
@@ -29,7 +29,7 @@ std::string warnings_of(const render::scene_arguments& given, bool nee = true) {
   return log.str();
 }
 
-/// What wfpg-render says of options of a scene that is not there: it has read no file.
+/// The error of wfpg-render for options of a scene that does not exist. It has read no file.
 std::string said_of(const std::string& options) {
   std::vector<std::string> words{"nowhere.glb", "--stats", "/nonexistent/stats"};
   std::istringstream text(options);
@@ -65,7 +65,7 @@ TEST_CASE("values out of range are refused by a line that names the range", "[re
   const std::string size = "WIDTHxHEIGHT, such as 640x360, each from 1 to 32768 and 2^28 pixels at most",
                     bytes = "bytes from 0 to 1TiB, such as 24MiB",
                     count = "a whole number from 1 to 4294967295",
-                    spp = "a whole number from 1 to 1073741824", share = "a number from 0 to 1",
+                    spp = "a whole number from 1 to 1073741824", fraction = "a number from 0 to 1",
                     seed = "a whole number from 0 to 18446744073709551615",
                     octree = "a power of two from 1 to 4096";
   struct refusal {
@@ -95,8 +95,8 @@ TEST_CASE("values out of range are refused by a line that names the range", "[re
       {"--seed", "1e3", seed, "pt"},
       {"--max-depth", "1025", "a whole number from 1 to 1024", "pt"},
       {"--roulette-depth", "0", spp, "pt"},
-      {"--guide-fraction", "1.5", share, "wfpg"},
-      {"--guide-fraction", "nan", share, "wfpg"},
+      {"--guide-fraction", "1.5", fraction, "wfpg"},
+      {"--guide-fraction", "nan", fraction, "wfpg"},
       {"--guided-depths", "0", count, "wfpg"},
       {"--octree-resolution", "100", octree, "wfpg"},
       {"--octree-resolution", "8192", octree, "wfpg"},
@@ -119,12 +119,12 @@ TEST_CASE("values out of range are refused by a line that names the range", "[re
       {"--sarsa-resolution", "65", "a whole number from 1 to 64", "sarsa"},
       {"--sarsa-directions", "1", "a whole number from 2 to 64", "sarsa"},
       {"--sarsa-step", "0", count, "sarsa"},
-      {"--sarsa-learning-rate", "nan", share, "sarsa"},
+      {"--sarsa-learning-rate", "nan", fraction, "sarsa"},
       {"--records-octree", "3", octree, "records"},
       {"--records-level", "13", "a whole number from 0 to 12", "records"},
       {"--records-rays", "0", "a whole number from 1 to 2147483648", "records"},
       {"--records-cones", "257", "a whole number from 1 to 256", "records"},
-      {"--records-albedo", "2", share, "records"},
+      {"--records-albedo", "2", fraction, "records"},
       {"--exposure", "0", "a number above 0, up to 1e+30", "pt --png /nonexistent/a.png"},
       {"--exposure", "nan", "a number above 0, up to 1e+30", "pt --png /nonexistent/a.png"},
       {"--reference", "''", "a path", "pt"},
@@ -139,7 +139,7 @@ TEST_CASE("values out of range are refused by a line that names the range", "[re
   CHECK(contains(said_of("--product-resolution 5 --method wfpg-product"), "5 not in {4,8,16}"));
 }
 
-TEST_CASE("numbers are decimal, and at the ends of their ranges accepted", "[renderer][arguments]") {
+TEST_CASE("numbers are decimal, and range ends are accepted", "[renderer][arguments]") {
   CHECK(parsed_options("--spp 010").spp == 10);
   CHECK(parsed_options("--seed 010").seed == 10);
   CHECK(parsed_options("--seed 18446744073709551615").seed == std::numeric_limits<std::uint64_t>::max());
@@ -202,7 +202,7 @@ TEST_CASE("options without effect are refused by a line that says what they need
     CHECK(is_accepted(options));
 }
 
-TEST_CASE("a scene without light, or whose lights are lost, is warned of", "[renderer][arguments]") {
+TEST_CASE("a scene without usable lights causes a warning", "[renderer][arguments]") {
   CHECK(warnings_of({"ajar", ""}) == "");
   CHECK(warnings_of({"ajar", ""}, false) == "");
 
@@ -220,7 +220,7 @@ TEST_CASE("a scene without light, or whose lights are lost, is warned of", "[ren
                  "it: warning: point, spot and directional lights are lost with --nee off\n"));
 }
 
-TEST_CASE("an environment that is named takes the place of the scene's", "[renderer][arguments]") {
+TEST_CASE("a named environment replaces the scene's", "[renderer][arguments]") {
   const temporary_folder folder;
   render::image sky = render::make_image(4, 2);
   for (vec3& texel : sky.pixels) texel = vec3(2.0f);
@@ -231,7 +231,7 @@ TEST_CASE("an environment that is named takes the place of the scene's", "[rende
   CHECK_FALSE(contains(log.str(), "no light"));
 }
 
-TEST_CASE("the vertex that roulette begins at is an option", "[renderer][arguments]") {
+TEST_CASE("--roulette-depth sets the vertex at which roulette begins", "[renderer][arguments]") {
   const auto depth_of = [](const std::string& arguments) {
     render::render_options options;
     CLI::App app;
@@ -244,7 +244,7 @@ TEST_CASE("the vertex that roulette begins at is an option", "[renderer][argumen
   CHECK_THROWS_AS(depth_of("--roulette-depth 0"), CLI::ValidationError);
 }
 
-TEST_CASE("the first vertices alone are guided where that is asked for", "[renderer][arguments]") {
+TEST_CASE("--guided-depths limits guiding to the first vertices", "[renderer][arguments]") {
   const auto parsed = [](const std::string& arguments) {
     render::render_options options;
     options.width = options.height = 16;
@@ -269,7 +269,8 @@ TEST_CASE("the first vertices alone are guided where that is asked for", "[rende
   };
   const std::string transient = "--method wfpg --fields transient";
   CHECK(fields_made(transient) == std::vector<bool>{true, true, true});
-  CHECK(fields_made(transient, 4) == std::vector<bool>{true, true, false});  // the last finds emitters alone
+  CHECK(fields_made(transient, 4) ==
+        std::vector<bool>{true, true, false});  // the last direction only finds emitters
   CHECK(fields_made(transient, 4, false) == std::vector<bool>{true, true, true});
   CHECK(fields_made(transient, 2) == std::vector<bool>{true, false, false});
   CHECK(fields_made(transient + " --guided-depths 1") == std::vector<bool>{true, false, false});
@@ -279,7 +280,7 @@ TEST_CASE("the first vertices alone are guided where that is asked for", "[rende
     CHECK_THROWS_AS(parsed(std::string("--guided-depths 1 --method ") + method), CLI::RequiresError);
 }
 
-TEST_CASE("options of fields are refused where there are none", "[renderer][arguments]") {
+TEST_CASE("options of fields are refused for methods without fields", "[renderer][arguments]") {
   const auto parse = [](const std::string& arguments) {
     render::render_options options;
     CLI::App app;

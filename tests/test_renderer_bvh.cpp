@@ -1,5 +1,5 @@
-// The renderer's own hierarchy against all triangles one by one, in double precision; no leaks at edges and
-// corners; what cannot be hit; the same answers on every policy.
+// The renderer's own BVH, compared with all triangles in double precision. No leaks at edges and corners,
+// triangles that cannot be hit, and equal answers on every policy.
 #include "casters/bvh_scene.hpp"
 #include "support/policies.hpp"
 #include "support/random_meshes.hpp"
@@ -21,7 +21,7 @@ using wfpg::ray;
 using wfpg::ray_hit;
 using wfpg::vec3;
 
-/// What kernels use has a name, for CUDA compilers.
+/// Types in kernels need names, for CUDA compilers.
 namespace bvh_test {
 
 struct answers {
@@ -62,10 +62,10 @@ std::vector<answers> cast(const test_mesh& mesh, const std::vector<ray>& rays,
   return found.to_host(exec);
 }
 
-/// Where a ray meets one triangle, with how far inside its edges it does; negative: it does not.
+/// Where a ray crosses a triangle, and how far inside its edges. Negative: it misses.
 struct crossing {
   double distance = -1.0;
-  double inside = -1.0;  ///< the least barycentric weight
+  double inside = -1.0;  ///< the smallest barycentric weight
 };
 
 crossing cross_triangle(const ray& r, const test_mesh& mesh, std::size_t t) {
@@ -100,8 +100,8 @@ std::vector<ray> random_rays(std::size_t n, std::uint64_t seed) {
   return rays;
 }
 
-/// What is wrong with an answer, or nothing. Triangles that are hit on an edge, or at a limit of the ray, may
-/// be hit or not.
+/// What is wrong with an answer. Empty if nothing is. Hits on a triangle's edge, or at an end of the ray, may
+/// be missed.
 std::string fault(const ray& r, const answers& found, const test_mesh& mesh) {
   constexpr double margin = 1e-4;
   double nearest = 1e30, nearest_perhaps = 1e30;
@@ -143,7 +143,7 @@ void check_against_all(const test_mesh& mesh, const std::vector<ray>& rays,
   CHECK(faults == 0);
 }
 
-/// A box's faces as n x n squares each that share their corners.
+/// A box whose faces are n x n squares each. The squares share their corners.
 test_mesh fine_box(int n) {
   test_mesh mesh;
   for (int face = 0; face < 6; ++face)
@@ -162,7 +162,7 @@ test_mesh fine_box(int n) {
   return mesh;
 }
 
-/// From inside toward points of the mesh's edges and to its corners.
+/// Rays from inside to points on the mesh's edges and to its corners.
 std::vector<ray> rays_through_edges(const test_mesh& mesh, std::size_t n) {
   random_numbers random(17);
   std::vector<ray> rays;
@@ -175,7 +175,7 @@ std::vector<ray> rays_through_edges(const test_mesh& mesh, std::size_t n) {
   return rays;
 }
 
-WFPG_TEST_CASE("a hierarchy finds what all triangles one by one say", "[renderer][bvh]") {
+WFPG_TEST_CASE("a BVH agrees with a test of each triangle", "[renderer][bvh]") {
   const std::vector<ray> rays = random_rays(3000, 5);
   for (const test_mesh& mesh : {mixed_triangles(700, 0.001f, 0.7f, 3), long_slivers(60, 4), sphere_mesh(12),
                                 mixed_triangles(1, 0.4f, 0.8f, 3), mixed_triangles(4, 0.4f, 0.8f, 3)})
@@ -189,7 +189,7 @@ WFPG_TEST_CASE("leaves of any size give the same hits", "[renderer][bvh]") {
     check_against_all(mesh, rays, cast<Exec>(mesh, rays, {size}));
 }
 
-WFPG_TEST_CASE("nothing leaks out of a closed box through edges and corners", "[renderer][bvh]") {
+WFPG_TEST_CASE("no ray leaks out of a closed box through edges and corners", "[renderer][bvh]") {
   for (const int n : {1, 9}) {
     const test_mesh box = fine_box(n);
     const std::vector<ray> rays = rays_through_edges(box, 100000);
@@ -200,7 +200,7 @@ WFPG_TEST_CASE("nothing leaks out of a closed box through edges and corners", "[
   }
 }
 
-WFPG_TEST_CASE("rays along axes and inside planes", "[renderer][bvh]") {
+WFPG_TEST_CASE("rays along axes and inside planes agree with brute force", "[renderer][bvh]") {
   const test_mesh box = fine_box(4);
   std::vector<ray> rays;
   for (int axis = 0; axis < 3; ++axis)
@@ -222,7 +222,7 @@ WFPG_TEST_CASE("rays along axes and inside planes", "[renderer][bvh]") {
   }
 }
 
-WFPG_TEST_CASE("a hierarchy passes the checks of a ray caster", "[renderer][bvh]") {
+WFPG_TEST_CASE("a BVH passes the checks of a ray caster", "[renderer][bvh]") {
   const Exec exec;
   const device_mesh<Exec> box(exec, fine_box(5));
   const bvh_scene<Exec> scene(exec, box.view(), environment);
@@ -235,7 +235,7 @@ WFPG_TEST_CASE("a hierarchy passes the checks of a ray caster", "[renderer][bvh]
   CHECK(report);
 }
 
-WFPG_TEST_CASE("what no ray can hit is never hit", "[renderer][bvh]") {
+WFPG_TEST_CASE("degenerate and not finite triangles are never hit", "[renderer][bvh]") {
   const float nan = std::numeric_limits<float>::quiet_NaN(),
               infinity = std::numeric_limits<float>::infinity();
   const vec3 a(0.0f), b(1.0f, 0.0f, 0.0f), c(0.0f, 1.0f, 0.0f);
@@ -267,10 +267,10 @@ WFPG_TEST_CASE("what no ray can hit is never hit", "[renderer][bvh]") {
   for (std::size_t i = 1; i < odd.size(); ++i) CHECK_FALSE(found[i].hit.is_hit());
 }
 
-WFPG_TEST_CASE("triangles in one place, and many of one size at each scale", "[renderer][bvh]") {
+WFPG_TEST_CASE("triangles in one place, and many sizes at each scale, are found", "[renderer][bvh]") {
   test_mesh stacked, nested;
   for (int i = 0; i < 3000; ++i) stacked.add({0.0f, 0.0f, 0.5f}, {1.0f, 0.0f, 0.5f}, {0.0f, 1.0f, 0.5f});
-  // Centres close in on a corner: each level of the tree splits few triangles off.
+  // Centres approach a corner, so each level of the tree splits off few triangles.
   for (int i = 0; i < 300; ++i) {
     const float scale = std::pow(0.8f, static_cast<float>(i));
     for (int k = 0; k < 7; ++k)
@@ -282,7 +282,7 @@ WFPG_TEST_CASE("triangles in one place, and many of one size at each scale", "[r
   check_against_all(nested, rays, cast<Exec>(nested, rays));
 }
 
-WFPG_TEST_CASE("hierarchies and hits are those of every other policy", "[renderer][bvh]") {
+WFPG_TEST_CASE("BVHs and hits are equal on all policies", "[renderer][bvh]") {
   const test_mesh mesh = mixed_triangles(2000, 0.005f, 0.2f, 12);
   const std::vector<ray> rays = random_rays(5000, 13);
   const std::vector<answers> first = cast<wfpg::exec::tbb>(mesh, rays);

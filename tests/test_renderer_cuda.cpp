@@ -1,4 +1,4 @@
-// The renderer on a GPU: its pictures have the means of the CPU's, and one seed gives one picture. Needs a
+// The renderer on a GPU. Its pictures have the means of the CPU's, and one seed gives one picture. Needs a
 // GPU.
 #include "support/catch.hpp"
 #include "support/renderings.hpp"
@@ -19,7 +19,7 @@ void check_as_on_cpu(rendering what) {
   wfpg_test::check_rendering(what);
 }
 
-// All but many-lamps, where next-event estimation is not to be off: too little light is hit by chance.
+// All scenes except many-lamps. It needs next-event estimation, since paths hardly hit its lamps.
 constexpr const char* scenes[] = {"cornell-box", "cornell-enclosed", "cornell-wall", "ajar",
                                   "thin-wall",   "glossy-room",      "caustic-pool", "furnace"};
 
@@ -36,19 +36,19 @@ bool same_bits(const render::image& a, const render::image& b) {
 
 }  // namespace
 
-TEST_CASE("unguided pictures of a GPU have the means of the CPU's", "[renderer][cuda]") {
+TEST_CASE("unguided GPU pictures have the means of the CPU's", "[renderer][cuda]") {
   check_all_scenes(sampling_method::pt);
 }
 
-TEST_CASE("pictures of a GPU guided by kept fields have the means of the CPU's", "[renderer][cuda]") {
+TEST_CASE("GPU pictures guided by kept fields have the means of the CPU's", "[renderer][cuda]") {
   check_all_scenes(sampling_method::wfpg);
 }
 
-TEST_CASE("pictures of a GPU guided by products have the means of the CPU's", "[renderer][cuda]") {
+TEST_CASE("GPU pictures guided by products have the means of the CPU's", "[renderer][cuda]") {
   check_all_scenes(sampling_method::wfpg_product);
 }
 
-TEST_CASE("pictures of a GPU guided by a SARSA grid have the means of the CPU's", "[renderer][cuda]") {
+TEST_CASE("GPU pictures guided by a SARSA grid have the means of the CPU's", "[renderer][cuda]") {
   check_all_scenes(sampling_method::sarsa);
   rendering what{"cornell-enclosed", true, sampling_method::sarsa};
   for (const auto& update : render::sarsa_update_names())
@@ -59,11 +59,11 @@ TEST_CASE("pictures of a GPU guided by a SARSA grid have the means of the CPU's"
     }
 }
 
-TEST_CASE("pictures of a GPU guided by irradiance records have the means of the CPU's", "[renderer][cuda]") {
+TEST_CASE("GPU pictures guided by irradiance records have the means of the CPU's", "[renderer][cuda]") {
   check_all_scenes(sampling_method::records);
 }
 
-TEST_CASE("pictures of a GPU guided by transient fields have the means of the CPU's", "[renderer][cuda]") {
+TEST_CASE("GPU pictures guided by transient fields have the means of the CPU's", "[renderer][cuda]") {
   for (const sampling_method method : {sampling_method::wfpg, sampling_method::wfpg_product}) {
     for (const char* scene : scenes) {
       check_as_on_cpu({scene, true, method, fields::transient, guiding::oriented});
@@ -73,16 +73,14 @@ TEST_CASE("pictures of a GPU guided by transient fields have the means of the CP
   }
 }
 
-TEST_CASE("pictures of a GPU have the means of the CPU's once what guides know has settled",
-          "[renderer][cuda]") {
+TEST_CASE("GPU pictures after warm-up have the means of the CPU's", "[renderer][cuda]") {
   for (const sampling_method method :
        {sampling_method::wfpg, sampling_method::wfpg_product, sampling_method::sarsa})
-    // In ajar unguided pictures would need so many more samples than guided ones for their means to be
-    // normal.
+    // In ajar, unguided pictures would need too many samples for normally distributed means.
     for (const char* scene : {"cornell-box", "cornell-enclosed", "glossy-room"})
       for (const bool nee : {false, true}) {
         rendering what{scene, nee, method};
-        what.settled = true;
+        what.warmed_up = true;
         check_as_on_cpu(what);
       }
 }

@@ -1,4 +1,5 @@
-// Files that the renderer's programs write: checked before any work, and replaced whole or not at all.
+// Files that the renderer's programs write. They are checked before any work, and replaced as a whole or not
+// at all.
 #include "app/image_io.hpp"
 #include "app/output_files.hpp"
 #include "app/plot.hpp"
@@ -30,7 +31,7 @@ render::image noise(int side) {
   return picture;
 }
 
-/// What wfpg-render says of a command line whose scene is not there: what is said of its files comes first.
+/// The error of wfpg-render for a scene that does not exist. Errors of other files come first.
 std::string complaint_of(strings arguments) {
   arguments.insert(arguments.begin(), "nowhere.glb");
   const outcome refused = run_render(std::move(arguments));
@@ -40,7 +41,7 @@ std::string complaint_of(strings arguments) {
   return refused.log;
 }
 
-/// Without a superuser's rights, which permissions do not bind, while it lives.
+/// Drops a superuser's rights while it lives, since permissions do not bind them.
 class ordinary_user {
  public:
   ordinary_user() {
@@ -79,10 +80,10 @@ TEST_CASE("each output is checked before the scene is loaded", "[renderer][files
     if (!end.empty()) fs::create_symlink("fifo", fifo);
     CHECK(complaint(fifo) == "wfpg-render: " + option + ": " + fifo + " is there and is not a file\n");
   }
-  CHECK(files_in(folder) == 7);  // and nothing is left behind
+  CHECK(files_in(folder) == 7);  // no file is left behind
 }
 
-TEST_CASE("a folder that cannot be written to is found before the scene is loaded", "[renderer][files]") {
+TEST_CASE("an unwritable folder is found before the scene is loaded", "[renderer][files]") {
   const temporary_folder folder;
   fs::permissions(folder.path(), fs::perms::owner_read | fs::perms::owner_exec | fs::perms::others_read |
                                      fs::perms::others_exec);
@@ -95,8 +96,7 @@ TEST_CASE("a folder that cannot be written to is found before the scene is loade
   CHECK(said == "wfpg-render: --stats: " + folder.file("a.json") + " cannot be written: Permission denied\n");
 }
 
-TEST_CASE("pictures of other formats are refused, and those that can be written are named",
-          "[renderer][files]") {
+TEST_CASE("unknown picture formats are refused, and the known ones are named", "[renderer][files]") {
   const temporary_folder folder;
   for (const std::string name : {"a.jpg", "a", "a.exr.gz", ".exr"})
     CHECK(complaint_of({"-o", folder.file(name)}) ==
@@ -107,7 +107,7 @@ TEST_CASE("pictures of other formats are refused, and those that can be written 
   CHECK(files_in(folder) == 0);
 }
 
-TEST_CASE("no two outputs, and no output and input, are one file", "[renderer][files]") {
+TEST_CASE("outputs and inputs must be different files", "[renderer][files]") {
   const temporary_folder folder;
   fs::create_symlink("real.exr", folder.file("link.exr"));
   fs::create_directory(folder.file("in"));
@@ -125,7 +125,7 @@ TEST_CASE("no two outputs, and no output and input, are one file", "[renderer][f
   folder.write("one.exr", "x");
   fs::create_hard_link(folder.file("one.exr"), folder.file("two.exr"));
   CHECK(is_one({"-o", folder.file("one.exr"), "--stats", folder.file("two.exr")}, "--output"));
-  // A rendering that goes on may keep its newer state where the older one is.
+  // A resumed rendering may replace the state that it resumes.
   CHECK(contains(complaint_of({"--resume", folder.file("state"), "--save-state", folder.file("state")}),
                  "nowhere.glb"));
   CHECK(contains(complaint_of({"--stats", folder.file("a"), "-o", folder.file("a.exr")}), "nowhere.glb"));
@@ -152,7 +152,7 @@ TEST_CASE("a reference of another size is found before the first sample", "[rend
   CHECK_FALSE(fs::exists(folder.file("stats")));
 }
 
-TEST_CASE("a file that does not fit leaves the old one, whatever writes it", "[renderer][files]") {
+TEST_CASE("a file that does not fit leaves the old one, with every writer", "[renderer][files]") {
   const temporary_folder folder;
   const render::image picture = noise(48);
   const render::plot drawn{"t", "x", "y", {{"a", {{1.0, 0.1}, {2.0, 0.05}}}}};
@@ -183,8 +183,7 @@ TEST_CASE("a file that does not fit leaves the old one, whatever writes it", "[r
   }
 }
 
-TEST_CASE("on a full disk all old files stay, and each that could not be written is named",
-          "[renderer][files]") {
+TEST_CASE("on a full disk old files stay, and each failed output is named", "[renderer][files]") {
   const temporary_folder folder;
   const std::string output = folder.write("a.exr", "old"), png = folder.write("a.png", "old"),
                     state = folder.write("state", "old"), stats = folder.file("stats");
@@ -200,11 +199,11 @@ TEST_CASE("on a full disk all old files stay, and each that could not be written
     CHECK(contains(failed.log, "wfpg-render: " + path + " cannot be written: the disk may be full\n"));
     CHECK(content_of(path) == "old");
   }
-  CHECK(contains(content_of(stats), "\"spp\": 1"));  // what fits is written
+  CHECK(contains(content_of(stats), "\"spp\": 1"));  // files that fit are written
   CHECK(files_in(folder) == 4);
 }
 
-TEST_CASE("folders of outputs are made, or what is wrong with them is said", "[renderer][files]") {
+TEST_CASE("folders of outputs are created, or the error names their fault", "[renderer][files]") {
   const temporary_folder folder;
   const auto said = [](const std::string& path) -> std::string {
     try {

@@ -1,4 +1,4 @@
-// The glTF loader: what it reads, and that hostile files end in an error that names path and reason.
+// The glTF loader. It reads valid files, and hostile files end in an error that names path and reason.
 #include "app/image_io.hpp"
 #include "scene/gltf_loader.hpp"
 #include "support/catch.hpp"
@@ -29,7 +29,7 @@ bool warns(const scene& s, const std::string& part) {
 
 }  // namespace
 
-TEST_CASE("glTF: one triangle, embedded and binary", "[renderer][gltf]") {
+TEST_CASE("glTF: one triangle loads, embedded and binary", "[renderer][gltf]") {
   temporary_folder folder;
   const tiny_gltf tiny;
   for (const std::string& path : {folder.write("a.gltf", tiny.json()), folder.write("a.glb", tiny.glb())}) {
@@ -42,13 +42,13 @@ TEST_CASE("glTF: one triangle, embedded and binary", "[renderer][gltf]") {
     check_close(corner(s, 0, 1), {1, 0, 0});
     check_close(corner(s, 0, 2), {0, 1, 0});
     CHECK(warns(s, "camera"));
-    // The camera that is made up sees the triangle.
+    // The default camera sees the triangle.
     const vec3 towards = glm::normalize(vec3(0.5f, 0.5f, 0.0f) - s.view.position);
     CHECK(glm::dot(towards, s.view.forward) > 0.99f);
   }
 }
 
-TEST_CASE("glTF: a buffer in a file beside", "[renderer][gltf]") {
+TEST_CASE("glTF: a buffer may be in a separate file", "[renderer][gltf]") {
   temporary_folder folder;
   const tiny_gltf tiny;
   std::string json = tiny.json();
@@ -60,7 +60,7 @@ TEST_CASE("glTF: a buffer in a file beside", "[renderer][gltf]") {
   CHECK(render::load_gltf(path).triangles.size() == 1);
 }
 
-TEST_CASE("glTF: triangles without indices, and none at all", "[renderer][gltf]") {
+TEST_CASE("glTF: triangles may lack indices, and scenes may lack triangles", "[renderer][gltf]") {
   tiny_gltf tiny;
   tiny.with("meshes", R"([{"primitives": [{"attributes": {"POSITION": 0}}]}])");
   const scene s = tiny.load();
@@ -71,10 +71,10 @@ TEST_CASE("glTF: triangles without indices, and none at all", "[renderer][gltf]"
   CHECK(empty.triangles.empty());
 }
 
-TEST_CASE("glTF: transforms of nested nodes", "[renderer][gltf]") {
+TEST_CASE("glTF: transforms of nested nodes are combined", "[renderer][gltf]") {
   const float half = std::sqrt(0.5f);
   tiny_gltf tiny;
-  // The parent moves; the child turns by a right angle about z and then scales along its own x.
+  // The parent translates. The child turns by a right angle about z and then scales along its own x.
   tiny.with("nodes", R"([{"children": [1], "translation": [10, 20, 30]},
                          {"mesh": 0, "scale": [2, 1, 1], "rotation": [0, 0, )" +
                          std::to_string(half) + ", " + std::to_string(half) + "]}]");
@@ -90,7 +90,7 @@ TEST_CASE("glTF: transforms of nested nodes", "[renderer][gltf]") {
   check_close(corner(m, 0, 2), {5, 6, 8});
 }
 
-TEST_CASE("glTF: mirroring turns the winding round", "[renderer][gltf]") {
+TEST_CASE("glTF: a mirroring transform reverses the winding", "[renderer][gltf]") {
   tiny_gltf tiny;
   const scene plain = tiny.load();
   const scene mirrored = tiny.with("nodes", R"([{"mesh": 0, "scale": [-1, 1, 1]}])").load();
@@ -98,9 +98,10 @@ TEST_CASE("glTF: mirroring turns the winding round", "[renderer][gltf]") {
   check_close(face_normal(mirrored, 0), {0, 0, 1});
 }
 
-TEST_CASE("glTF: normals and texture coordinates", "[renderer][gltf]") {
+TEST_CASE("glTF: normals and texture coordinates are read", "[renderer][gltf]") {
   tiny_gltf tiny;
-  // Normals: one plain, one unnormalised, one of no length, which the triangle's own replaces.
+  // Three normals: a unit vector, an unnormalised one, and a zero one. The triangle's normal replaces the
+  // zero one.
   tiny.buffer = raw<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}) + raw<float>({0, 0, 1, 3, 0, 3, 0, 0, 0}) +
                 raw<std::uint8_t>({0, 255, 255, 0, 51, 51, 0, 0});
   tiny.with("bufferViews", R"([{"buffer": 0, "byteLength": 36},
@@ -124,7 +125,7 @@ TEST_CASE("glTF: normals and texture coordinates", "[renderer][gltf]") {
   CHECK(s.uvs[2].x == Approx(0.2f));
 }
 
-TEST_CASE("glTF: camera, resolution and environment", "[renderer][gltf]") {
+TEST_CASE("glTF: camera, resolution and environment are read", "[renderer][gltf]") {
   tiny_gltf tiny;
   tiny.with("nodes", R"([{"mesh": 0}, {"camera": 0, "matrix": [-1,0,0,0, 0,1,0,0, 0,0,-1,0, 1,2,3,1]}])");
   tiny.with("cameras", R"([{"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1}}])");
@@ -148,7 +149,7 @@ TEST_CASE("glTF: camera, resolution and environment", "[renderer][gltf]") {
   check_close(odd.environment, vec3(0.0f));
 }
 
-TEST_CASE("glTF: what materials become", "[renderer][gltf]") {
+TEST_CASE("glTF: materials become the renderer's", "[renderer][gltf]") {
   const auto read = [](const std::string& json) {
     return tiny_gltf().with("materials", "[" + json + "]").load().materials.at(0);
   };
@@ -197,7 +198,7 @@ TEST_CASE("glTF: lights too bright for sums of floats are refused by name", "[re
   CHECK(bulb.error() == "light 0 has an intensity of 2e+38, at most 1e+15 is supported");
 }
 
-TEST_CASE("glTF: what transmits becomes solid or thin", "[renderer][gltf]") {
+TEST_CASE("glTF: transmissive materials become solid or thin", "[renderer][gltf]") {
   const auto read = [](const std::string& roughness, const std::string& extensions) {
     return tiny_gltf()
         .with("materials", R"([{"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": )" +
@@ -254,7 +255,7 @@ TEST_CASE("glTF: a base colour texture becomes linear", "[renderer][gltf]") {
   CHECK(contains(tiny.error(), "nowhere.png"));
 }
 
-TEST_CASE("glTF: metallic-roughness textures, samplers and texture transforms", "[renderer][gltf]") {
+TEST_CASE("glTF: metallic-roughness textures, samplers and texture transforms are read", "[renderer][gltf]") {
   temporary_folder folder;
   image picture = render::make_image(1, 1);
   picture.pixels = {vec3(render::srgb_to_linear(0.2f), render::srgb_to_linear(0.4f), 1.0f)};
@@ -269,7 +270,7 @@ TEST_CASE("glTF: metallic-roughness textures, samplers and texture transforms", 
           "offset": [0.5, 0.25], "rotation": 1.5707963267948966, "scale": [2, 3]}}},
       "metallicRoughnessTexture": {"index": 0}}}])");
   const scene s = tiny.load();
-  CHECK(s.warnings.size() == 1);  // of the camera that is made up
+  CHECK(s.warnings.size() == 1);  // of the default camera
   REQUIRE(s.textures.size() == 2);
   const render::material& m = s.materials[0];
   CHECK(m.kind == material_kind::metallic_roughness);
@@ -278,7 +279,7 @@ TEST_CASE("glTF: metallic-roughness textures, samplers and texture transforms", 
   check_close(vec3(s.textures[std::size_t(m.base_texture.index)].texels[0]), picture.pixels[0], 0.005f);
   check_close(vec3(s.textures[std::size_t(m.metallic_roughness_texture.index)].texels[0]), {0.2f, 0.4f, 1.0f},
               0.005f);
-  // The extension's own matrices: a quarter turn takes (u, v) to (v, -u).
+  // The extension's own matrices: a quarter turn maps (u, v) to (v, -u).
   const render::vec2 place = m.base_texture.transformed({0.1f, 0.2f});
   CHECK(place.x == Approx(0.5f + 3.0f * 0.2f));
   CHECK(place.y == Approx(0.25f - 2.0f * 0.1f));
@@ -289,7 +290,7 @@ TEST_CASE("glTF: metallic-roughness textures, samplers and texture transforms", 
   CHECK(contains(tiny.error(), "sampler 0"));
 }
 
-TEST_CASE("glTF: punctual lights", "[renderer][gltf]") {
+TEST_CASE("glTF: punctual lights are read", "[renderer][gltf]") {
   tiny_gltf tiny;
   tiny.with("extensions", R"({"KHR_lights_punctual": {"lights": [
       {"type": "spot", "intensity": 5, "color": [1, 0.5, 0], "spot": {"outerConeAngle": 0.5}},
@@ -312,7 +313,7 @@ TEST_CASE("glTF: punctual lights", "[renderer][gltf]") {
   CHECK(contains(tiny.error(), "light 3"));
 }
 
-TEST_CASE("glTF: volumes absorb, emission has textures", "[renderer][gltf]") {
+TEST_CASE("glTF: volumes absorb, and emission has textures", "[renderer][gltf]") {
   temporary_folder folder;
   render::write_png(folder.file("t.png"), render::make_image(1, 1));
   tiny_gltf tiny;
@@ -328,7 +329,7 @@ TEST_CASE("glTF: volumes absorb, emission has textures", "[renderer][gltf]") {
   check_close(s.materials[1].absorption, {0.0f, std::log(2.0f) / 2.0f, std::log(4.0f) / 2.0f});
 }
 
-TEST_CASE("glTF: alpha masks", "[renderer][gltf]") {
+TEST_CASE("glTF: alpha masks are read", "[renderer][gltf]") {
   tiny_gltf tiny;
   const scene s = tiny.with("materials", R"([{"alphaMode": "MASK", "pbrMetallicRoughness":
       {"baseColorFactor": [1, 1, 1, 0.25]}}, {"alphaCutoff": 0.3, "alphaMode": "MASK"}, {}])")
@@ -339,7 +340,7 @@ TEST_CASE("glTF: alpha masks", "[renderer][gltf]") {
   CHECK(s.materials[2].alpha_cutoff == 0.0f);
 }
 
-TEST_CASE("glTF: what is not supported is said once", "[renderer][gltf]") {
+TEST_CASE("glTF: each unsupported feature causes one warning", "[renderer][gltf]") {
   tiny_gltf tiny;
   tiny.with("meshes", R"([{"primitives": [{"attributes": {"POSITION": 0}, "mode": 1},
                                           {"attributes": {"POSITION": 0}, "mode": 0}]}])");
@@ -351,7 +352,7 @@ TEST_CASE("glTF: what is not supported is said once", "[renderer][gltf]") {
   CHECK(lines == 2);
 }
 
-TEST_CASE("glTF: extensions and their textures that are not read are warned of", "[renderer][gltf]") {
+TEST_CASE("glTF: unread extensions and their textures cause warnings", "[renderer][gltf]") {
   tiny_gltf tiny;
   tiny.with("extensionsUsed", R"(["EXT_mesh_gpu_instancing", "KHR_materials_transmission"])");
   tiny.with("materials", R"([{"extensions": {"KHR_materials_transmission":
@@ -367,12 +368,12 @@ TEST_CASE("glTF: extensions and their textures that are not read are warned of",
   CHECK(lines_with("KHR_materials_transmission") == 0);
 }
 
-TEST_CASE("glTF: hostile files", "[renderer][gltf][hostile]") {
-  SECTION("missing") {
+TEST_CASE("glTF: hostile files end in an error", "[renderer][gltf][hostile]") {
+  SECTION("the file is missing") {
     CHECK_THROWS_AS(render::load_gltf("/nonexistent/no.glb"), std::runtime_error);
     CHECK_THROWS_AS(render::load_gltf("/"), std::runtime_error);
   }
-  SECTION("empty, noise, wrong version") {
+  SECTION("the file is empty, noise, or of a wrong version") {
     CHECK(contains(tiny_gltf::error_of(""), "empty"));
     tiny_gltf::error_of("not json");
     tiny_gltf::error_of("{}");
@@ -381,14 +382,14 @@ TEST_CASE("glTF: hostile files", "[renderer][gltf][hostile]") {
     CHECK(contains(tiny_gltf().with("extras", std::string(5000, '[') + std::string(5000, ']')).error(),
                    "nests"));
   }
-  SECTION("cut off at every byte") {
+  SECTION("the file is truncated at any byte") {
     const std::string glb = tiny_gltf().glb(), json = tiny_gltf().json();
     for (std::size_t size = 0; size < glb.size(); ++size)
       CHECK(tiny_gltf::error_of(glb.substr(0, size)) != "nothing was thrown");
     for (std::size_t size = 0; size < json.size(); size += 7)
       CHECK(tiny_gltf::error_of(json.substr(0, size)) != "nothing was thrown");
   }
-  SECTION("a GLB chunk that leaves the file") {
+  SECTION("a GLB chunk exceeds the file") {
     std::string glb = tiny_gltf().glb();
     const std::uint32_t huge = 0xfffffff0u;
     std::memcpy(&glb[12], &huge, 4);
@@ -398,12 +399,12 @@ TEST_CASE("glTF: hostile files", "[renderer][gltf][hostile]") {
     std::memcpy(&last[last.size() - tiny_gltf().buffer.size() - 8], &more, 4);
     CHECK(contains(tiny_gltf::error_of(last), "chunk"));
   }
-  SECTION("vertex index out of range") {
+  SECTION("a vertex index is out of range") {
     tiny_gltf tiny;
     tiny.buffer[36] = 3;
     CHECK(contains(tiny.error(), "index 3"));
   }
-  SECTION("accessors that leave their buffer view, views that leave their buffer") {
+  SECTION("accessors exceed their buffer view, and views their buffer") {
     const std::string indices = R"({"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"}])";
     for (const char* bad : {R"("count": 4)", R"("count": 3, "byteOffset": 4)", R"("count": 2000000000)",
                             R"("count": 3, "byteOffset": 2000000000)", R"("count": -1)"})
@@ -421,7 +422,7 @@ TEST_CASE("glTF: hostile files", "[renderer][gltf][hostile]") {
               .with("bufferViews", R"([{"buffer": 7, "byteLength": 36}, {"buffer": 0, "byteLength": 6}])")
               .error() != "nothing was thrown");
   }
-  SECTION("wrong component types and types") {
+  SECTION("component types and types are wrong") {
     const std::string positions = R"([{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},)";
     const std::string indices = R"({"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"}])";
     CHECK(contains(tiny_gltf()
@@ -436,7 +437,7 @@ TEST_CASE("glTF: hostile files", "[renderer][gltf][hostile]") {
                        .error(),
                    "wrong type"));
   }
-  SECTION("references to what does not exist") {
+  SECTION("references have no target") {
     for (const auto& [part, json] : std::vector<std::pair<std::string, std::string>>{
              {"scene", "5"},
              {"scenes", R"([{"nodes": [3]}])"},
@@ -453,7 +454,7 @@ TEST_CASE("glTF: hostile files", "[renderer][gltf][hostile]") {
       CHECK(tiny_gltf().with(part, json).error() != "nothing was thrown");
     }
   }
-  SECTION("a scene that no camera sees, a camera that sees nothing") {
+  SECTION("no camera sees the scene, or a camera sees nothing") {
     tiny_gltf huge;
     huge.buffer.replace(0, 36, raw<float>({0, 0, 0, 3e38f, 0, 0, 0, 3e38f, 0}));
     CHECK(contains(huge.error(), "too large"));
@@ -461,17 +462,17 @@ TEST_CASE("glTF: hostile files", "[renderer][gltf][hostile]") {
     narrow.with("cameras", R"([{"type": "perspective", "perspective": {"yfov": 1e-60, "znear": 0.1}}])");
     CHECK(contains(narrow.with("nodes", R"([{"mesh": 0, "camera": 0}])").error(), "yfov"));
   }
-  SECTION("node graphs that are no trees") {
+  SECTION("node graphs are not trees") {
     CHECK(contains(tiny_gltf().with("nodes", R"([{"children": [0]}])").error(), "twice"));
     CHECK(contains(tiny_gltf().with("nodes", R"([{"children": [1]}, {"children": [0]}])").error(), "twice"));
     CHECK(contains(tiny_gltf().with("nodes", R"([{"children": [1, 1]}, {"mesh": 0}])").error(), "twice"));
   }
-  SECTION("a hierarchy of a hundred thousand levels is no problem") {
+  SECTION("a hierarchy of a hundred thousand levels loads") {
     std::string nodes = "[";
     for (int i = 1; i < 100000; ++i) nodes += R"({"children": [)" + std::to_string(i) + "]},";
     CHECK(tiny_gltf().with("nodes", nodes + R"({"mesh": 0}])").load().triangles.size() == 1);
   }
-  SECTION("transforms and positions that are not finite") {
+  SECTION("transforms and positions are not finite") {
     CHECK(tiny_gltf().with("nodes", R"([{"mesh": 0, "matrix": [1, 2, 3]}])").error() != "nothing was thrown");
     CHECK(contains(tiny_gltf().with("nodes", R"([{"mesh": 0, "scale": [1e300, 1, 1]}])").error(), "finite"));
     tiny_gltf tiny;
@@ -479,7 +480,7 @@ TEST_CASE("glTF: hostile files", "[renderer][gltf][hostile]") {
     std::memcpy(&tiny.buffer[12], &nan, 4);
     CHECK(contains(tiny.error(), "finite"));
   }
-  SECTION("an image whose buffer view leaves the buffer") {
+  SECTION("an image's buffer view exceeds the buffer") {
     tiny_gltf tiny;
     tiny.with("bufferViews", R"([{"buffer": 0, "byteLength": 36},
         {"buffer": 0, "byteOffset": 36, "byteLength": 6}, {"buffer": 0, "byteOffset": 900, "byteLength": 900}])");
@@ -558,7 +559,7 @@ TEST_CASE("glTF: fields of a wrong type or sign are named", "[renderer][gltf][ho
             "extensions.KHR_lights_punctual.lights[0].intensity is \"1\"" + number}}) {
     CHECK(tiny_gltf().with(one.part, one.json).error() == one.message);
   }
-  // Extras are anyone's.
+  // Extras may have any content.
   CHECK(tiny_gltf().with("extras", R"({"index": -1})").load().triangles.size() == 1);
   CHECK(
       tiny_gltf().with("materials", R"([{"extras": {"index": -1, "scale": "a"}}])").load().triangles.size() ==
@@ -591,7 +592,7 @@ TEST_CASE("glTF: files outside of the scene's folder are not read", "[renderer][
     CHECK(contains(loaded(uri), "expected a file in the scene's folder"));
   for (const std::string uri : {"none.bin", "textures", "", "x.bin"})
     CHECK(contains(loaded(uri), "expected a file that is there, in the scene's folder"));
-  // Neither is what happens to lie where the program runs.
+  // Files in the working directory are not read either.
   const std::filesystem::path before = std::filesystem::current_path();
   std::filesystem::current_path(folder.path());
   CHECK(contains(loaded("x.bin"), "expected a file that is there"));

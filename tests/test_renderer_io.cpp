@@ -81,12 +81,14 @@ TEST_CASE("OpenEXR: failures name the path", "[renderer][exr]") {
   CHECK_THROWS_AS(render::write_png("/nonexistent/x.png", grey(2, 2, 1.0f)), std::runtime_error);
 }
 
-TEST_CASE("Environments: OpenEXR and Radiance HDR, and what is wrong with one", "[renderer][environment]") {
+TEST_CASE("Environments: OpenEXR and Radiance HDR load, and errors name their fault",
+          "[renderer][environment]") {
   temporary_folder folder;
   render::write_exr(folder.file("a.exr"), grey(4, 2, 1.5f));
   CHECK(render::read_environment(folder.file("a.exr")).texels == std::vector<vec3>(8, vec3(1.5f)));
 
-  // Uncompressed: 4 bytes a pixel, (mantissa + 1/2) / 256 times 2^(exponent - 128), or without the half.
+  // Uncompressed pixels of 4 bytes. Values are (mantissa + 1/2) / 256 times 2^(exponent - 128), or without
+  // the half.
   const std::string head = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 3\n";
   std::string pixels;
   for (int i = 0; i < 6; ++i) pixels += std::string("\x80\x40\x20\x82", 4);
@@ -121,7 +123,7 @@ TEST_CASE("Environments: OpenEXR and Radiance HDR, and what is wrong with one", 
   CHECK(error(folder.file("bright.exr")) == "nothing was thrown");
 }
 
-TEST_CASE("PNG: what is written is read again, and what is not is an error", "[renderer][png]") {
+TEST_CASE("PNG: a complete file is written, and errors name the path", "[renderer][png]") {
   const temporary_folder folder;
   const std::string path = folder.file("a.png");
   render::write_png(path, grey(4, 3, 0.5f), 1.0f);
@@ -132,7 +134,7 @@ TEST_CASE("PNG: what is written is read again, and what is not is an error", "[r
     CHECK(contains(error_of([&] { render::write_png(nowhere, grey(4, 3, 0.5f), 1.0f); }), nowhere));
 }
 
-TEST_CASE("The sRGB curve goes both ways", "[renderer][png]") {
+TEST_CASE("The sRGB curve and its inverse agree", "[renderer][png]") {
   for (int i = 0; i <= 255; ++i) {
     const float encoded = float(i) / 255.0f;
     CHECK(render::linear_to_srgb(render::srgb_to_linear(encoded)) == Approx(encoded).margin(1e-5));
@@ -140,7 +142,7 @@ TEST_CASE("The sRGB curve goes both ways", "[renderer][png]") {
   CHECK(render::srgb_to_linear(0.5f) == Approx(0.21404f).margin(1e-4));
 }
 
-TEST_CASE("Pictures side by side", "[renderer][png]") {
+TEST_CASE("Pictures can be put side by side", "[renderer][png]") {
   const image row = render::side_by_side({grey(2, 3, 0.25f), grey(1, 2, 0.5f)}, 2);
   REQUIRE(row.width == 5);
   REQUIRE(row.height == 3);
@@ -151,7 +153,7 @@ TEST_CASE("Pictures side by side", "[renderer][png]") {
   CHECK_THROWS_AS(render::side_by_side({}, 2), std::invalid_argument);
 }
 
-TEST_CASE("Pictures enlarged and cropped", "[renderer][png]") {
+TEST_CASE("Pictures can be enlarged and cropped", "[renderer][png]") {
   image picture = grey(3, 2, 0.0f);
   for (std::size_t i = 0; i < 6; ++i) picture.pixels[i] = vec3(float(i));
   const image large = render::enlarged(picture, 2);
@@ -167,7 +169,7 @@ TEST_CASE("Pictures enlarged and cropped", "[renderer][png]") {
   CHECK_THROWS_AS(render::cropped(picture, 0, 0, 0, 2), std::invalid_argument);
 }
 
-TEST_CASE("Errors of hand-made pictures", "[renderer][metrics]") {
+TEST_CASE("Errors of hand-made pictures are right", "[renderer][metrics]") {
   const render::image_error none = render::compare(grey(4, 4, 2.0f), grey(4, 4, 2.0f));
   CHECK(none.mse == 0.0);
   CHECK((none.relmse == 0.0 && none.mse_reinhard == 0.0));
@@ -200,7 +202,8 @@ TEST_CASE("Trimming drops one pixel in a thousand", "[renderer][metrics]") {
   CHECK(render::compare(test, grey(50, 40, 1.0f)).relmse_trimmed > 400.0);
 }
 
-TEST_CASE("One pixel in ten thousand is left out, and its share is said", "[renderer][metrics]") {
+TEST_CASE("One pixel in ten thousand is left out, and its fraction of the error is reported",
+          "[renderer][metrics]") {
   image test = grey(200, 100, 1.0f);
   test.pixels[10] = vec3(11.0f);   // relative error 100 / 1.01
   test.pixels[700] = vec3(21.0f);  // 400 / 1.01
@@ -209,13 +212,13 @@ TEST_CASE("One pixel in ten thousand is left out, and its share is said", "[rend
   CHECK(error.relmse == Approx(501.0 / 1.01 / 20000.0));
   CHECK(error.relmse_robust == Approx(1.0 / 1.01 / 19998.0));
   CHECK(error.worst_share == Approx(500.0 / 501.0));
-  // Fewer pixels than ten thousand: none is left out.
+  // A picture of fewer than ten thousand pixels keeps all.
   const render::image_error small = render::compare(grey(4, 4, 3.0f), grey(4, 4, 1.0f));
   CHECK(small.relmse_robust == small.relmse);
   CHECK(small.worst_share == Approx(0.0).margin(1e-12));
 }
 
-TEST_CASE("Errors pixel by pixel", "[renderer][metrics]") {
+TEST_CASE("Errors of single pixels are right", "[renderer][metrics]") {
   image test = grey(3, 1, 1.0f);
   test.pixels[1] = vec3(3.0f);
   test.pixels[2].x = std::numeric_limits<float>::quiet_NaN();
@@ -227,7 +230,7 @@ TEST_CASE("Errors pixel by pixel", "[renderer][metrics]") {
   CHECK_THROWS_AS(render::reinhard_errors(test, grey(1, 3, 1.0f)), std::invalid_argument);
 }
 
-TEST_CASE("Pixels that are not finite are not hidden", "[renderer][metrics]") {
+TEST_CASE("Pixels that are not finite make errors infinite", "[renderer][metrics]") {
   image test = grey(50, 40, 1.0f);
   test.pixels[3].x = std::numeric_limits<float>::quiet_NaN();
   render::image_error error = render::compare(test, grey(50, 40, 1.0f));
@@ -242,17 +245,17 @@ TEST_CASE("Pixels that are not finite are not hidden", "[renderer][metrics]") {
   CHECK(std::isinf(error.relmse_trimmed));
 }
 
-TEST_CASE("Errors refuse what cannot be compared", "[renderer][metrics]") {
+TEST_CASE("Errors of pictures that cannot be compared are refused", "[renderer][metrics]") {
   CHECK_THROWS_AS(render::compare(grey(4, 4, 1.0f), grey(4, 5, 1.0f)), std::invalid_argument);
   CHECK_THROWS_AS(render::compare(image{}, image{}), std::invalid_argument);
   CHECK(render::noise_of_halves(grey(4, 4, 3.0f), grey(4, 4, 1.0f)).mse == Approx(1.0));
-  // The mean is 2, and each half 1 from it.
+  // The mean is 2, and each half differs from it by 1.
   CHECK(render::noise_of_halves(grey(4, 4, 3.0f), grey(4, 4, 1.0f)).relmse_robust == Approx(1.0 / 4.01));
   CHECK(render::noise_of_halves(grey(4, 4, 3.0f), grey(4, 4, 1.0f)).smape == Approx(0.5 / 5.01 + 0.5 / 3.01));
   CHECK_THROWS_AS(render::noise_of_halves(grey(4, 4, 1.0f), grey(4, 5, 1.0f)), std::invalid_argument);
 }
 
-TEST_CASE("Built-in scenes hold together", "[renderer][builtin]") {
+TEST_CASE("Built-in scenes are valid", "[renderer][builtin]") {
   for (const std::string& name : render::builtin_scene_names()) {
     INFO(name);
     CHECK(render::is_builtin_scene(name));
@@ -300,7 +303,7 @@ TEST_CASE("The furnace is closed, faces inwards and has a known answer", "[rende
 
 namespace {
 
-/// Twice the number of edges that some triangles use in one direction and none in the other, by position.
+/// Twice the number of edges that triangles use in one direction only, compared by position.
 std::size_t open_edges(const scene& s, material_kind kind) {
   using key = std::tuple<float, float, float>;
   std::map<std::pair<key, key>, int> balance;
@@ -342,7 +345,7 @@ TEST_CASE("The glass around the enclosed lamp is closed and faces outwards", "[r
       }
 }
 
-TEST_CASE("The water of caustic-pool is smooth, lies on the walls, and has the camera below",
+TEST_CASE("The water of caustic-pool is smooth and touches the walls; the camera is below",
           "[renderer][builtin]") {
   const scene s = render::make_builtin_scene("caustic-pool");
   vec3 lower(1e9f), upper(-1e9f), room(0.0f);
@@ -368,7 +371,7 @@ TEST_CASE("The conductor box of ajar is closed", "[renderer][builtin]") {
   CHECK(open_edges(render::make_builtin_scene("ajar"), material_kind::conductor) == 0);
 }
 
-TEST_CASE("plots: names do not lie on one another, and long ones have room", "[renderer][plot]") {
+TEST_CASE("plots: names do not overlap, and long names have room", "[renderer][plot]") {
   temporary_folder folder;
   const std::string name = "a name of many more letters than the others";
   const render::curve first{name, {{1.0, 0.1}, {2.0, 0.05}}}, second{"b", {{1.0, 0.1}, {2.0, 0.05}}};
@@ -385,7 +388,7 @@ TEST_CASE("plots: names do not lie on one another, and long ones have room", "[r
   CHECK_FALSE(contains(svg, "inf"));
 }
 
-TEST_CASE("plots: short axes are named between powers of ten", "[renderer][plot]") {
+TEST_CASE("plots: short axes have labels between powers of ten", "[renderer][plot]") {
   temporary_folder folder;
   render::write_svg(folder.file("a.svg"), {"t", "x", "y", {{"a", {{1.0, 0.0023}, {1000.0, 0.0171}}}}});
   const std::string svg = content_of(folder.file("a.svg"));
@@ -396,14 +399,14 @@ TEST_CASE("plots: short axes are named between powers of ten", "[renderer][plot]
   CHECK_FALSE(contains(svg, ">0.003<"));
   CHECK(contains(svg, ">1000<"));
   CHECK_FALSE(contains(svg, ">500<"));
-  // One value has an axis too.
+  // A single value has an axis too.
   render::write_svg(folder.file("b.svg"), {"t", "x", "y", {{"a", {{1.0, 1.0}}}}});
   CHECK_FALSE(contains(content_of(folder.file("b.svg")), "nan"));
   render::write_svg(folder.file("c.svg"), {"t", "x", "y", {{"a", {{3.0, 1.0}, {4.0, 100.0}}}}});
   CHECK(contains(content_of(folder.file("c.svg")), ">4<"));
 }
 
-TEST_CASE("plots: every positive point is drawn inside the frame, names are escaped", "[renderer][plot]") {
+TEST_CASE("plots: positive points are inside the frame, and names are escaped", "[renderer][plot]") {
   temporary_folder folder;
   const render::curve falling{"a<b", {{0.02, 5.0}, {0.2, 0.5}, {7.0, 0.003}, {0.0, 1.0}, {1.0, -1.0}}};
   render::write_svg(folder.file("a.svg"), {"title", "x", "y", {falling, {"empty", {}}}});

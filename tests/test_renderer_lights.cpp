@@ -1,4 +1,4 @@
-// How lights are chosen: the alias table's probabilities, and what the lights of a scene are drawn with.
+// Choices of lights: the alias table's probabilities, and the sampling of a scene's lights.
 #include "app/render.hpp"
 #include "lights/lights.hpp"
 #include "scene/alias_table.hpp"
@@ -20,7 +20,7 @@ namespace {
 
 using namespace render;
 
-/// What pick() gives each element.
+/// The probability of each element in pick().
 std::vector<double> probabilities(const std::vector<alias_column>& table) {
   std::vector<double> result(table.size(), 0.0);
   for (std::size_t i = 0; i < table.size(); ++i) {
@@ -41,8 +41,8 @@ vec2 numbers(std::uint32_t i, std::uint32_t use) {
 
 }  // namespace
 
-TEST_CASE("an alias table's probabilities are the weights", "[renderer][lights]") {
-  // Sums and shares of these are exact.
+TEST_CASE("an alias table's probabilities are proportional to the weights", "[renderer][lights]") {
+  // Sums and fractions of these weights are exact.
   for (const std::vector<double>& weights : {std::vector<double>{1},
                                              {1, 1},
                                              {3, 1},
@@ -52,7 +52,7 @@ TEST_CASE("an alias table's probabilities are the weights", "[renderer][lights]"
                                              {1, 1, 1, 13}})
     for (std::size_t i = 0; i < weights.size(); ++i)
       CHECK(probabilities(make_alias_table(weights))[i] == weights[i] / total(weights));
-  // Others round to a float's share of a column.
+  // Others round to a float's fraction of a column.
   for (const std::size_t count : {3u, 1000u, 100000u}) {
     std::vector<double> weights;
     for (std::uint32_t i = 0; i < count; ++i)
@@ -66,7 +66,7 @@ TEST_CASE("an alias table's probabilities are the weights", "[renderer][lights]"
   }
 }
 
-TEST_CASE("picks are as frequent as the weights say", "[renderer][lights]") {
+TEST_CASE("picks have the frequencies of their weights", "[renderer][lights]") {
   const std::vector<double> weights{1, 0, 7, 2, 0.5};
   const std::vector<alias_column> table = make_alias_table(weights);
   std::vector<double> counts(weights.size(), 0.0);
@@ -78,7 +78,7 @@ TEST_CASE("picks are as frequent as the weights say", "[renderer][lights]") {
   CHECK(pick({table.data(), table.size()}, {0x1.fffffep-1f, 0x1.fffffep-1f}) < weights.size());
 }
 
-TEST_CASE("emitters are drawn by power, and their density by area is their radiance's",
+TEST_CASE("emitters are sampled by power, and the density by area matches their radiance",
           "[renderer][lights]") {
   scene s;
   s.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {3, 0, 0}, {0, 3, 0}};
@@ -109,8 +109,8 @@ TEST_CASE("an environment map is sampled by luminance", "[renderer][lights]") {
   const wfpg::exec::seq exec;
   const device_scene<wfpg::exec::seq> geometry(exec, s);
   const environment_view sky = geometry.view().environment;
-  // The density of a uniform direction averages to 1 over the sphere; a sample's inverse to the sphere's
-  // area.
+  // The mean density of uniform directions is 1 over the sphere's area. The mean inverse density of samples
+  // is that area.
   double integral = 0.0, area = 0.0;
   constexpr std::uint32_t draws = 200000;
   for (std::uint32_t i = 0; i < draws; ++i) {
@@ -125,7 +125,7 @@ TEST_CASE("an environment map is sampled by luminance", "[renderer][lights]") {
   }
   CHECK(integral / draws * 4.0 * static_cast<double>(pi) == Approx(1.0).epsilon(0.02));
   CHECK(area / draws == Approx(4.0 * static_cast<double>(pi)).epsilon(0.05));
-  // The middle is -z, its right +x, the upper edge +y.
+  // The centre is -z, its right +x, the upper edge +y.
   s.sky = {4, 2, std::vector<vec3>(8, vec3(0.0f))};
   s.sky.texels[2] = vec3(1.0f);
   const device_scene<wfpg::exec::seq> corner(exec, s);
@@ -135,8 +135,8 @@ TEST_CASE("an environment map is sampled by luminance", "[renderer][lights]") {
 
 namespace {
 
-/// Squares of side 0.1 in a row along x, a unit apart, that face +z or, every other one, -z, and a floor that
-/// does not shine; of radius about half the row's length.
+/// Squares of side 0.1 in a row along x, a unit apart. Every other one faces +z, the others -z. The floor
+/// does not emit; its radius is about half the row's length.
 scene row_of_lamps(int count) {
   scene s;
   s.materials.resize(2);
@@ -163,7 +163,7 @@ double sum_of_shares(const grouped_lights& grouped) {
 
 }  // namespace
 
-TEST_CASE("every light is in one group, with its share of the power", "[renderer][lights]") {
+TEST_CASE("every light is in one group, which has the sum of their power", "[renderer][lights]") {
   scene s = row_of_lamps(6);
   punctual_light bulb;
   bulb.position = {0.5f, 0.5f, 3.0f};
@@ -172,7 +172,7 @@ TEST_CASE("every light is in one group, with its share of the power", "[renderer
   for (const std::uint32_t most : {1u, 2u, 3u, 5u, 8u, 255u}) {
     const grouped_lights grouped = group_lights(s, most);
     INFO("at most " << most);
-    CHECK(grouped.groups.size() == (most == 1 ? 1u : std::min(most, 7u) + 1u));  // the sky is apart
+    CHECK(grouped.groups.size() == (most == 1 ? 1u : std::min(most, 7u) + 1u));  // the sky has its own group
     CHECK(grouped.lights.size() == 6 * 2 + 2);
     CHECK(sum_of_shares(grouped) == Approx(1.0));
     std::vector<std::uint32_t> seen = grouped.lights;
@@ -197,21 +197,20 @@ TEST_CASE("every light is in one group, with its share of the power", "[renderer
   }
 }
 
-TEST_CASE("flat emitters are one light, and lights near each other stay together", "[renderer][lights]") {
+TEST_CASE("a flat emitter is one light, and lights near each other share a group", "[renderer][lights]") {
   CHECK(group_lights(row_of_lamps(1), 32).groups.size() == 1);
   CHECK(group_lights(row_of_lamps(1), 32).triangle_groups.empty());
-  // Two lamps of a thousand, a unit apart in a scene that is a thousand wide.
+  // Two lamps of a thousand, a unit apart in a scene of width a thousand.
   CHECK(group_lights(row_of_lamps(1000), 255).groups.size() < 100);
   CHECK(group_lights(row_of_lamps(6), 32).groups.size() == 6);
   CHECK(group_lights(scene(), 32).groups.empty());
-  // Front and back of a thin lamp are two.
+  // Front and back of a thin lamp are two lights.
   scene both = row_of_lamps(2);
   for (std::size_t i = 8; i < 12; ++i) both.positions[i].x -= 1.0f;
   CHECK(group_lights(both, 32).groups.size() == 2);
 }
 
-TEST_CASE("a choice of groups changes what lights are drawn with, and not what they bring",
-          "[renderer][lights]") {
+TEST_CASE("choices of groups change the lights' densities, not their radiance", "[renderer][lights]") {
   const scene s = row_of_lamps(5);
   const wfpg::exec::seq exec;
   const device_scene<wfpg::exec::seq> geometry(exec, s);
@@ -229,7 +228,7 @@ TEST_CASE("a choice of groups changes what lights are drawn with, and not what t
     return sum / draws;
   };
   const double expected = irradiance(whole, [](std::uint32_t) { return wfpg::light_choice{}; });
-  // Far from how bright the groups are from there.
+  // Probabilities unlike the groups' brightness.
   const float probabilities[] = {0.4f, 0.3f, 0.05f, 0.05f, 0.2f};
   const double found = irradiance(parts, [&](std::uint32_t i) {
     float u = numbers(i, 20).x;
@@ -243,7 +242,7 @@ TEST_CASE("a choice of groups changes what lights are drawn with, and not what t
 
 namespace {
 
-/// What the renderer says of a scene.
+/// The renderer's error for a scene.
 std::string error_of(const scene& s) {
   try {
     render_options options;
@@ -289,7 +288,7 @@ TEST_CASE("lights too bright for sums of floats are refused by name", "[renderer
   s.punctual_lights[2].intensity.z = 1e16f;
   CHECK(error_of(s) ==
         "wfpg: the intensity of scene.punctual_lights, element 2 is 1e+16, expected in [0, 1e+15]");
-  // Each is usable, and their sum is not: an area of 1e16.
+  // Each light is valid, but their sum is not: the area is 1e16.
   s = row_of_lamps(1);
   s.materials[1].emission = vec3(largest_radiance);
   for (vec3& p : s.positions) p *= 1e9f;
@@ -297,7 +296,7 @@ TEST_CASE("lights too bright for sums of floats are refused by name", "[renderer
         "wfpg: the sum of radiance times area over all lights is 1e+31, expected at most 1e+30");
 }
 
-TEST_CASE("the brightest lights that are not refused give finite pictures", "[renderer][lights]") {
+TEST_CASE("the brightest accepted lights give finite pictures", "[renderer][lights]") {
   const scene bright = scene_of_lights(largest_radiance), plain = scene_of_lights(1.0f);
   for (const sampling_method method : {sampling_method::pt, sampling_method::wfpg}) {
     render_options options;

@@ -1,4 +1,4 @@
-// The renderer's BSDFs: by the library's checks of what a host hands it, and against what is known of each.
+// The renderer's BSDFs. They pass the library's checks and match known values.
 #include "materials/materials.hpp"
 #include "support/catch.hpp"
 #include "tracer/rng.hpp"
@@ -41,7 +41,7 @@ std::vector<named_bsdf> non_delta() {
     const std::string roughness = ' ' + std::to_string(alpha);
     all.push_back({"conductor" + roughness, make(material_kind::conductor, colour, alpha)});
     all.push_back({"plastic" + roughness, make(material_kind::plastic, colour, alpha)});
-    // What is refracted is spread over a third of the angle: a narrower lobe than the checks resolve.
+    // Refraction compresses the lobe to a third of the angle, which the checks do not resolve.
     if (alpha < 0.1f) continue;
     all.push_back({"rough dielectric" + roughness, make(material_kind::rough_dielectric, white, alpha)});
   }
@@ -56,7 +56,7 @@ std::vector<named_bsdf> non_delta() {
   return all;
 }
 
-/// All lobes: what a material shares out to metal, facets, transmission and diffuse transmission.
+/// A material with all lobes: metal, facets, transmission and diffuse transmission.
 bsdf layered(material_kind kind, const float (&factors)[4], float alpha, float ior = 1.5f) {
   bsdf f = make(kind, colour, alpha);
   f.ior = ior;
@@ -69,12 +69,12 @@ bsdf layered(material_kind kind, const float (&factors)[4], float alpha, float i
 }
 
 std::vector<named_bsdf> layered_bsdfs() {
-  constexpr float shares[][4] = {{0, 0.5f, 0, 0},       {0.4f, 1, 0, 0},       {0.3f, 0.2f, 0, 0},
-                                 {0, 1, 0.6f, 0},       {0.3f, 0.7f, 0.5f, 0}, {0, 0, 1, 0},
-                                 {0, 0.3f, 0, 0.7f},    {0, 0, 0, 1},          {0, 1, 0.4f, 0.3f},
-                                 {0.5f, 0.8f, 1, 0.5f}, {0, 0, 0, 0},          {1, 0, 1, 1}};
+  constexpr float fractions[][4] = {{0, 0.5f, 0, 0},       {0.4f, 1, 0, 0},       {0.3f, 0.2f, 0, 0},
+                                    {0, 1, 0.6f, 0},       {0.3f, 0.7f, 0.5f, 0}, {0, 0, 1, 0},
+                                    {0, 0.3f, 0, 0.7f},    {0, 0, 0, 1},          {0, 1, 0.4f, 0.3f},
+                                    {0.5f, 0.8f, 1, 0.5f}, {0, 0, 0, 0},          {1, 0, 1, 1}};
   std::vector<named_bsdf> all;
-  for (const auto& factors : shares)
+  for (const auto& factors : fractions)
     for (const float alpha : {0.15f, 0.6f})
       for (const material_kind kind :
            {material_kind::metallic_roughness, material_kind::thin_metallic_roughness}) {
@@ -137,7 +137,7 @@ TEST_CASE("all lobes together pass the library's checks of BSDFs", "[renderer][b
   }
 }
 
-TEST_CASE("kinds are what all lobes together are for their factors", "[renderer][bsdf]") {
+TEST_CASE("each kind equals all lobes together with its factors", "[renderer][bsdf]") {
   const auto is_same = [](const bsdf& a, const bsdf& b) {
     for (std::uint32_t i = 0; i < 1000; ++i) {
       const vec3 wo = uniform_sphere(numbers(i, 8)), wi = uniform_sphere(numbers(i, 9));
@@ -171,7 +171,7 @@ TEST_CASE("a thin dielectric lets light straight through", "[renderer][bsdf]") {
   }
 }
 
-TEST_CASE("a white GGX conductor loses only what shadowing takes", "[renderer][bsdf]") {
+TEST_CASE("a white GGX conductor loses only shadowed light", "[renderer][bsdf]") {
   const bsdf smooth = make(material_kind::conductor, vec3(1.0f), 0.05f);
   estimate albedo;
   for (std::uint32_t i = 0; i < 20000; ++i) {
@@ -182,7 +182,7 @@ TEST_CASE("a white GGX conductor loses only what shadowing takes", "[renderer][b
   CHECK(albedo.mean() <= 1.00001);
 }
 
-TEST_CASE("nothing leaks where shading and geometric sides differ", "[renderer][bsdf]") {
+TEST_CASE("no light leaks where shading and geometric sides differ", "[renderer][bsdf]") {
   std::vector<named_bsdf> all = non_delta();
   for (named_bsdf& each : layered_bsdfs()) {
     each.f.normal = glm::normalize(vec3(0.4f, 0.1f, 1.0f));
@@ -223,7 +223,7 @@ TEST_CASE("a mirror mirrors", "[renderer][bsdf]") {
   CHECK(mirror.sample(-wo, {0.3f, 0.4f}).pdf == 0.0f);
 }
 
-TEST_CASE("a dielectric reflects and refracts as Fresnel and Snell say", "[renderer][bsdf]") {
+TEST_CASE("a dielectric reflects and refracts by Fresnel and Snell", "[renderer][bsdf]") {
   const bsdf glass = make(material_kind::dielectric, vec3(1.0f));
   CHECK((glass.is_delta() && glass.transmits()));
   CHECK(render::fresnel_dielectric(1.0f, 1.5f) == Approx(0.04));
@@ -245,14 +245,14 @@ TEST_CASE("a dielectric reflects and refracts as Fresnel and Snell say", "[rende
       CHECK(glm::length(vec2(refracted.direction)) == Approx(sine / eta).margin(1e-5));
       CHECK(reflected.pdf + refracted.pdf == Approx(1.0f));
       CHECK(glass.delta_weight_rgb(wo, refracted.direction).x == Approx(1.0f / (eta * eta)));
-      // Light that goes in and comes out again is neither squeezed nor spread.
+      // Light that enters and leaves is neither compressed nor spread.
       CHECK(glass.delta_weight_rgb(wo, refracted.direction).x *
                 glass.delta_weight_rgb(refracted.direction, wo).x ==
             Approx(1.0f));
     }
 }
 
-TEST_CASE("roulette sees of smooth glass what goes on, whatever its colour", "[renderer][bsdf]") {
+TEST_CASE("reflectance of smooth glass is 1 reflected, and its colour transmitted", "[renderer][bsdf]") {
   const vec3 colour(0.5f, 0.25f, 0.0f);
   for (const material_kind kind : {material_kind::dielectric, material_kind::thin_dielectric})
     for (const bool is_black : {false, true}) {

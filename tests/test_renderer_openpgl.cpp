@@ -1,5 +1,5 @@
-// The renderer guided by Open PGL: pictures have the means of path tracing's, densities are those that
-// directions are drawn with, what is learnt is what arrives, and what cannot be is refused.
+// The renderer guided by Open PGL. Pictures have the means of path tracing. Densities match the directions,
+// incident light is learnt, and invalid options are refused.
 #include "casters/embree_caster.hpp"
 #include "scene/builtin_scenes.hpp"
 #include "scene/device_scene.hpp"
@@ -49,7 +49,7 @@ void with_trained_guider(PGL_DIRECTIONAL_DISTRIBUTION_TYPE directional, const F&
   f(guider);
 }
 
-/// What a guider draws from at a point, with all of the cosine or none, as a BSDF that check_bsdf takes.
+/// Open PGL's distribution at a point, with all of the cosine or none, as a BSDF for check_bsdf.
 struct drawn_from_field {
   openpgl_field_view field;
   wfpg::surface<bsdf> at;
@@ -95,7 +95,7 @@ TEST_CASE("a furnace guided by Open PGL has its radiance within 0.5%", "[rendere
     }
 }
 
-TEST_CASE("densities are those that Open PGL draws directions with", "[renderer][openpgl]") {
+TEST_CASE("reported densities are those of Open PGL's directions", "[renderer][openpgl]") {
   wfpg::testing::bsdf_check_options options;
   options.reciprocal = false;
   options.samples = std::size_t(1) << 14;
@@ -116,7 +116,7 @@ TEST_CASE("densities are those that Open PGL draws directions with", "[renderer]
     });
 }
 
-TEST_CASE("Open PGL learns the light that drawn directions bring", "[renderer][openpgl]") {
+TEST_CASE("Open PGL learns the light along sampled directions", "[renderer][openpgl]") {
   const policy exec;
   openpgl_paths paths(3, 3);
   const openpgl_recorder& recorder = paths.recorder();
@@ -132,7 +132,7 @@ TEST_CASE("Open PGL learns the light that drawn directions bring", "[renderer][o
   const wfpg::sampled_direction mirrored{up, 1.0f, wfpg::sampling_technique::delta};
   paths.clear();
 
-  // A lamp and a lit surface, seen through what takes half of the light; the first vertex is lit too.
+  // A lamp and a lit surface behind a surface that takes half of the light. The first vertex is lit too.
   recorder.vertex(0, 0, vec3(0.0f), up, white);
   recorder.radiance(0, 0, vec3(7.0f));
   recorder.drawn(0, 0, diffuse, drawn);
@@ -170,7 +170,7 @@ TEST_CASE("Open PGL learns the light that drawn directions bring", "[renderer][o
   CHECK(paths.samples().GetSizeSurface() == 0);
 }
 
-TEST_CASE("a rendering guided by Open PGL is one picture on any number of threads", "[renderer][openpgl]") {
+TEST_CASE("a rendering guided by Open PGL is equal on any number of threads", "[renderer][openpgl]") {
   for (const sampling_method method : methods) {
     render_options options = rendering{"cornell-enclosed", false, method}.options();
     const scene enclosed = make_builtin_scene("cornell-enclosed");
@@ -182,7 +182,7 @@ TEST_CASE("a rendering guided by Open PGL is one picture on any number of thread
   }
 }
 
-TEST_CASE("a rendering guided by Open PGL says what it cost", "[renderer][openpgl]") {
+TEST_CASE("a rendering guided by Open PGL reports its cost", "[renderer][openpgl]") {
   const scene wall = make_builtin_scene("thin-wall");
   for (const sampling_method method : methods) {
     render_options options = rendering{"thin-wall", true, method}.options();
@@ -213,7 +213,7 @@ TEST_CASE("a rendering in the dark teaches Open PGL nothing", "[renderer][openpg
   }
 }
 
-TEST_CASE("the first sample that Open PGL is shown is path tracing's", "[renderer][openpgl]") {
+TEST_CASE("the first sample with Open PGL is unguided", "[renderer][openpgl]") {
   const scene wall = make_builtin_scene("thin-wall");
   const auto picture = [&](sampling_method method, int spp) {
     render_options options = rendering{"thin-wall", true, method}.options();
@@ -226,13 +226,12 @@ TEST_CASE("the first sample that Open PGL is shown is path tracing's", "[rendere
   }
 }
 
-TEST_CASE("a path's last direction is Open PGL's only where no next-event estimation finds the light",
+TEST_CASE("with next-event estimation Open PGL does not guide a path's last direction",
           "[renderer][openpgl]") {
   for (const sampling_method method : methods) wfpg_test::check_depths_are_guided(method);
 }
 
-TEST_CASE("Open PGL where it cannot run, and leaves that it cannot fill, are refused by name",
-          "[renderer][openpgl]") {
+TEST_CASE("Open PGL refuses other devices and options out of range by name", "[renderer][openpgl]") {
   render_options options = rendering{"cornell-box", true, sampling_method::openpgl_vmm}.options();
   for (const auto& [where, name] : {std::pair(device::cuda, "cuda"), std::pair(device::optix, "optix"),
                                     std::pair(device::omp, "omp"), std::pair(device::seq, "seq")}) {

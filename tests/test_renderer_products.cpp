@@ -1,5 +1,5 @@
-// Products of fields with the renderer's BSDFs: random pairs on every policy, width and resolution; what the
-// glossy-aware mixture leaves to a guide; where the rays of a thin wall's dark side go.
+// Products of fields with the renderer's BSDFs: random pairs on every policy, width and resolution. Also the
+// guide's fraction beside glossy parts, and rays on a thin wall's dark side.
 #include "casters/embree_caster.hpp"
 #include "materials/materials.hpp"
 #include "scene/builtin_scenes.hpp"
@@ -31,7 +31,7 @@ constexpr named_bsdf bsdfs[] = {
     {"plastic", material_kind::plastic, 0.2f},   {"rough dielectric", material_kind::rough_dielectric, 0.3f}};
 constexpr std::uint64_t kinds = sizeof bsdfs / sizeof bsdfs[0];
 
-/// One of many pairs of a field and a surface, with the BSDFs in turn and every other view at grazing.
+/// One of many pairs of a field and a surface. BSDFs alternate, and every other view is grazing.
 struct random_pair {
   named_bsdf scatters;
   bool grazing, hemisphere;
@@ -60,7 +60,7 @@ struct random_pair {
   }
 };
 
-WFPG_TEST_CASE("products of 50 fields and BSDFs at every resolution", "[renderer][products]") {
+WFPG_TEST_CASE("products of 50 fields and BSDFs are right at every resolution", "[renderer][products]") {
   const Exec exec;
   product_family family;
   int empty = 0;
@@ -81,7 +81,7 @@ WFPG_TEST_CASE("products of 50 fields and BSDFs at every resolution", "[renderer
 
 }  // namespace
 
-TEST_CASE("mixtures of products and BSDFs are what they say, over the sphere", "[renderer][products]") {
+TEST_CASE("mixtures of products and BSDFs report their densities over the sphere", "[renderer][products]") {
   const wfpg::exec::seq exec;
   for (std::uint64_t seed = 0; seed < 4 * kinds; ++seed) {
     const random_pair pair(seed);
@@ -90,7 +90,7 @@ TEST_CASE("mixtures of products and BSDFs are what they say, over the sphere", "
     std::vector<drawn_direction> drawn;
     for (const product_draw& d : made.drawn())
       if (d.mixed.pdf > 0.0f) drawn.push_back({d.mixed.direction, d.mixed.pdf});
-    // Samples fail where the BSDF's do: the density of those that succeed integrates to their share.
+    // Samples fail where the BSDF's do. The density integrates to the fraction that succeeds.
     sampler_check_options options;
     options.total = double(drawn.size()) / double(made.drawn().size());
     options.moments = seed % 4 == 0;
@@ -102,7 +102,7 @@ TEST_CASE("mixtures of products and BSDFs are what they say, over the sphere", "
   }
 }
 
-TEST_CASE("a diffuse surface's product is its field, where that carries its cosine", "[renderer][products]") {
+TEST_CASE("a diffuse surface's product is its field, if the field has the cosine", "[renderer][products]") {
   const wfpg::exec::seq exec;
   const auto values = field_values(field_kind::noise, 16, 3);
   const auto is_field = [&](material_kind kind, bool hemisphere, vec3 normal) {
@@ -121,7 +121,7 @@ TEST_CASE("a diffuse surface's product is its field, where that carries its cosi
   CHECK_FALSE(is_field(material_kind::plastic, true, up));
 }
 
-TEST_CASE("glossy parts leave the guide less, the narrower they are", "[renderer][products]") {
+TEST_CASE("narrower glossy parts leave the guide a smaller fraction", "[renderer][products]") {
   CHECK(wfpg::guided_part(0.5f, 0.5f) == 1.0f);
   CHECK(wfpg::guided_part(1.0f, 0.5f) == 1.0f);
   CHECK(wfpg::guided_part(0.25f, 0.5f) == Approx(0.25f + 0.75f / 4.0f));
@@ -130,18 +130,18 @@ TEST_CASE("glossy parts leave the guide less, the narrower they are", "[renderer
   const wfpg::exec::seq exec;
   const built_field<wfpg::exec::seq> built(exec, field_values(field_kind::noise, 16, 3), 16);
   const wfpg::guide_mixture mixture{wfpg::directional_field(built.grid(), up), 0.6f};
-  const auto shares = [&](material_kind kind, float alpha) {
+  const auto fractions = [&](material_kind kind, float alpha) {
     wfpg::surface<bsdf> s;
     s.normal = s.outgoing = up;
     s.bsdf = {up, up, vec3(0.8f, 0.5f, 0.3f), alpha, 1.5f, kind};
     return mixture.fractions_of(s);
   };
-  const wfpg::mixture_fractions lambert = shares(material_kind::lambert, 0.1f);
+  const wfpg::mixture_fractions lambert = fractions(material_kind::lambert, 0.1f);
   CHECK((lambert.guide == 0.6f && lambert.glossy == 0.0f));
-  const wfpg::mixture_fractions mirror_like = shares(material_kind::conductor, 0.01f);
+  const wfpg::mixture_fractions mirror_like = fractions(material_kind::conductor, 0.01f);
   CHECK(mirror_like.guide == Approx(0.6f * wfpg::guided_part(0.01f, 0.5f)));
   CHECK(mirror_like.smooth == Approx(0.0f).margin(1e-6));
-  const wfpg::mixture_fractions coated = shares(material_kind::plastic, 0.1f);
+  const wfpg::mixture_fractions coated = fractions(material_kind::plastic, 0.1f);
   CHECK(coated.guide < 0.6f);
   CHECK(coated.guide > mirror_like.guide);
   for (const wfpg::mixture_fractions& s : {lambert, mirror_like, coated})
@@ -150,7 +150,7 @@ TEST_CASE("glossy parts leave the guide less, the narrower they are", "[renderer
 
 namespace {
 
-/// Points of the thin wall's dark side, seen from in front of it.
+/// Points on the thin wall's dark side, seen from in front of it.
 struct dark_side {
   std::uint64_t seed;
   wfpg::surface<bsdf> operator()(std::uint32_t ray) const {
@@ -165,9 +165,9 @@ struct dark_side {
   }
 };
 
-/// Of the guided rays from there, the share below the surface: plain bins, transient fields, after `samples`
-/// samples of the scene.
-double share_below(std::uint32_t product_resolution, int samples) {
+/// The fraction of guided rays from there that go below the surface. Plain bins, transient fields, after
+/// `samples` samples of the scene.
+double fraction_below(std::uint32_t product_resolution, int samples) {
   using exec_policy = wfpg::exec::tbb;
   const exec_policy exec;
   const render::scene scene = render::make_builtin_scene("thin-wall");
@@ -205,8 +205,8 @@ double share_below(std::uint32_t product_resolution, int samples) {
 
 }  // namespace
 
-TEST_CASE("products send no rays of a thin wall's dark side to the bright one", "[renderer][products]") {
-  const double without = share_below(0, 16), with = share_below(8, 16);
+TEST_CASE("products send no rays from a thin wall's dark side to the bright side", "[renderer][products]") {
+  const double without = fraction_below(0, 16), with = fraction_below(8, 16);
   INFO("below the surface: " << 100.0 * with << "% with products, " << 100.0 * without << "% without");
   CHECK(with < 0.01);
   CHECK(without > 0.1);

@@ -1,4 +1,4 @@
-// render(): what it refuses, reports and keeps on the way, and guided pictures against path tracing's.
+// render(): refused options, reports, checkpoints, and guided pictures compared with path tracing.
 #include "app/option_names.hpp"
 #include "app/render.hpp"
 #include "casters/embree_caster.hpp"
@@ -25,7 +25,7 @@ namespace {
 using namespace render;
 using namespace render_test;
 
-/// What render() says of options that it refuses.
+/// The message of render() for refused options.
 std::string refusal(const render_options& options) {
   try {
     render::render(square_of({}), options, {});
@@ -35,7 +35,8 @@ std::string refusal(const render_options& options) {
   return "nothing";
 }
 
-/// The mean of a part of a path-traced picture of 32 x 32 pixels, by its first and last column and row.
+/// The mean of a part of a path-traced picture of 32 x 32 pixels. The part has a first and last column and
+/// row.
 double mean_of_part(const std::string& name, int max_depth, const int (&columns)[2], const int (&rows)[2]) {
   render_options options;
   options.method = sampling_method::pt;
@@ -60,7 +61,7 @@ TEST_CASE("each method has a row and a name", "[renderer]") {
   }
 }
 
-TEST_CASE("a policy refuses methods of TBB alone", "[renderer]") {
+TEST_CASE("policies other than TBB refuse methods that need TBB", "[renderer]") {
   const scene square = square_of({});
   render_options options;
   options.method = sampling_method::openpgl_vmm;
@@ -68,7 +69,7 @@ TEST_CASE("a policy refuses methods of TBB alone", "[renderer]") {
                   std::invalid_argument);
 }
 
-TEST_CASE("scenes and options that cannot be right are refused by name", "[renderer]") {
+TEST_CASE("invalid scenes and options are refused by name", "[renderer]") {
   const wfpg::exec::seq exec;
   scene broken = square_of({});
   broken.triangles[1].y = 4;
@@ -110,7 +111,7 @@ TEST_CASE("a rendering reports itself and takes samples or seconds", "[renderer]
   CHECK(timed.report.total_seconds >= 0.05);
 }
 
-TEST_CASE("checkpoints are the pictures on the way", "[renderer]") {
+TEST_CASE("checkpoints are the pictures after fewer samples", "[renderer]") {
   render_options options;
   options.width = options.height = 16;
   options.octree_resolution = 32;
@@ -138,7 +139,7 @@ TEST_CASE("checkpoints are the pictures on the way", "[renderer]") {
   CHECK(all.checkpoints[2].picture.pixels == odd.picture.pixels);
 }
 
-TEST_CASE("later samples count more only where they are better", "[renderer]") {
+TEST_CASE("later samples have more weight only if they are better", "[renderer]") {
   render_options options;
   CHECK(combination_of(options) == wfpg::sample_combination::pt_linear);
   options.method = sampling_method::pt;
@@ -169,7 +170,7 @@ TEST_CASE("a guided rendering finds the furnace's radiance", "[renderer][guided]
       }
 }
 
-TEST_CASE("a guided rendering is one picture on any device and number of threads", "[renderer][guided]") {
+TEST_CASE("a guided rendering is equal on any device and number of threads", "[renderer][guided]") {
   const scene scene = make_builtin_scene("cornell-enclosed");
   render_options options;
   options.width = options.height = 24;
@@ -202,7 +203,7 @@ TEST_CASE("a guided rendering is one picture on any device and number of threads
   }
 }
 
-TEST_CASE("a rendering reports its irradiance records, all samples of which are guided and count alike",
+TEST_CASE("a rendering with irradiance records reports them, and all samples have equal weight",
           "[renderer][guided]") {
   render_options options;
   options.width = options.height = 16;
@@ -225,8 +226,7 @@ TEST_CASE("a rendering reports its irradiance records, all samples of which are 
   CHECK(render::render(enclosed, options, {}).report.records.builds == 0);
 }
 
-TEST_CASE("the first sample of a guided rendering is path tracing's, later ones are not",
-          "[renderer][guided]") {
+TEST_CASE("only the first sample of a guided rendering is path tracing's", "[renderer][guided]") {
   const scene scene = make_builtin_scene("thin-wall");
   render_options options;
   options.width = options.height = 16;
@@ -257,7 +257,7 @@ TEST_CASE("the first sample of a guided rendering is path tracing's, later ones 
   CHECK(guided.report.slots.refreshed > 0.0);
 }
 
-TEST_CASE("a path's last direction is guided only where no next-event estimation finds the light",
+TEST_CASE("with next-event estimation the guide does not sample a path's last direction",
           "[renderer][guided]") {
   for (const sampling_method method : {sampling_method::wfpg, sampling_method::wfpg_product,
                                        sampling_method::sarsa, sampling_method::records})
@@ -270,7 +270,7 @@ TEST_CASE("left of the wall of cornell-wall all light is indirect", "[renderer][
   CHECK(mean_of_part("cornell-wall", 2, {18, 29}, {4, 23}) > 0.1);
 }
 
-TEST_CASE("light gets to the floor of caustic-pool through the water alone", "[renderer][builtin]") {
+TEST_CASE("light reaches the floor of caustic-pool only through the water", "[renderer][builtin]") {
   CHECK(mean_of_part("caustic-pool", 2, {0, 31}, {20, 31}) == 0.0);
   CHECK(mean_of_part("caustic-pool", 3, {0, 31}, {20, 31}) > 0.02);
 }
@@ -289,14 +289,14 @@ TEST_CASE("roulette ends no path before its depth, and keeps the mean", "[render
       options.roulette_depth = depth;
       const render_result result = render::render(dark, options, {});
       CHECK(mean_of(result.picture.pixels) == Approx(1.0 / 0.95).epsilon(0.005));
-      // One in forty goes on from the vertex that roulette begins at.
+      // One path in forty survives roulette.
       const double segments = static_cast<double>(result.report.segments) / (64.0 * 64.0 * 16.0);
       CHECK(segments >= std::min(depth + 1, 8));
       CHECK(segments <= std::min(depth + 1.05, 8.0));
     }
 }
 
-TEST_CASE("hits of lights are counted, of the side that emits and of skies that do", "[renderer]") {
+TEST_CASE("hits of lights count on emitting sides and for skies that emit", "[renderer]") {
   render_options options;
   options.method = sampling_method::pt;
   options.width = options.height = 8;

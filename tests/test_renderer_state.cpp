@@ -1,4 +1,4 @@
-// Renderings that are interrupted and go on, and guides that renderings leave to one another.
+// Renderings that are interrupted and resumed, and guides that later renderings load.
 #include "app/interruption.hpp"
 #include "app/output_files.hpp"
 #include "app/render.hpp"
@@ -40,7 +40,7 @@ render_options small(const rendering& what, int spp) {
   return options;
 }
 
-/// A rendering that is stopped after so many samples.
+/// A rendering that is stopped after `samples` samples.
 render_result stopped(const scene& world, render_options options, int samples) {
   int taken = 0;
   options.keep_state = true;
@@ -48,7 +48,7 @@ render_result stopped(const scene& world, render_options options, int samples) {
   return render::render(world, options, {});
 }
 
-/// What an Error says that a call throws; empty where it throws none.
+/// The message of an Error that a call throws. Empty if it throws none.
 template <class Error = wfpg::file_error>
 std::string fault(const std::function<void()>& call) {
   try {
@@ -61,8 +61,7 @@ std::string fault(const std::function<void()>& call) {
 
 }  // namespace
 
-TEST_CASE("a rendering that is stopped and goes on gives the picture of one that was not",
-          "[renderer][state]") {
+TEST_CASE("a stopped and resumed rendering gives the same picture", "[renderer][state]") {
   const temporary_folder folder;
   std::vector<rendering> renderings = {
       {"ajar", true, sampling_method::pt},
@@ -104,8 +103,7 @@ TEST_CASE("a rendering that is stopped and goes on gives the picture of one that
     }
 }
 
-TEST_CASE("a rendering that is complete goes on to more samples, and has nothing to do for as many",
-          "[renderer][state]") {
+TEST_CASE("resuming a complete rendering adds samples, or does nothing", "[renderer][state]") {
   const temporary_folder folder;
   const scene world = make_builtin_scene("ajar");
   render_options options = small({"ajar"}, 9);
@@ -138,7 +136,7 @@ TEST_CASE("a signal ends a rendering after the sample in flight", "[renderer][st
       if (p.samples == 2) std::raise(signal);
     });
     CHECK((result.is_stopped && result.report.spp == 3));  // sample 2 was reported, and 3 in flight
-    // The next one is the system's own again.
+    // The next signal has the system's own handler again.
     CHECK(std::signal(SIGINT, SIG_DFL) == SIG_DFL);
     CHECK(std::signal(SIGTERM, SIG_DFL) == SIG_DFL);
   }
@@ -148,7 +146,7 @@ TEST_CASE("a signal ends a rendering after the sample in flight", "[renderer][st
   std::signal(SIGTERM, SIG_DFL);
 }
 
-TEST_CASE("a rendering does not go on as another one", "[renderer][state]") {
+TEST_CASE("a rendering with other options or another scene does not resume", "[renderer][state]") {
   const temporary_folder folder;
   const scene world = make_builtin_scene("ajar");
   const render_options options = small({"ajar"}, 5);
@@ -196,7 +194,7 @@ TEST_CASE("a rendering does not go on as another one", "[renderer][state]") {
   CHECK(render::render(renamed, same, {}).report.spp == 5);
 }
 
-TEST_CASE("state files that are cut off, altered or foreign are told apart", "[renderer][state]") {
+TEST_CASE("truncated, altered and foreign state files have different errors", "[renderer][state]") {
   const temporary_folder folder;
   const scene world = make_builtin_scene("ajar");
   render_options options = small({"ajar"}, 5);
@@ -235,7 +233,7 @@ TEST_CASE("state files that are cut off, altered or foreign are told apart", "[r
         "wfpg: " + options.load_guide + " is not a guide file");
 }
 
-TEST_CASE("a rendering begins with the guide of another one", "[renderer][state]") {
+TEST_CASE("a rendering can begin with the guide of another one", "[renderer][state]") {
   const temporary_folder folder;
   const scene world = make_builtin_scene("ajar");
   for (const fields lifetime : {fields::kept, fields::transient}) {
@@ -255,7 +253,7 @@ TEST_CASE("a rendering begins with the guide of another one", "[renderer][state]
     const render_result warm = render::render(world, options, {});
     CHECK(warm.report.spp == 1);
     CHECK(warm.report.cones_per_segment > 0.0);
-    // What the other rendering counted is not counted again.
+    // Counts of the other rendering are not included.
     CHECK(warm.report.cones_per_segment < 3.0 * teacher.report.cones_per_segment);
     CHECK_FALSE(same_bits(warm.picture, cold.picture));
 
@@ -281,7 +279,7 @@ TEST_CASE("a rendering begins with the guide of another one", "[renderer][state]
   }
 }
 
-TEST_CASE("state on disk is of methods that have one", "[renderer][state]") {
+TEST_CASE("guides and states need a method that can save them", "[renderer][state]") {
   const scene world = make_builtin_scene("ajar");
   const auto refused = [&](sampling_method method, auto change, const std::string& expected) {
     render_options options = small({"ajar"}, 1);

@@ -1,4 +1,4 @@
-// What rays find of a scene's surfaces: textures, holes in them, and normals on the viewer's side.
+// The surfaces that rays find in a scene: textures, holes, and normals on the viewer's side.
 #include "casters/bvh_scene.hpp"
 #include "casters/embree_caster.hpp"
 #include "scene/device_scene.hpp"
@@ -67,8 +67,8 @@ TEST_CASE("textures are clamped or mirrored beyond their edges", "[renderer]") {
     }
 }
 
-TEST_CASE("rays go through what an alpha mask cuts out", "[renderer]") {
-  // Three squares behind one another: one cut out in its left half, one opaque, one whose holes nobody sees.
+TEST_CASE("rays pass through the holes of an alpha mask", "[renderer]") {
+  // Three squares in a row: one with a hole in its left half, one opaque, one whose holes are hidden.
   scene s;
   for (const float z : {0.0f, -1.0f, -2.0f}) {
     const auto first = static_cast<std::uint32_t>(s.positions.size());

@@ -1,7 +1,7 @@
-// Guiding changes the noise of a picture and not its mean: tile means of pt and wfpg agree within their
-// standard errors, and so does the mean of the picture. Of every kind of guiding there is a picture so
-// precise that 1% of bias in indirect light is found. Pictures are bit-identical on all policies
-// (test_renderer_render.cpp), so one policy speaks for all.
+// Guiding changes the noise of a picture and not its mean. Tile means and picture means of pt and wfpg agree
+// within their standard errors. For every kind of guiding, one picture is precise enough to show a bias of 1%
+// in indirect light. One policy is enough, since pictures are bit-identical on all
+// (test_renderer_render.cpp).
 #include "support/catch.hpp"
 #include "support/renderings.hpp"
 
@@ -27,7 +27,7 @@ TEST_CASE("pictures guided by kept fields have the mean of unguided ones", "[ren
   for (const char* scene : {"cornell-box", "cornell-enclosed", "ajar", "thin-wall", "furnace"})
     for (const bool nee : {false, true}) check_rendering({scene, nee});
   check_rendering({"cornell-wall", true});
-  check_rendering({"many-lamps", true});  // whose choice is learnt
+  check_rendering({"many-lamps", true});  // the choice among them is learnt
   for (const bool nee : {false, true}) {
     check_rendering({map_scene, nee});
     check_precisely({"", nee});
@@ -37,11 +37,11 @@ TEST_CASE("pictures guided by kept fields have the mean of unguided ones", "[ren
   check_rendering({"thin-wall", true, wfpg_method, fields::kept, guiding::plain});
 }
 
-TEST_CASE("pictures have that mean too once what guides know has settled", "[renderer][unbiased]") {
+TEST_CASE("guided pictures have the mean of unguided ones after warm-up too", "[renderer][unbiased]") {
   for (const sampling_method method : {wfpg_method, product_method, sampling_method::sarsa})
     for (const bool nee : {false, true}) {
       rendering what{"cornell-enclosed", nee, method};
-      what.settled = true;
+      what.warmed_up = true;
       check_rendering(what);
       check_precisely(what);
     }
@@ -58,7 +58,7 @@ TEST_CASE("pictures guided by transient fields have the mean of unguided ones", 
   check_rendering({map_scene, true, wfpg_method, fields::transient, guiding::oriented});
 }
 
-TEST_CASE("pictures guided by fields of the octree's cones have the mean of unguided ones",
+TEST_CASE("pictures guided by fields of octree cones have the mean of unguided ones",
           "[renderer][unbiased]") {
   for (const render::cones through : {render::cones::march, render::cones::trace})
     for (const fields lifetime : {fields::kept, fields::transient}) {
@@ -89,7 +89,7 @@ TEST_CASE("pictures guided by a SARSA grid have the mean of unguided ones", "[re
     for (const bool nee : {false, true}) check_rendering({scene, nee, sampling_method::sarsa});
   for (const bool nee : {false, true}) check_precisely({"", nee, sampling_method::sarsa});
   rendering what{"cornell-enclosed", true, sampling_method::sarsa};
-  // Each with another: test_sarsa_grid_light.cpp has all pairs.
+  // Each update with another sampler. test_sarsa_grid_light.cpp has all pairs.
   const auto updates = render::sarsa_update_names();
   const auto samplers = render::sarsa_sampler_names();
   for (std::size_t i = 0; i < samplers.size(); ++i) {

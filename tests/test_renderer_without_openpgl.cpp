@@ -1,4 +1,4 @@
-// What a renderer that was built without Open PGL says where it is asked for it.
+// The renderer's errors for Open PGL's methods if it was built without Open PGL.
 #include "app/render.hpp"
 #include "scene/builtin_scenes.hpp"
 #include "support/catch.hpp"

@@ -1,4 +1,4 @@
-// Files are replaced whole: by several processes, through links, on a full disk, never half.
+// Files are replaced as a whole: by several processes, through links, on a full disk.
 #include "support/catch.hpp"
 #include "support/temporary_folder.hpp"
 
@@ -25,7 +25,7 @@ void replace_by(const std::string& path, const std::string& bytes) {
   replace_file(path, [&](std::ostream& out) { out << bytes; });
 }
 
-/// What is wrong where a file cannot be replaced.
+/// The error message if a file cannot be replaced.
 std::string refusal_of(const std::string& path) {
   try {
     replace_by(path, "new");
@@ -79,7 +79,7 @@ TEST_CASE("a file that does not fit leaves the old one", "[replace_file]") {
   CHECK(files_in(folder) == 1);
 }
 
-TEST_CASE("processes that replace one file at a time all succeed", "[replace_file]") {
+TEST_CASE("several processes may replace one file at the same time", "[replace_file]") {
   const temporary_folder folder;
   const std::string path = folder.file("a");
   constexpr int processes = 4, rounds = 50;
@@ -105,7 +105,7 @@ TEST_CASE("processes that replace one file at a time all succeed", "[replace_fil
   CHECK(files_in(folder) == 1);
 }
 
-TEST_CASE("links stay links, and what they name is replaced", "[replace_file]") {
+TEST_CASE("links stay links, and their targets are replaced", "[replace_file]") {
   const temporary_folder folder;
   fs::create_directory(folder.file("in"));
   const std::string target = folder.write("in/target", "old"), link = folder.file("link");
@@ -124,7 +124,7 @@ TEST_CASE("links stay links, and what they name is replaced", "[replace_file]") 
         "wfpg: " + folder.file("round") + " is a symbolic link that leads nowhere");
 }
 
-TEST_CASE("what is no file is refused and left alone", "[replace_file]") {
+TEST_CASE("folders, pipes and devices are refused and left alone", "[replace_file]") {
   const temporary_folder folder;
   const std::string fifo = folder.file("fifo");
   REQUIRE(mkfifo(fifo.c_str(), 0600) == 0);

@@ -1,4 +1,4 @@
-// The ways to combine samples, sample by sample.
+// The ways to combine samples, tested sample by sample.
 #include "support/catch.hpp"
 
 #include <wfpg/sampling/sample_combiner.hpp>
@@ -16,7 +16,7 @@ std::vector<float> weights(wfpg::sample_combination combination) {
 
 }  // namespace
 
-TEST_CASE("sample combiner: weights of the first eight samples", "[sample_combiner]") {
+TEST_CASE("sample combiner: weights of the first eight samples are right", "[sample_combiner]") {
   using wfpg::sample_combination;
   using sequence = std::vector<float>;
   CHECK(weights(sample_combination::constant) == sequence{1, 1, 1, 1, 1, 1, 1, 1});

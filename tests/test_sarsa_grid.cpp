@@ -1,5 +1,5 @@
-// The SARSA grid: densities of its samplers, what it learns from a path, options. How it converges, and that
-// pictures keep their mean, is test_sarsa_grid_light.cpp's.
+// The SARSA grid: densities of its samplers, what it learns from a path, options. test_sarsa_grid_light.cpp
+// tests its convergence and the means of pictures.
 #include "support/catch.hpp"
 #include "support/sarsa.hpp"
 #include "support/statistics.hpp"
@@ -20,7 +20,7 @@ using wfpg::sarsa_update;
 const vec3 place(0.4f, 0.6f, 0.3f);
 const vec3 spot = glm::normalize(vec3(0.3f, 0.8f, -0.4f));
 
-/// A grid that knows the light at `place`.
+/// A grid that has learnt the light at `place`.
 template <class Exec>
 sarsa_guider<Exec> taught(const Exec& exec, sarsa_sampler sampler, const bright_spot& light,
                           std::uint32_t samples = 2) {
@@ -53,7 +53,7 @@ struct density_of_direction {
   }
 };
 
-/// Along axes, where the lattice of normals has one, and between.
+/// Normals along axes, where the lattice has one, and between.
 const std::vector<vec3>& test_normals() {
   static const std::vector<vec3> list = {{0, 1, 0},
                                          {0, 0, -1},
@@ -63,7 +63,7 @@ const std::vector<vec3>& test_normals() {
   return list;
 }
 
-WFPG_TEST_CASE("sarsa grid: densities integrate to one, and frequencies are theirs", "[sarsa]") {
+WFPG_TEST_CASE("sarsa grid: densities integrate to one and match the frequencies", "[sarsa]") {
   const Exec exec;
   chi_square_family family;
   for (const sarsa_sampler sampler : sarsa_samplers) {
@@ -91,7 +91,7 @@ WFPG_TEST_CASE("sarsa grid: densities integrate to one, and frequencies are thei
   CHECK(family.accepted());
 }
 
-WFPG_TEST_CASE("sarsa grid: samplers of the hemisphere draw nothing below the surface", "[sarsa]") {
+WFPG_TEST_CASE("sarsa grid: samplers of the hemisphere sample nothing below the surface", "[sarsa]") {
   const Exec exec;
   random_numbers random(5);
   for (const sarsa_sampler sampler : sarsa_samplers) {
@@ -121,27 +121,27 @@ WFPG_TEST_CASE("sarsa grid: samplers of the hemisphere draw nothing below the su
   }
 }
 
-WFPG_TEST_CASE("sarsa grid: light is drawn where it is, by the optimal share", "[sarsa]") {
+WFPG_TEST_CASE("sarsa grid: samplers find a bright spot, with the optimal fraction", "[sarsa]") {
   const Exec exec;
   const bright_spot light{spot};
-  double shares[4];
+  double fractions[4];
   for (const sarsa_sampler sampler : sarsa_samplers) {
     const sarsa_guider<Exec> guider = taught(exec, sampler, light);
     int hits = 0;
     for (const drawn_direction& d :
          evaluate(exec, 20000, draw_directions{guider.guide().view(), {0, 1, 0}, false}))
       hits += light(d.direction) > 10.0f ? 1 : 0;
-    shares[int(sampler)] = hits / 20000.0;
+    fractions[int(sampler)] = hits / 20000.0;
   }
-  // The spot has 1/20 of the sphere; what is uniform hits it in 1/10 of the draws above the surface.
-  CHECK(shares[0] > 0.3);
-  CHECK(shares[1] > 0.5);
-  CHECK(shares[2] == Approx(shares[1]).margin(0.02));
-  CHECK(shares[3] < shares[2] - 0.1);
-  CHECK(shares[3] > 0.5 * shares[2]);  // eps is 1/2 at most
+  // The spot covers 1/20 of the sphere. Uniform directions above the surface hit it with 1/10.
+  CHECK(fractions[0] > 0.3);
+  CHECK(fractions[1] > 0.5);
+  CHECK(fractions[2] == Approx(fractions[1]).margin(0.02));
+  CHECK(fractions[3] < fractions[2] - 0.1);
+  CHECK(fractions[3] > 0.5 * fractions[2]);  // eps is 1/2 at most
 }
 
-WFPG_TEST_CASE("sarsa grid: of light everywhere samplers of the hemisphere draw the cosine", "[sarsa]") {
+WFPG_TEST_CASE("sarsa grid: under uniform light samplers of the hemisphere sample the cosine", "[sarsa]") {
   const Exec exec;
   const vec3 normal(0.0f, 1.0f, 0.0f);
   for (const sarsa_sampler sampler : {sarsa_sampler::hemisphere_inversion, sarsa_sampler::rejection}) {
@@ -170,7 +170,7 @@ WFPG_TEST_CASE("sarsa grid: reruns give the same bits", "[sarsa]") {
   }
 }
 
-/// A path of three surfaces, written by hand: it attenuates by 0.5 at the second, where light is.
+/// A hand-written path of three surfaces. It attenuates by 0.5 at the second, where light is.
 struct write_path {
   wfpg::path_recorder_view recorder;
   WFPG_HD void operator()(std::size_t) const {
@@ -190,7 +190,7 @@ struct known_radiance {
   WFPG_HD float operator()() const { return view.radiance(position, direction); }
 };
 
-/// What is known at the path's first two vertices, of where it goes on.
+/// The learnt radiance at the path's first two vertices, along its directions.
 template <class Exec>
 std::pair<float, float> known(const Exec& exec, const sarsa_guider<Exec>& guider) {
   const wfpg::sarsa_grid_view view = guider.guide().view();
@@ -205,7 +205,7 @@ void sample_of_one_path(const Exec& exec, sarsa_guider<Exec>& guider) {
   guider.end_sample();
 }
 
-WFPG_TEST_CASE("sarsa grid: a path teaches what Eq. 6 and 7 say, at the end of a step", "[sarsa]") {
+WFPG_TEST_CASE("sarsa grid: a path teaches Eq. 6 and 7 at the end of a step", "[sarsa]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   for (const sarsa_update update : {sarsa_update::sarsa, sarsa_update::monte_carlo}) {
@@ -218,14 +218,14 @@ WFPG_TEST_CASE("sarsa grid: a path teaches what Eq. 6 and 7 say, at the end of a
     sample_of_one_path(exec, guider);
     CHECK(known(exec, guider) == std::pair<float, float>(0.0f, 0.0f));  // not yet
     sample_of_one_path(exec, guider);
-    // 2 emitted, 1 scattered of a light, and half of the 6 that come from the third vertex.
+    // 2 emitted, 1 scattered from a light, and half of the 6 from the third vertex.
     const bool bootstraps = update == sarsa_update::sarsa;
     CHECK(known(exec, guider).first == Approx(bootstraps ? 3.0f : 6.0f));
     CHECK(known(exec, guider).second == Approx(6.0f));
     for (int sample = 0; sample < 2; ++sample) sample_of_one_path(exec, guider);
     CHECK(known(exec, guider).first == Approx(bootstraps ? (2 * 3.0f + 2 * 6.0f) / 4.0f : 6.0f));
     for (int sample = 0; sample < 2; ++sample) sample_of_one_path(exec, guider);
-    // As four are known, the fifth and the sixth count for a quarter each.
+    // After four values, the fifth and the sixth have a weight of a quarter each.
     CHECK(known(exec, guider).first ==
           Approx(bootstraps ? 4.5f + (6.0f - 4.5f) * (1.0f - 0.75f * 0.75f) : 6.0f));
     guider.forget_light();
@@ -233,7 +233,7 @@ WFPG_TEST_CASE("sarsa grid: a path teaches what Eq. 6 and 7 say, at the end of a
   }
 }
 
-/// A white Lambertian surface at a place where the light is known: eval is 0.8 cos / pi.
+/// A white Lambertian surface at a place with known light: eval is 0.8 cos / pi.
 WFPG_TEST_CASE("sarsa grid: expected SARSA sums over all directions of the next surface", "[sarsa]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
@@ -242,7 +242,7 @@ WFPG_TEST_CASE("sarsa grid: expected SARSA sums over all directions of the next 
   sarsa_guider<Exec> guider(exec, mesh.view(), options);
   const vec3 first(0.1f, 0.1f, 0.1f);
   teach(exec, guider, place, bright_spot{spot, 2.0f});  // no spot: 0.3 + 0.2 x y
-  // Now a path that meets the place, and goes on from there along what is drawn.
+  // A path that hits the place and continues along a sampled direction.
   guider.begin_sample();
   const std::vector<test_surface> surfaces(1, make_surface(place, {0, 1, 0}, {0, 1, 0}));
   const wave_of_surfaces<Exec> wave(exec, surfaces);
@@ -268,7 +268,7 @@ WFPG_TEST_CASE("sarsa grid: expected SARSA sums over all directions of the next 
         Approx(5.24f).epsilon(0.01));
 }
 
-/// A path that leaves the scene from its first surface, along a direction that no field had a part in.
+/// A path that leaves the scene from its first surface, along a direction that no field sampled.
 struct leave_scene {
   wfpg::path_recorder_view recorder;
   WFPG_HD void operator()(std::size_t) const {
@@ -280,7 +280,7 @@ struct leave_scene {
   }
 };
 
-WFPG_TEST_CASE("sarsa grid: the environment is learnt as surfaces are", "[sarsa]") {
+WFPG_TEST_CASE("sarsa grid: it learns the environment as it learns surfaces", "[sarsa]") {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   for (const sarsa_update update : sarsa_updates) {
@@ -321,7 +321,7 @@ WFPG_TEST_CASE("sarsa grid: options out of range are named", "[sarsa]") {
   }
 }
 
-WFPG_TEST_CASE("sarsa grid: memory is told; without paths or extent it guides on", "[sarsa]") {
+WFPG_TEST_CASE("sarsa grid: memory is reported, and it guides without paths or extent", "[sarsa]") {
   counting_resource resource;
   const Exec exec = Exec().with_resource(&resource);
   const box_mesh<Exec> mesh(exec);

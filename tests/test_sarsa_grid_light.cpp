@@ -1,4 +1,4 @@
-// What a SARSA grid knows of a furnace, whose radiance is known, and the means of paths that it guides.
+// What a SARSA grid learns in a furnace of known radiance, and the means of guided paths.
 #include "support/catch.hpp"
 #include "support/estimates.hpp"
 #include "support/sarsa.hpp"
@@ -22,7 +22,7 @@ sarsa_grid_options furnace_options(sarsa_update update, float learning_rate) {
   options.learning_rate = learning_rate;
   options.resolution = 2;
   options.direction_resolution = 4;
-  options.max_depth = 48;  // one path of 45000 gets there
+  options.max_depth = 48;  // one path in 45000 gets there
   return options;
 }
 
@@ -39,13 +39,13 @@ WFPG_TEST_CASE("sarsa grid: Monte Carlo converges to a furnace's radiance", "[sa
   CHECK(mean_radiance(exec, guider) == Approx(furnace_radiance).epsilon(0.02));
 }
 
-WFPG_TEST_CASE("sarsa grid: SARSA comes to a furnace's radiance from below, step by step",
+WFPG_TEST_CASE("sarsa grid: SARSA approaches a furnace's radiance from below, step by step",
                "[sarsa][furnace]") {
   const Exec exec;
   for (const sarsa_update update : {sarsa_update::sarsa, sarsa_update::expected_sarsa}) {
     INFO(name_of(update));
     sarsa_guider<Exec> guider = furnace_guider(exec, furnace_options(update, 0.1f));
-    // As many bounces as there were steps: with all values new, 1 + 0.8 + 0.8² + ...
+    // One bounce per step. If all values are new, the sum is 1 + 0.8 + 0.8² + ...
     trace_in_furnace(exec, guider, 1);
     CHECK(mean_radiance(exec, guider) == Approx(1.0f).epsilon(0.001));
     trace_in_furnace(exec, guider, 1);
@@ -57,10 +57,10 @@ WFPG_TEST_CASE("sarsa grid: SARSA comes to a furnace's radiance from below, step
   }
 }
 
-/// Where the error of what is known of the furnace is looked at, in samples.
+/// The samples after which the error in the furnace is measured.
 constexpr std::uint32_t looked_at[] = {8, 16, 32, 64, 128, 256};
 
-/// Prints a row of docs/guides.md, and returns the errors, in per cent.
+/// Prints a row of docs/guides.md, and returns the errors in per cent.
 template <class Exec>
 std::vector<double> print_furnace_errors(const Exec& exec, sarsa_update update, float learning_rate,
                                          std::uint32_t step) {
@@ -82,8 +82,8 @@ std::vector<double> print_furnace_errors(const Exec& exec, sarsa_update update, 
   return errors;
 }
 
-// Hidden, since it takes a minute: its rows are a table's in docs/guides.md.
-WFPG_TEST_CASE("sarsa grid: the bias of what is known of a furnace", "[.][bias]") {
+// Hidden, since it takes a minute. It prints the rows of a table in docs/guides.md.
+WFPG_TEST_CASE("sarsa grid: the bias in a furnace is below known bounds", "[.][bias]") {
   const Exec exec;
   std::cout << "| update | learning rate | step | 8 samples | 16 | 32 | 64 | 128 | 256 |\n";
   for (const sarsa_update update : sarsa_updates)
@@ -91,7 +91,7 @@ WFPG_TEST_CASE("sarsa grid: the bias of what is known of a furnace", "[.][bias]"
       const std::vector<double> errors = print_furnace_errors(exec, update, rate, 1);
       if (update == sarsa_update::monte_carlo)
         CHECK(std::abs(errors.front()) < 20.0);
-      else  // from below, and the sooner forgotten the less
+      else  // from below
         CHECK(errors.front() < -20.0);
       if (rate > 0.0f) CHECK(std::abs(errors.back()) < 10.0);
     }
@@ -100,7 +100,7 @@ WFPG_TEST_CASE("sarsa grid: the bias of what is known of a furnace", "[.][bias]"
   CHECK(slow.back() > -20.0);
 }
 
-/// Of paths whose guide has learnt from others before: numbers are not used twice.
+/// Paths whose guide has learnt from other paths before, with other random numbers.
 template <class Exec>
 estimate guided_estimate(const Exec& exec, const sarsa_grid_options& options) {
   constexpr std::uint32_t before = 8, samples = 16;
@@ -110,7 +110,7 @@ estimate guided_estimate(const Exec& exec, const sarsa_grid_options& options) {
   return estimate_of({gathered.begin() + std::ptrdiff_t(before * options.max_paths), gathered.end()});
 }
 
-WFPG_TEST_CASE("sarsa grid: what paths gather keeps its mean, and variance is less", "[sarsa]") {
+WFPG_TEST_CASE("sarsa grid: guided paths keep the mean and lower the variance", "[sarsa]") {
   const Exec exec;
   sarsa_grid_options options = sarsa_options(2048);
   options.unguided_samples = 1000;
@@ -124,7 +124,7 @@ WFPG_TEST_CASE("sarsa grid: what paths gather keeps its mean, and variance is le
         options.update = update;
         options.sampler = sampler;
         options.guide_fraction = unless_zero(fraction);
-        options.floor = fraction > 0.0f ? 1.0f : 0.01f;  // weights are bounded, as a test of means needs
+        options.floor = fraction > 0.0f ? 1.0f : 0.01f;  // a test of means needs bounded weights
         const estimate found = guided_estimate(exec, options);
         CHECK(std::abs(found.mean - unguided.mean) < 4.0 * std::sqrt(found.variance + unguided.variance));
         if (sampler == sarsa_sampler::mixed_rejection && !(fraction > 0.0f))

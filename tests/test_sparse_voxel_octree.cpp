@@ -1,4 +1,4 @@
-// The octree against one built naively with std::map: nodes, links, levels, look-ups, cones.
+// The octree, compared with a naive one in a std::map: nodes, links, levels, look-ups, cones.
 #include "support/catch.hpp"
 #include "support/evaluate.hpp"
 #include "support/octree_nodes.hpp"
@@ -26,7 +26,7 @@ using wfpg::uvec3;
 using wfpg::vec3;
 using octree_view = wfpg::sparse_voxel_octree_view;
 
-/// The octree as it is defined: the distinct prefixes of the leaves' codes, numbered by level, then by code.
+/// The octree by definition: the distinct prefixes of the leaves' codes, ordered by level, then by code.
 struct naive_octree {
   std::uint32_t depth = 0;
   std::vector<std::map<morton_code, node_id>> levels;
@@ -47,7 +47,7 @@ struct naive_octree {
   node_id leaf(uvec3 voxel) const { return find(depth, wfpg::morton_encode(voxel)); }
 };
 
-/// Compares all of a record but its bounds; counts what differs.
+/// Counts the differences between a node and its record, except for bounds.
 int differences(const naive_octree& naive, std::uint32_t level, morton_code code, const node_record& r) {
   int wrong = 0;
   wrong += r.level != level;
@@ -68,7 +68,7 @@ int differences(const naive_octree& naive, std::uint32_t level, morton_code code
   return wrong + (r.coordinates != wfpg::morton_decode(code));
 }
 
-/// Whether a box is that of integer coordinates at a level, up to rounding.
+/// Whether a box has integer coordinates `at` of a level, up to rounding.
 bool is_box_of(const wfpg::bounds3& box, const wfpg::voxel_grid& grid, std::uint32_t level, uvec3 at) {
   const double size = double(grid.side) / (1u << level);
   const dvec3 lower = dvec3(grid.origin) + dvec3(at) * size;
@@ -79,7 +79,7 @@ bool is_box_of(const wfpg::bounds3& box, const wfpg::voxel_grid& grid, std::uint
 
 const wfpg::vec3 grid_origin(-3.0f, 10.0f, 0.5f);
 
-/// Fragments of given codes; the areas number them in their order here.
+/// Fragments of given codes. Their areas number them in order.
 template <class Exec>
 wfpg::voxel_fragments<Exec> make_fragments(const Exec& exec, const std::vector<morton_code>& codes,
                                            std::uint32_t resolution) {
@@ -93,7 +93,7 @@ wfpg::voxel_fragments<Exec> make_fragments(const Exec& exec, const std::vector<m
   return fragments;
 }
 
-/// Codes of n random voxels, some of them repeated, in clusters of a few voxels.
+/// Codes of n random voxels in small clusters. Some are repeated.
 std::vector<morton_code> random_codes(std::size_t n, std::uint32_t resolution, std::uint64_t seed) {
   random_numbers random(seed);
   std::vector<morton_code> codes;
@@ -157,7 +157,8 @@ WFPG_TEST_CASE("nodes and links equal a naive octree's", "[sparse_voxel_octree]"
     CHECK(tree.resolution() == c.resolution);
     CHECK(tree.node_count() == naive.count);
     const wfpg::sparse_voxel_octree_view view = tree.view();
-    std::size_t every_other = 0;  // nodes of the levels that descents stop at, the least 8 of the first table
+    std::size_t every_other =
+        0;  // nodes of the levels at which descents stop; at least the 8 of the first table
     for (std::uint32_t level = view.depth(); level >= 2; level -= 2)
       every_other += view.level_begin(level - 1) - view.level_begin(level - 2);
     CHECK(tree.bytes() <=
@@ -191,7 +192,7 @@ WFPG_TEST_CASE("the build sorts fragments by voxel and keeps their order inside"
   }
 }
 
-/// Points in and around a grid, among them corners of voxels and such as no voxel can hold.
+/// Points in and around a grid. They include corners of voxels, and points that no voxel can hold.
 std::vector<vec3> query_points(const wfpg::voxel_grid& grid, const std::vector<morton_code>& codes) {
   random_numbers random(9);
   std::vector<vec3> points;
@@ -221,8 +222,8 @@ struct find_leaves {
   }
 };
 
-/// Square distance, in voxels, from a point in grid units to the nearest centre of the leaves in the 27
-/// voxels around it; negative where there is none.
+/// Square distance from a point to the nearest centre of the leaves in the 27 voxels around it. Point in grid
+/// units, distance in voxels. Negative if there is no leaf.
 double nearest_square_distance(const naive_octree& naive, dvec3 g, std::uint32_t resolution) {
   double best = -1.0;
   for (int i = 0; i < 27; ++i) {
@@ -275,7 +276,7 @@ WFPG_TEST_CASE("points find their leaf, or the nearest of the 26 around", "[spar
   }
 }
 
-WFPG_TEST_CASE("every voxel's look-up agrees with the map on every level", "[sparse_voxel_octree]") {
+WFPG_TEST_CASE("look-ups of all voxels agree with the map on every level", "[sparse_voxel_octree]") {
   const Exec exec;
   struct dense {
     std::uint32_t resolution, leaves;
@@ -302,7 +303,7 @@ WFPG_TEST_CASE("every voxel's look-up agrees with the map on every level", "[spa
   }
 }
 
-/// How far the face of a node of a level is from a cone's base, in ratio.
+/// The ratio between the face of a node of a level and a cone's base.
 double mismatch(const octree_view& view, std::uint32_t level, double area) {
   const double size = double(view.grid().side) / (1u << level);
   return std::abs(std::log(size * size / area));
@@ -390,7 +391,7 @@ WFPG_TEST_CASE("an empty scene is a valid octree", "[sparse_voxel_octree]") {
   }
 }
 
-TEST_CASE("fragments of a resolution that no octree has are refused", "[sparse_voxel_octree]") {
+TEST_CASE("fragments of an invalid resolution are refused", "[sparse_voxel_octree]") {
   const one_policy exec;
   for (const std::uint32_t resolution : {0u, 3u, 8192u, 16384u}) {
     wfpg::voxel_fragments<one_policy> fragments;

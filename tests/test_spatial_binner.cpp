@@ -1,4 +1,4 @@
-// The spatial binner against a literal transcription of Algorithm 2.
+// The spatial binner, compared with a literal transcription of Algorithm 2.
 #include "support/catch.hpp"
 #include "support/evaluate.hpp"
 #include "support/octree_nodes.hpp"
@@ -34,7 +34,7 @@ struct read_rays {
   WFPG_HD ray_to_bin operator()(std::size_t i) const { return rays[i]; }
 };
 
-/// What a view says of a bin.
+/// A bin as a view reports it.
 struct bin_record {
   node_id node;
   std::uint32_t orientation, begin, size;
@@ -115,7 +115,7 @@ void check_bins(const Exec& exec, wfpg::spatial_binner<Exec>& binner, const octr
   CHECK(wrong == 0);
 }
 
-/// Rays on a unit sphere around the origin, more of them near the pole; some inactive, some far outside.
+/// Rays on a unit sphere around the origin, denser near the pole. Some are inactive, some far outside.
 std::vector<ray_to_bin> random_rays(std::size_t n, bool oriented, std::uint64_t seed) {
   random_numbers random(seed);
   std::vector<ray_to_bin> rays;
@@ -143,7 +143,7 @@ struct sphere_tree {
       : fragments(voxelized(exec, sphere_mesh(40), resolution)), tree(exec, fragments) {}
 };
 
-WFPG_TEST_CASE("bins are those of Algorithm 2", "[spatial_binner]") {
+WFPG_TEST_CASE("bins equal those of Algorithm 2", "[spatial_binner]") {
   const sphere_tree<Exec> scene(32);
   for (const bool oriented : {false, true}) {
     const std::vector<ray_to_bin> rays = random_rays(4000, oriented, oriented ? 1 : 2);
@@ -158,7 +158,7 @@ WFPG_TEST_CASE("bins are those of Algorithm 2", "[spatial_binner]") {
   }
 }
 
-WFPG_TEST_CASE("a least level below the leaves makes a bin of every leaf", "[spatial_binner]") {
+WFPG_TEST_CASE("a least level below the leaves makes every leaf a bin", "[spatial_binner]") {
   const sphere_tree<Exec> scene(16);
   const std::vector<ray_to_bin> rays = random_rays(1500, false, 3);
   for (const std::uint32_t min_level : {4u, 5u, 12u, 13u, 0xffffffffu}) {
@@ -189,7 +189,7 @@ WFPG_TEST_CASE("the leaf level takes part in marking", "[spatial_binner]") {
   CHECK(host[1].size == 64);
 }
 
-WFPG_TEST_CASE("a leaf of thousands of rays is a bin, and one of a few less is not", "[spatial_binner]") {
+WFPG_TEST_CASE("thresholds of thousands of rays decide exactly which leaf is a bin", "[spatial_binner]") {
   const sphere_tree<Exec> scene(16);
   const octree_view tree = scene.tree.view();
   const std::vector<node_record> nodes = nodes_of(scene.exec, tree);
@@ -203,7 +203,7 @@ WFPG_TEST_CASE("a leaf of thousands of rays is a bin, and one of a few less is n
   }
 }
 
-WFPG_TEST_CASE("rays without a bin", "[spatial_binner]") {
+WFPG_TEST_CASE("rays without a bin are counted, and buffers are reused correctly", "[spatial_binner]") {
   const sphere_tree<Exec> scene(16);
   const octree_view tree = scene.tree.view();
   wfpg::spatial_binner<Exec> binner(scene.exec, tree, {3, 4}, 100);
@@ -218,11 +218,10 @@ WFPG_TEST_CASE("rays without a bin", "[spatial_binner]") {
       {{surface, any, true}, {far, any, true}, {far, any, false}, {inside, any, true}, {odd, any, true}},
       {3, 4});
   CHECK(wfpg::read_element(scene.exec, binner.unbinned()) == 3);
-  check_bins(scene.exec, binner, tree, {{surface, any, true}},
-             {3, 4});  // nothing is left of the calls before
+  check_bins(scene.exec, binner, tree, {{surface, any, true}}, {3, 4});  // nothing is left of earlier calls
 }
 
-WFPG_TEST_CASE("an octree without nodes bins nothing", "[spatial_binner]") {
+WFPG_TEST_CASE("an octree without nodes has no bins", "[spatial_binner]") {
   const Exec exec;
   const std::vector<ray_to_bin> rays = random_rays(100, true, 4);
   for (const std::uint32_t resolution : {1u, 64u}) {
@@ -236,7 +235,7 @@ WFPG_TEST_CASE("an octree without nodes bins nothing", "[spatial_binner]") {
   check_bins(exec, binner, scene.tree.view(), rays, {3, 16});
 }
 
-WFPG_TEST_CASE("arguments that cannot be right are refused", "[spatial_binner]") {
+WFPG_TEST_CASE("invalid arguments are refused", "[spatial_binner]") {
   const sphere_tree<Exec> scene(16);
   const octree_view tree = scene.tree.view();
   using binner_type = wfpg::spatial_binner<Exec>;
@@ -249,7 +248,7 @@ WFPG_TEST_CASE("arguments that cannot be right are refused", "[spatial_binner]")
   check_bins(scene.exec, binner, tree, random_rays(100, false, 6), {3, 8});
 }
 
-TEST_CASE("the dominant axis of a direction", "[spatial_binner]") {
+TEST_CASE("dominant_axis() returns the axis nearest to a direction", "[spatial_binner]") {
   for (std::uint32_t axis = 0; axis < 6; ++axis) {
     vec3 n(0.1f, -0.2f, 0.3f);
     n[static_cast<int>(axis / 2)] = axis % 2 ? -0.9f : 0.9f;

@@ -1,4 +1,4 @@
-// The statistics kit: correct samplers pass, each of several broken ones is caught and named.
+// The statistics kit: correct samplers pass, and each broken one is found and named.
 #include "support/catch.hpp"
 #include "support/fields.hpp"
 #include "support/reports.hpp"
@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t samples = 200000;
 constexpr std::uint32_t cells = 16;
 
-/// A field's sampler in the open, so that each of its steps can be broken.
+/// A field's sampler with open steps, so that tests can break each of them.
 class open_sampler {
  public:
   open_sampler()
@@ -30,7 +30,7 @@ class open_sampler {
   const directional_field& field() const { return field_; }
   float pdf(vec3 d) const { return field_.pdf(d); }
 
-  /// Directions of `where(uv)` for points uv of the field's square, with the densities that `pdf` gives them.
+  /// Directions of `where(uv)` for points uv of the field's square, with densities of `pdf`.
   std::vector<drawn_direction> draw(const std::function<vec2(vec2)>& where,
                                     const std::function<float(vec3)>& pdf, std::size_t n = samples) const {
     std::vector<drawn_direction> drawn;
@@ -51,7 +51,7 @@ vec2 as_it_is(vec2 uv) {
   return uv;
 }
 
-/// Tiles of a renderer whose noise is normal, by sums of twelve uniform numbers.
+/// Tiles of a renderer with normal noise, from sums of twelve uniform numbers.
 tile_means rendered(double mean, std::uint64_t seed, int renderings = 24) {
   random_numbers random(seed);
   tile_means result(256);
@@ -78,7 +78,7 @@ TEST_CASE("statistics: a correct sampler passes", "[statistics]") {
   CHECK(report.frequencies.degrees > 100.0);
 }
 
-TEST_CASE("statistics: correct samplers are rejected as rarely as they are to be", "[statistics]") {
+TEST_CASE("statistics: correct samplers are rejected with the chosen significance", "[statistics]") {
   int rejected = 0;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     std::vector<drawn_direction> drawn;
@@ -88,15 +88,15 @@ TEST_CASE("statistics: correct samplers are rejected as rarely as they are to be
     options.significance = 0.05;
     rejected += !check_sampler(drawn, each([](vec3) { return 0.25f / wfpg::pi; }), options);
   }
-  CHECK(rejected <= 12);  // 5 expected, 0.1% of 13 or more
+  CHECK(rejected <= 12);  // 5 expected; 13 or more with 0.1%
 }
 
-TEST_CASE("statistics: a density wrong by 2% is caught", "[statistics]") {
+TEST_CASE("statistics: a density wrong by 2% is found", "[statistics]") {
   const open_sampler sampler;
   const auto larger = [&](vec3 d) { return 1.02f * sampler.pdf(d); };
   check_names(check_sampler(sampler.draw(as_it_is, larger), each(larger)), {"energy", "integrates to 1.02"});
 
-  // Of the right sum: 2% too much above, 2% too little below.
+  // The sum is right: 2% too much above, too little below.
   double above = 0.0;
   for (std::uint32_t i = 0; i < cells * cells; ++i) {
     const vec2 uv = (vec2(float(i % cells), float(i / cells)) + 0.5f) / float(cells);
@@ -111,26 +111,26 @@ TEST_CASE("statistics: a density wrong by 2% is caught", "[statistics]") {
               {"frequencies", "observed", "expected", "p = "});
 }
 
-TEST_CASE("statistics: a cell shifted by one is caught", "[statistics]") {
+TEST_CASE("statistics: a cell shifted by one is found", "[statistics]") {
   const open_sampler sampler;
   const auto shifted = [](vec2 uv) { return vec2(glm::fract(uv.x + 1.0f / float(cells)), uv.y); };
   const auto pdf = [&](vec3 d) { return sampler.pdf(d); };
   check_names(check_sampler(sampler.draw(shifted, pdf), each(pdf)),
               {"frequencies", "observed", "expected", "z in [", "phi in [", "p = "});
 
-  // And where the density reported is that of the cell that was drawn.
+  // With the density of the sampled cell too.
   std::vector<drawn_direction> drawn = sampler.draw(as_it_is, pdf);
   const std::vector<drawn_direction> moved = sampler.draw(shifted, pdf);
   for (std::size_t i = 0; i < drawn.size(); ++i) drawn[i].direction = moved[i].direction;
   check_names(check_sampler(drawn, each(pdf)), {"query", "was drawn with density", "pdf() says"});
 }
 
-TEST_CASE("statistics: a missing Jacobian is caught", "[statistics]") {
+TEST_CASE("statistics: a missing Jacobian is found", "[statistics]") {
   const open_sampler sampler;
   const auto of_the_square = [&](vec3 d) { return 4.0f * wfpg::pi * sampler.pdf(d); };
   check_names(check_sampler(sampler.draw(as_it_is, of_the_square), each(of_the_square)), {"energy", "12.57"});
 
-  // Even in theta and phi, where the density is said to be even over the sphere: its sum is right.
+  // Uniform in theta and phi, but reported as uniform over the sphere. The density integrates to one.
   std::vector<drawn_direction> drawn;
   const auto even = [](vec3) { return 0.25f / wfpg::pi; };
   for (std::uint32_t i = 0; i < samples; ++i) {
@@ -142,7 +142,7 @@ TEST_CASE("statistics: a missing Jacobian is caught", "[statistics]") {
   check_names(check_sampler(drawn, each(even)), {"frequencies", "observed", "expected"});
 }
 
-TEST_CASE("statistics: a row that is never reached is caught", "[statistics]") {
+TEST_CASE("statistics: a row that is never reached is found", "[statistics]") {
   const open_sampler sampler;
   const auto without_row = [](vec2 uv) {
     const bool missed = std::uint32_t(uv.y * float(cells)) == 7;
@@ -153,18 +153,18 @@ TEST_CASE("statistics: a row that is never reached is caught", "[statistics]") {
               {"frequencies", "observed", "expected"});
 }
 
-TEST_CASE("statistics: tiles of two renderers", "[statistics]") {
+TEST_CASE("statistics: tiles of two renderers differ if one is biased", "[statistics]") {
   const tile_means truth = rendered(1.0, 1);
   INFO(check_unbiased(truth, rendered(1.0, 2)).message);
   CHECK(check_unbiased(truth, rendered(1.0, 2)));
   check_names(check_unbiased(truth, rendered(1.2, 3)), {"standard errors apart"});
-  // Too little for a single tile, whose mean has a standard error of 2%.
+  // Too small for a single tile, whose mean has a standard error of 2%.
   check_names(check_unbiased(truth, rendered(1.02, 4)), {"tiles together"});
-  // And too little for their squares.
+  // Too small for the sum of squares too.
   check_names(check_unbiased(truth, rendered(1.007, 4)), {"the picture", "standard errors apart"});
 }
 
-TEST_CASE("statistics: a tile that is not finite is no unbiased one", "[statistics]") {
+TEST_CASE("statistics: a tile that is not finite is biased", "[statistics]") {
   const tile_means truth = rendered(1.0, 1);
   for (const double bad : {std::nan(""), double(INFINITY), -double(INFINITY)}) {
     tile_means tested = rendered(1.0, 2);
@@ -175,7 +175,8 @@ TEST_CASE("statistics: a tile that is not finite is no unbiased one", "[statisti
   }
 }
 
-TEST_CASE("statistics: what failed by chance is made anew, and what is biased fails again", "[statistics]") {
+TEST_CASE("statistics: a failed check is repeated with more samples, and a bias fails again",
+          "[statistics]") {
   std::vector<int> factors;
   const auto truth = [&](int factor) {
     factors.push_back(factor);
@@ -189,14 +190,14 @@ TEST_CASE("statistics: what failed by chance is made anew, and what is biased fa
   CHECK(check_renderers_unbiased(truth, tested(1.2, 1.0)));
   CHECK(factors == std::vector<int>{1, 1, 4});
   check_names(check_renderers_unbiased(truth, tested(1.2, 1.2)), {"standard errors apart"});
-  // Too little for the first check, and not for the second.
+  // Too small for the first check, but not for the second.
   CHECK(check_renderers_unbiased(truth, tested(1.004, 1.004)));
   check_names(check_renderers_unbiased(truth, tested(1.2, 1.004)), {"the picture"});
   check_names(check_renderers_unbiased(truth, tested(1.2, 1.01)), {"tiles together"});
 }
 
-TEST_CASE("statistics: a bias in a picture's mean is found as often as it is to be", "[statistics]") {
-  // The bias that found_bias() says, of either sign, is found in 99% of pairs; one is found in 0.4% without.
+TEST_CASE("statistics: a bias in a picture's mean is found with the stated probability", "[statistics]") {
+  // A bias of found_bias(), of either sign, is found in 99% of pairs. Without bias 0.4% are reported.
   int found = 0, by_chance = 0;
   constexpr int pairs = 200;
   for (int i = 0; i < pairs; ++i) {
@@ -208,11 +209,11 @@ TEST_CASE("statistics: a bias in a picture's mean is found as often as it is to 
     const double difference = std::fabs(tested.picture_mean() - truth.picture_mean());
     by_chance += difference >= picture_threshold * picture_error(truth, tested);
   }
-  CHECK(found >= 194);    // 198 expected, 1% of fewer
-  CHECK(by_chance <= 4);  // 0.8 expected, 0.2% of more
+  CHECK(found >= 194);    // 198 expected; fewer with 1%
+  CHECK(by_chance <= 4);  // 0.8 expected; more with 0.2%
 }
 
-TEST_CASE("statistics: a picture whose indirect light is scaled", "[statistics]") {
+TEST_CASE("statistics: tile means with scaled indirect light are right", "[statistics]") {
   tile_means tested(2), expected(2);
   for (const double x : {1.0, 1.5, 3.0}) {
     tested.add({1.0 + x, 2.0 + 4.0 * x});

@@ -1,4 +1,4 @@
-// check_bsdf: what is right passes, and each of many faults, alone, is found and named.
+// check_bsdf: correct BSDFs pass, and each of many faults is found and named.
 #include "support/policies.hpp"
 #include "support/reports.hpp"
 #include "support/scenes.hpp"
@@ -25,7 +25,7 @@ const vec3 tilted = glm::normalize(vec3(0.3f, -0.5f, 0.7f));
 
 bsdf_check_options options_for(bsdf_kind kind, vec3 normal) {
   bsdf_check_options options{normal};
-  // Their values are constant, or symmetric, with the cosine.
+  // Their values are constant or symmetric, including the cosine.
   options.reciprocal = kind != bsdf_kind::glossy && kind != bsdf_kind::glass;
   return options;
 }
@@ -49,7 +49,7 @@ enum class bsdf_fault {
   leaks,
 };
 
-/// A Lambert BSDF of albedo 0.8 about `normal`, but for a fault.
+/// A Lambert BSDF of albedo 0.8 about `normal`, with one fault.
 struct faulty_bsdf {
   bsdf_fault fault = bsdf_fault::none;
   vec3 normal{0.0f, 0.0f, 1.0f};
@@ -97,7 +97,7 @@ struct faulty_bsdf {
   }
 };
 
-/// A mirror, but for a fault.
+/// A mirror with one fault.
 struct faulty_mirror {
   float probability = 1.0f, value = 0.0f;
   WFPG_HD bool is_delta() const { return true; }
@@ -111,7 +111,7 @@ struct faulty_mirror {
 
 enum class part_fault { none, share, alpha, sum, sample_pdf, sample_shape };
 
-/// 0.3 of its samples are uniform above, the rest of a cosine.
+/// 0.3 of its samples are uniform above the surface, the rest have a cosine density.
 struct parted_bsdf {
   part_fault fault = part_fault::none;
   WFPG_HD bool is_delta() const { return false; }
@@ -177,8 +177,8 @@ struct coated_bsdf {
   }
 };
 
-/// A rough boundary that scatters evenly to both sides, as Lambert's law has it: half reflected, half
-/// transmitted, radiance times the square of the ratio of indices. The index is `ior` below.
+/// A rough boundary that scatters to both sides by Lambert's law. It reflects half, and transmits half with
+/// radiance times the square of the ratio of indices. The index below is `ior`.
 struct diffuse_boundary {
   float ior = 1.5f;
   bool scales_radiance = true;
@@ -243,14 +243,14 @@ TEST_CASE("check_bsdf: each fault is found and named", "[testing]") {
   check_passes(check_faulty<one_policy>(bsdf_fault::not_reciprocal, false));
 }
 
-TEST_CASE("check_bsdf: faults of delta BSDFs", "[testing]") {
+TEST_CASE("check_bsdf: faults of delta BSDFs are found and named", "[testing]") {
   const one_policy exec;
   check_passes(check_bsdf(exec, faulty_mirror{}));
   check_names(check_bsdf(exec, faulty_mirror{1.2f}), {"gives pdf 1.2, expected a probability"});
   check_names(check_bsdf(exec, faulty_mirror{1.0f, 0.3f}), {"eval() is 0.3", "expected 0 of a delta BSDF"});
 }
 
-TEST_CASE("check_bsdf: faults of parts", "[testing]") {
+TEST_CASE("check_bsdf: faults of parts are found and named", "[testing]") {
   const one_policy exec;
   const auto check = [&](part_fault fault) { return check_bsdf(exec, parted_bsdf{fault}); };
   check_passes(check(part_fault::none));
@@ -270,7 +270,7 @@ TEST_CASE("check_bsdf: faults of delta lobes beside others", "[testing]") {
   check_names(check(coat_fault::silent), {"pdf() disagrees with sample()"});
 }
 
-TEST_CASE("check_bsdf: radiance through a boundary of indices", "[testing]") {
+TEST_CASE("check_bsdf: radiance scales with the index at a boundary", "[testing]") {
   const one_policy exec;
   bsdf_check_options options;
   options.ior = 1.5f;
@@ -285,7 +285,7 @@ TEST_CASE("check_bsdf: radiance through a boundary of indices", "[testing]") {
   check_names(check_bsdf(exec, diffuse_boundary{1.5f, false}, options), {"not reciprocal"});
 }
 
-TEST_CASE("check_bsdf: correct samplers are rejected no more often than said", "[testing]") {
+TEST_CASE("check_bsdf: correct samplers are rejected no more often than stated", "[testing]") {
   const one_policy exec;
   bsdf_check_options options{tilted};
   options.samples = 4096;
@@ -294,7 +294,7 @@ TEST_CASE("check_bsdf: correct samplers are rejected no more often than said", "
   int rejected = 0;
   for (options.seed = 1; options.seed <= 60; ++options.seed)
     rejected += !check_bsdf(exec, test_bsdf{bsdf_kind::glossy, tilted}, options);
-  CHECK(rejected <= 9);  // 3 expected at most; 9 is 3.5 standard deviations above
+  CHECK(rejected <= 9);  // at most 3 expected; 9 is 3.5 standard deviations above
 }
 
 TEST_CASE("check_bsdf: options out of range are refused", "[testing]") {
@@ -312,7 +312,7 @@ TEST_CASE("check_bsdf: options out of range are refused", "[testing]") {
   CHECK_THROWS_AS(check([](auto& o) { o.albedo_limit = -1.0f; }), std::invalid_argument);
 }
 
-TEST_CASE("sphere bins: integrals, sizes and words", "[testing]") {
+TEST_CASE("sphere bins: integrals, sizes and descriptions are right", "[testing]") {
   const wfpg::frame axes(tilted);
   const auto each = [](const auto& f) {
     return [f](const std::vector<vec3>& directions) {

@@ -1,5 +1,4 @@
-// check_ray_caster and check_surface: what is right passes, and each of many faults, alone, is found and
-// named.
+// check_ray_caster and check_surface: correct ones pass, and each of many faults is found and named.
 #include "support/policies.hpp"
 #include "support/reports.hpp"
 #include "support/scenes.hpp"
@@ -28,7 +27,7 @@ constexpr float nan_value = std::numeric_limits<float>::quiet_NaN();
 
 enum class caster_fault { none, doubled, nan, infinite, negative, ignores_t_max, dark, zero };
 
-/// The box's caster, but for a fault.
+/// The box's caster with one fault.
 struct faulty_caster {
   caster_fault fault = caster_fault::none;
   bool open_top = false;
@@ -47,7 +46,7 @@ struct faulty_caster {
   }
 };
 
-/// Answers for the ray `shift` places further on, and leaves the last `unwritten` hits alone.
+/// Returns the hit of the ray `shift` places later, and leaves the last `unwritten` hits unwritten.
 struct shifted_caster {
   std::size_t shift = 0, unwritten = 0;
   template <class Exec>
@@ -92,7 +91,7 @@ WFPG_TEST_CASE("check_ray_caster: correct casters pass", "[testing]") {
   check_passes(check_ray_caster(exec, wfpg::svo_ray_caster(tree.view()), tree.view(), marching));
 }
 
-WFPG_TEST_CASE("check_surfaces: a wave's correct surfaces pass, and the first wrong one is named",
+WFPG_TEST_CASE("check_surfaces: correct surfaces of a wave pass, and the first wrong one is named",
                "[testing]") {
   const Exec exec;
   const auto tree = box_octree(exec, 32);
@@ -152,7 +151,7 @@ TEST_CASE("check_ray_caster: each fault is found and named", "[testing]") {
               {"batches answer for other rays", "as ray", "expected the same"});
   check_names(check_ray_caster(exec, shifted_caster{0, 3}, unit_box), {"distance nan, or none was written"});
 
-  // A caster that is right, of another scene.
+  // A correct caster of another scene.
   const auto half = box_octree(exec, 32, 0.5f);
   check_names(check_ray_caster(exec, box_caster{}, half.view()),
               {"in no leaf of the octree", "voxel of side"});

@@ -1,4 +1,4 @@
-// The two normals of a voxel: packing, k-means against a naive one, thin walls.
+// The two normals of a voxel: packing, k-means compared with a naive one, thin walls.
 #include "support/cached_scene.hpp"
 #include "support/catch.hpp"
 #include "support/octree_nodes.hpp"
@@ -25,7 +25,7 @@ double degrees_between(dvec3 a, dvec3 b) {
   return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)) * 57.29577951308232;
 }
 
-TEST_CASE("voxel normals in 16 bits are within 1 degree and the axes exact", "[exitance_cache]") {
+TEST_CASE("voxel normals in 16 bits are within 1 degree, and axes exact", "[exitance_cache]") {
   const auto round_trip = [](vec3 n) {
     return wfpg::detail::unpack_voxel_normal(wfpg::detail::pack_voxel_normal(n));
   };
@@ -50,7 +50,7 @@ struct weighted {
   double area;
 };
 
-/// Two clusters: around the first normal and its opposite, by area, at most 8 rounds.
+/// Two clusters around the first normal and its opposite, weighted by area, in at most 8 rounds.
 dvec3 naive_normal(const std::vector<weighted>& members) {
   dvec3 means[2] = {members[0].normal, -members[0].normal};
   double areas[2];
@@ -68,7 +68,7 @@ dvec3 naive_normal(const std::vector<weighted>& members) {
   return areas[1] > areas[0] ? means[1] : means[0];
 }
 
-WFPG_TEST_CASE("normals of voxels are those of a naive k-means", "[exitance_cache]") {
+WFPG_TEST_CASE("normals of voxels equal those of a naive k-means", "[exitance_cache]") {
   random_numbers random(2);
   std::vector<voxel_normal> list;
   for (std::uint32_t v = 0; v < 300; ++v) {
@@ -111,14 +111,14 @@ WFPG_TEST_CASE("normals of voxels are those of a naive k-means", "[exitance_cach
   CHECK(worst < 1.01);
 }
 
-WFPG_TEST_CASE("a thin wall's voxel has one normal for either side", "[exitance_cache]") {
+WFPG_TEST_CASE("a thin wall's voxel has one normal for each side", "[exitance_cache]") {
   const vec3 z(0, 0, 1), x(1, 0, 0);
   const cached_scene<Exec> scene(fragments_in_grid<Exec>({
-                                     {{0, 0, 0}, z, 3.0f},  // both sides, the first is larger
+                                     {{0, 0, 0}, z, 3.0f},  // both sides; the first is larger
                                      {{0, 0, 0}, -z, 2.0f},
                                      {{2, 0, 0}, z, 2.0f},  // the second is larger
                                      {{2, 0, 0}, -z, 3.0f},
-                                     {{4, 0, 0}, -z, 1.0f},  // alike: the first
+                                     {{4, 0, 0}, -z, 1.0f},  // equal: the first
                                      {{4, 0, 0}, z, 1.0f},
                                      {{6, 0, 0}, z, 0.0f},  // touched, without area
                                      {{0, 2, 0}, x, 1.0f},  // alone

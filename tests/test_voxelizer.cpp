@@ -1,5 +1,5 @@
-// The voxelizer against brute-force overlap of triangles and voxels in double precision, areas, bad input,
-// and fragments from surface samples.
+// The voxelizer, compared with brute-force overlap of triangles and voxels in double precision. Areas, bad
+// input, and fragments from surface samples.
 #include "support/brute_force_voxels.hpp"
 #include "support/catch.hpp"
 #include "support/policies.hpp"
@@ -66,14 +66,14 @@ struct scenario {
   std::string name;
   test_mesh mesh;
   std::uint32_t resolution;
-  bool area_once = true;  ///< no triangle lies in a face between voxels, where its area counts on both sides
+  bool area_once = true;  ///< false if a triangle lies between voxels, where its area counts twice
   std::unique_ptr<const fragments> first{};
   touched_voxels truth{};
 };
 
-/// Triangles whose corners are corners of voxels, or which lie in a plane between voxels.
+/// Triangles with corners at voxels' corners, or in a plane between voxels.
 test_mesh snapped_triangles() {
-  // The box makes voxels of 17/256 from -8/256: whole steps are their faces, half steps their centres.
+  // The box makes voxels of 17/256 from -8/256. Whole steps are their faces, half steps their centres.
   random_numbers random(21);
   test_mesh mesh = box_mesh();
   const auto coordinate = [&] { return (8.5f * static_cast<float>(1 + random.below(31)) - 8.0f) / 256.0f; };
@@ -153,7 +153,7 @@ const std::vector<scenario>& scenarios() {
   return all;
 }
 
-WFPG_TEST_CASE("no touched voxel is missed, none is extra", "[voxelizer]") {
+WFPG_TEST_CASE("no touched voxel is missed, and none is extra", "[voxelizer]") {
   const Exec exec;
   for (const scenario& s : scenarios()) {
     const fragments f = fragments_of(exec, s.mesh, s.resolution);
@@ -186,11 +186,11 @@ TEST_CASE("areas inside the voxels add up to the triangles'", "[voxelizer]") {
     INFO(s.name << ", resolution " << s.resolution);
     CHECK(f.area() == Approx(s.mesh.area()).epsilon(1.0e-3));
     CHECK(*std::min_element(f.areas.begin(), f.areas.end()) >= 0.0f);
-    CHECK(*std::max_element(f.areas.begin(), f.areas.end()) <= 1.42f * voxel * voxel);  // of a cube: sqrt(2)
+    CHECK(*std::max_element(f.areas.begin(), f.areas.end()) <= 1.42f * voxel * voxel);  // sqrt(2) for a cube
   }
 }
 
-WFPG_TEST_CASE("a wall's fragments have its normal and their share of its area", "[voxelizer]") {
+WFPG_TEST_CASE("a wall's fragments have its normal and their part of its area", "[voxelizer]") {
   const Exec exec;
   test_mesh mesh;
   mesh.add_quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
@@ -240,7 +240,7 @@ test_mesh good_triangles() {
   return mixed_triangles(20, 0.1f, 0.5f, 41);
 }
 
-WFPG_TEST_CASE("bad triangles are left out and counted", "[voxelizer]") {
+WFPG_TEST_CASE("bad triangles are skipped and counted", "[voxelizer]") {
   const Exec exec;
   const test_mesh good = good_triangles();
   test_mesh mesh = good;
@@ -286,7 +286,7 @@ WFPG_TEST_CASE("meshes without triangles give no fragments", "[voxelizer]") {
   CHECK(voxelized(exec, mesh, 64).report.degenerate == 1);
 }
 
-WFPG_TEST_CASE("extreme scales voxelize", "[voxelizer]") {
+WFPG_TEST_CASE("meshes of extreme scales voxelize", "[voxelizer]") {
   const Exec exec;
   for (const float scale : {1.0e-9f, 1.0e-4f, 1.0e4f, 9.0e14f}) {
     test_mesh mesh = sphere_mesh(6);
@@ -299,7 +299,7 @@ WFPG_TEST_CASE("extreme scales voxelize", "[voxelizer]") {
   }
 }
 
-WFPG_TEST_CASE("resolutions that are no power of two are refused", "[voxelizer]") {
+WFPG_TEST_CASE("resolutions that are not powers of two are refused", "[voxelizer]") {
   const Exec exec;
   const test_mesh mesh = good_triangles();
   const wfpg::buffer<surface_fragment, Exec> samples(exec, std::vector<surface_fragment>(1));
@@ -321,8 +321,8 @@ fragments from_samples(const Exec& exec, const std::vector<surface_fragment>& sa
   return fragments(exec, wfpg::fragments_from_samples(exec, const_view(device), resolution, bounds));
 }
 
-/// The same direction, packed by a policy and by the host: to the bit, or to the next step of the packing
-/// where a GPU rounds otherwise.
+/// Whether directions packed on a policy and on the host agree. They agree bit for bit, or to one step of the
+/// packing if a GPU rounds differently.
 bool same_packed(std::uint32_t a, std::uint32_t b) {
   if (same_operations_same_bits) return a == b;
   return glm::distance(wfpg::unpack_direction(a), wfpg::unpack_direction(b)) < 2.0e-4f;
@@ -360,7 +360,7 @@ WFPG_TEST_CASE("samples become fragments of the voxels that hold them", "[voxeli
   }
 }
 
-WFPG_TEST_CASE("bad samples are left out and counted", "[voxelizer]") {
+WFPG_TEST_CASE("bad samples are skipped and counted", "[voxelizer]") {
   const Exec exec;
   const vec3 up(0, 0, 1), inside(0.5f);
   const std::vector<surface_fragment> samples = {
@@ -389,7 +389,7 @@ WFPG_TEST_CASE("bad samples are left out and counted", "[voxelizer]") {
   CHECK(from_samples(exec, {samples[1], samples[6]}, 8).codes.empty());
 }
 
-WFPG_TEST_CASE("one point is one voxel", "[voxelizer]") {
+WFPG_TEST_CASE("a single point gives a single voxel", "[voxelizer]") {
   const Exec exec;
   for (const vec3 p : {vec3(0.0f), vec3(3, 4, 5), vec3(-1.0e10f, 2, 0), vec3(1.0e-20f), vec3(1.0e15f)})
     for (const std::uint32_t resolution : {1u, 64u, 1024u}) {
@@ -399,7 +399,7 @@ WFPG_TEST_CASE("one point is one voxel", "[voxelizer]") {
       uvec3 voxel(0u);
       REQUIRE(f.grid.voxel_of(p, voxel));
       const glm::ivec3 away = glm::abs(glm::ivec3(wfpg::morton_decode(f.codes[0])) - glm::ivec3(voxel));
-      // A point between two voxels, such as the middle of the grid, may be rounded to either.
+      // A point between two voxels, such as the centre of the grid, may round to either.
       CHECK(glm::max(away.x, glm::max(away.y, away.z)) <= (same_operations_same_bits ? 0 : 1));
     }
 }

@@ -1,4 +1,4 @@
-// Which colour stands for which value, and the bar that says so.
+// Maps values to colours, and draws the bar that explains them.
 #pragma once
 
 #include "app/image_io.hpp"
@@ -13,20 +13,20 @@ using render::vec3;
 /// Heat colours over a range of values, by value or by its logarithm.
 class colour_scale {
  public:
-  /// The five powers of ten that end at or above `greatest`; at 1 where that is not positive and finite.
+  /// Five powers of ten. The last is at or above `greatest`, or 1 if that is not positive and finite.
   static colour_scale logarithmic(double greatest, std::string unit);
-  /// From 0 to `last` > 0, each whole number named.
+  /// From 0 to `last` > 0, with a label at each whole number.
   static colour_scale whole_numbers(int last, std::string unit);
 
   vec3 colour(double value) const;
   /// A picture's luminances as colours.
   render::image colours(const render::image& values) const;
 
-  /// Of what is shown.
+  /// The unit of the values.
   const std::string& unit() const { return unit_; }
-  /// Evenly spaced along the bar, both ends among them.
+  /// Labels evenly spaced along the bar, including both ends.
   const std::vector<std::string>& labels() const { return labels_; }
-  /// Least to greatest, from left to right.
+  /// The bar from least to greatest, from left to right.
   render::image bar() const;
 
  private:

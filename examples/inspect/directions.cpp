@@ -1,4 +1,4 @@
-// Cells to directions and back.
+// Maps cells to directions and back.
 #include "directions.hpp"
 
 #include "scene/frame.hpp"

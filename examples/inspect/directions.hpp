@@ -1,5 +1,5 @@
-// Cells of equal solid angle, as fields have them, and what they hold as pictures: the square of the
-// octahedral map is the cells as they are; latitude and longitude are the world's, as environments have them.
+// Cells of equal solid angle, as in fields, and pictures of their values. The octahedral square shows the
+// cells as they are. Latitude and longitude are the world's, as in environments.
 #pragma once
 
 #include "app/image_io.hpp"
@@ -14,30 +14,30 @@ namespace inspect {
 using render::vec2;
 using render::vec3;
 
-/// F x F cells over the sphere, or over the hemisphere above a normal; trivially copyable.
+/// F x F cells over the sphere, or over the hemisphere above a normal. Trivially copyable.
 class direction_grid {
  public:
   /// Over the sphere. Precondition: resolution > 0.
   explicit direction_grid(int resolution) : cells_(grid(resolution)) {}
   /// Over the hemisphere above a unit normal.
   direction_grid(int resolution, vec3 normal) : cells_(grid(resolution), normal) {}
-  /// That of a field.
+  /// The grid of a field.
   explicit direction_grid(const wfpg::directional_field& field) : cells_(field) {}
 
   int resolution() const { return static_cast<int>(cells_.grid().resolution()); }
   std::size_t size() const { return std::size_t(resolution()) * std::size_t(resolution()); }
-  /// Of a cell, steradians.
+  /// Solid angle of a cell, steradians.
   float solid_angle() const { return cells_.cell_solid_angle(); }
 
-  /// The same cells, each cut into `times` x `times`.
+  /// These cells, each divided into `times` x `times`.
   direction_grid refined(int times) const {
     const int fine = resolution() * times;
     return cells_.hemisphere() ? direction_grid(fine, cells_.normal()) : direction_grid(fine);
   }
 
-  /// The unit direction at `inside`, [0, 1]², of a cell; cells are row by row.
+  /// The unit direction at `inside`, [0, 1]², of a cell. Cells are row by row.
   vec3 direction(std::size_t cell, vec2 inside) const;
-  /// The cell that a unit direction lies in; none below the hemisphere.
+  /// The cell of a unit direction. Empty below the hemisphere.
   std::optional<std::size_t> cell_of(vec3 direction) const;
 
  private:
@@ -45,15 +45,15 @@ class direction_grid {
     return {nullptr, static_cast<std::uint32_t>(resolution)};
   }
 
-  wfpg::directional_field cells_;  // maps directions; its distribution is not read
+  wfpg::directional_field cells_;  // maps directions; its distribution is unused
 };
 
-/// The unit direction at a place of [0, 1]² of a picture of all directions: its middle is -z, its right +x,
+/// The unit direction at a place in [0, 1]² of a picture of all directions. Its centre is -z, its right +x,
 /// its upper edge +y.
 vec3 direction_at(vec2 place);
 
-/// What cells hold, a value each in `cells`, F x F, as a picture of `height` rows, twice as wide, of all
-/// directions; `outside` where there is no cell.
+/// Draws values of F x F cells as a picture of all directions. It has `height` rows and is twice as wide.
+/// Directions without a cell get `outside`.
 render::image latitude_longitude(const direction_grid& grid, const render::image& cells, int height,
                                  vec3 outside);
 

@@ -21,7 +21,7 @@ map times(map a, const map& b) {
   return a;
 }
 
-/// Per steradian: integrates to 1.
+/// Values per steradian, scaled to integrate to 1.
 map density(map values, const direction_grid& cells) {
   values = normalised(std::move(values));
   for (double& value : values) value /= double(cells.solid_angle());
@@ -41,7 +41,7 @@ direction_grid cells_of(const pixel_sampler& sampler, const finding_options& opt
   return {options.field_resolution, wfpg::facing_normal(at)};
 }
 
-/// The cosine that the field has in it.
+/// The cosine that the field includes.
 double cosine_of_field(const pixel_sampler& sampler, vec3 direction) {
   const wfpg::directional_field& field = sampler.field();
   return field.hemisphere() ? std::max(glm::dot(direction, field.normal()), 0.0f) : 1.0f;
@@ -51,7 +51,7 @@ double eval(const pixel_sampler& sampler, vec3 direction) {
   return sampler.surface().bsdf.eval(sampler.surface().outgoing, direction);
 }
 
-/// The light of both halves as luminances on the fine cells. Their product is a square without bias.
+/// Both halves of the light as luminances on the fine cells. Their product is an unbiased square.
 struct light_maps {
   map first, second, mean;
 
@@ -59,7 +59,7 @@ struct light_maps {
       : first(luminances(light.first)), second(luminances(light.second)), mean(luminances(light.mean())) {}
 };
 
-/// Of a sampler of density `pdf(fine cell, direction)`.
+/// Relative standard deviation of a sampler with density `pdf(fine cell, direction)`.
 template <class Pdf>
 double relative_deviation(const pixel_sampler& sampler, const direction_grid& fine, const light_maps& light,
                           const Pdf& pdf) {
@@ -91,7 +91,7 @@ predicted_noise predict(const pixel_sampler& sampler, const findings& found, con
   return noise;
 }
 
-/// What a sample brings in each fine cell over the mean of all samples.
+/// A sample's contribution in each fine cell over the mean of all samples.
 map contributions_of(const pixel_sampler& sampler, const findings& found, const light_maps& light,
                      const map& bsdf_values) {
   map values = times(cell_means(found.fine_cells, fine_points,
@@ -108,7 +108,7 @@ map contributions_of(const pixel_sampler& sampler, const findings& found, const 
   return values;
 }
 
-/// How far the field is from the reference, and what of that may be the reference's own noise.
+/// Compares the field with the reference, and estimates what the reference's own noise adds.
 void compare(const map& cosines, const light_maps& light, int refinement, findings& found) {
   const auto half = [&](const map& of) { return normalised(coarsened(times(cosines, of), refinement)); };
   const map mean = half(light.mean);

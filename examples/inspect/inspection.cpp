@@ -1,4 +1,4 @@
-// Learns, measures, writes.
+// Learns, measures, and writes the results.
 #include "inspection.hpp"
 
 #include "app/option_names.hpp"
@@ -31,7 +31,7 @@ void check(const inspection& asked) {
   if (!asked.vdb.empty()) require_vdb();
 }
 
-/// Makes the page's folder, and checks that files can be written before there is anything to write.
+/// Makes the page's folder, and checks early that files can be written.
 void check_files(const inspection& asked) {
   render::prepare_folder("--output", asked.output);
   render::check_outputs({{"--output", (asked.output / "index.html").string(), ""},
@@ -39,7 +39,7 @@ void check_files(const inspection& asked) {
                          {"--vdb", asked.vdb, ""}});
 }
 
-/// A bar for one stage.
+/// A progress bar for one stage.
 class shown_progress {
  public:
   ~shown_progress() { bar_.finish(); }
@@ -64,7 +64,7 @@ float exposure_of(const render::image& picture) {
   return *middle > 0.0f && std::isfinite(*middle) ? 0.25f / *middle : 1.0f;
 }
 
-/// The picture so far, and what the octree is at its pixels.
+/// Adds the picture so far, and the octree at its pixels.
 void show_octree(const learnt_scene& learnt, const inspection& asked, const picture_folder& folder,
                  page& shown) {
   const render::image& rendered = learnt.rendering().picture;
@@ -98,7 +98,7 @@ void show_octree(const learnt_scene& learnt, const inspection& asked, const pict
               normal_picture(learnt))}});
 }
 
-/// Two figures a map of values, all on one scale.
+/// Two figures for each map of values, all on one scale.
 struct map_section {
   const picture_folder& folder;
   section& shown;
@@ -175,7 +175,7 @@ void show_directions(const learnt_scene& learnt, const inspection& asked, std::u
                         {densities(found, folder), contributions(found, folder), light(found, folder)});
 }
 
-/// Why there is less to see than of most pixels; empty where there is not.
+/// Why a pixel shows less than most. Empty if it does not.
 std::string note_of(const learnt_scene& learnt, std::uint32_t pixel) {
   switch (kind_of(learnt, pixel)) {
     case pixel_kind::nothing:

@@ -1,5 +1,5 @@
-// An inspection from a scene to a folder of pictures, numbers and a page, after the thesis's tool
-// (section 5.3).
+// An inspection from a scene to a folder of pictures, numbers and a page. After the thesis's tool (section
+// 5.3).
 #pragma once
 
 #include "app/render.hpp"
@@ -20,10 +20,10 @@ struct inspection {
   std::string vdb;  ///< OpenVDB file of the octree; empty: none
 };
 
-/// Writes pictures, numbers.json and index.html into the output folder, which is made. Stages and warnings go
-/// to `log`, progress to stderr. Throws std::invalid_argument for what cannot be right, such as a pixel
-/// outside of the picture or a folder that cannot be written to, before anything is rendered; what
-/// render::render throws; std::runtime_error where a file cannot be written.
+/// Writes pictures, numbers.json and index.html into the output folder, which it makes. Stages and warnings
+/// go to `log`, progress to stderr. Throws std::invalid_argument before it renders, if the pixel is outside
+/// of the picture or the folder cannot be written to. Throws what render::render throws, and
+/// std::runtime_error if a file cannot be written.
 void run(const render::scene& scene, const inspection& asked, std::ostream& log);
 
 }  // namespace inspect

@@ -1,4 +1,4 @@
-// The renderer's parts, put together for one look at its guider.
+// Combines the renderer's parts to look into its guider.
 #include "learnt_scene.hpp"
 
 #include "app/option_names.hpp"
@@ -40,13 +40,13 @@ struct hit_surfaces {
   wfpg::surface<render::bsdf> operator()(std::uint32_t pixel) const { return hits[pixel].surface; }
 };
 
-/// For waves that draw nothing.
+/// For waves that sample nothing.
 struct no_random {
   vec2 operator()(std::uint32_t, std::uint32_t) const { return vec2(0.0f); }
 };
 
-/// Looks from a point of a surface along the directions of cells, as a camera along those of pixels. Where
-/// surfaces only reflect, directions below them meet their own near side, as a field's cones do.
+/// A camera at a point on a surface that looks along the directions of cells. If the surface only reflects,
+/// directions below it hit its near side, as a field's cones do.
 struct cell_camera {
   const render::hit_surface& at;
   direction_grid cells;
@@ -104,7 +104,7 @@ struct learnt_scene::state {
     std::visit([&](auto& g) { render::report_guider(g, tracer.segments(), rendering.report); }, guider);
   }
 
-  /// Fields as the next sample's camera rays find them.
+  /// Looks up the fields that the next sample's camera rays will have.
   void look() {
     const std::size_t pixels = rendering.picture.pixels.size();
     hits = hits_of(exec, geometry.view(), accelerated.caster(), camera, pixels);
@@ -128,7 +128,7 @@ struct learnt_scene::state {
         wfpg::field_store<exec_policy>::bytes_a_slot(g.options().kept.resolution, options.kept.learn);
   }
 
-  /// The guider's own are those of Algorithm 2, too.
+  /// The guider's bins are those of Algorithm 2, too.
   void find_bins(const transient_guider& g) {
     wfpg::spatial_binner<exec_policy> binner(exec, g.guide().octree().view(), g.options().binning,
                                              hits.size());
@@ -143,7 +143,7 @@ struct learnt_scene::state {
   render::render_options options;
   render::device_scene<exec_policy> geometry;
   render::light_distribution<exec_policy> lights;
-  render::light_distribution<exec_policy> lights_by_power;  // for who does not learn to choose
+  render::light_distribution<exec_policy> lights_by_power;  // for guides that do not learn choices
   render::embree_scene accelerated;
   render::pinhole camera;
   guider_type guider;

@@ -1,5 +1,5 @@
-// A scene with a guider that has learnt from some samples, and what its camera sees: the point that each
-// pixel's middle hits, its field, its bin. Light that arrives at such a point is traced by brute force.
+// A scene with a guider that has learnt from some samples, and the camera's view. Each pixel's centre has a
+// hit point, a field and a bin. Incident light at such a point is traced by brute force.
 #pragma once
 
 #include "app/render.hpp"
@@ -16,16 +16,16 @@
 
 namespace inspect {
 
-/// Of a pixel without a bin.
+/// Bin of a pixel without one.
 inline constexpr std::uint32_t no_bin = 0xffffffffu;
 
-/// Bytes that guiding takes.
+/// Memory of the guide.
 struct guide_bytes {
   std::size_t field = 0;  ///< of one field
   std::size_t persistent = 0, transient = 0;
 };
 
-/// Two pictures of the same light from independent samples, a pixel for each cell; W/(m² sr).
+/// Two pictures of the same light from independent samples, a pixel per cell. W/(m² sr).
 struct incident_light {
   render::image first, second;
 
@@ -33,36 +33,36 @@ struct incident_light {
   render::image mean() const;
 };
 
-/// Throws std::invalid_argument where the method is not guided by fields, the device is not the CPU, or paths
-/// end where the camera looks.
+/// Throws std::invalid_argument if the method has no fields, the device is not the CPU, or paths end at the
+/// camera's hits.
 void require_fields(const render::render_options& options);
 
 /// Runs on exec::tbb, with Embree.
 class learnt_scene {
  public:
-  /// Renders as options say, which are complete. Throws as render::render and require_fields() do. The
-  /// scene outlives this.
+  /// Renders with `options`, which must be complete. Throws as render::render and require_fields() do. The
+  /// scene must outlive this.
   learnt_scene(const render::scene& scene, const render::render_options& options,
                const render::progress_callback& progress);
   learnt_scene(const learnt_scene&) = delete;
   learnt_scene& operator=(const learnt_scene&) = delete;
   ~learnt_scene();
 
-  /// What was rendered meanwhile, and what it cost.
+  /// The picture rendered so far, and its cost.
   const render::render_result& rendering() const;
-  /// A pixel: what its middle hits; not active where that is nothing.
+  /// Hits of the pixels' centres. Not active if a ray hits nothing.
   const std::vector<render::hit_surface>& hits() const;
-  /// The fields that the next sample has for these hits; a ray is a pixel.
+  /// The fields of these hits in the next sample. A ray is a pixel.
   const wfpg::guide_view& fields() const;
-  /// A pixel: node · orientations + orientation of its field's bin, or no_bin.
+  /// Per pixel: node · orientations + orientation of its field's bin, or no_bin.
   const std::vector<std::uint32_t>& bins() const;
-  /// What light leaves each node of the octree.
+  /// The radiance that leaves each node of the octree.
   wfpg::exitance_cache_view cache() const;
   guide_bytes bytes() const;
 
-  /// Light that arrives at a hit from each of the grid's cells, by path tracing without a guide: `samples` >
-  /// 1 paths a cell, half of them for either picture. Paths have as many segments as those of the rendering
-  /// have left there.
+  /// Incident light at a hit from each of the grid's cells, by path tracing without a guide. Each cell gets
+  /// `samples` > 1 paths, half of them for each picture. Paths have as many segments as the rendering's have
+  /// left there.
   incident_light arriving(const render::hit_surface& at, const direction_grid& cells, int samples,
                           const render::progress_callback& progress) const;
 

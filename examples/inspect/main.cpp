@@ -1,4 +1,4 @@
-// wfpg-inspect: why a pixel is noisy. Exit code 0; 2 with a message on failure.
+// wfpg-inspect: shows why a pixel is noisy. Exit code 0, or 2 with a message on failure.
 #include "program.hpp"
 
 #include <iostream>

@@ -1,4 +1,4 @@
-// Numbers and what they are called.
+// Numbers and their names.
 #include "numbers.hpp"
 
 #include <wfpg/bins/spatial_binner.hpp>
@@ -16,7 +16,7 @@ json vector_of(vec3 v) {
   return {v.x, v.y, v.z};
 }
 
-/// Members of the JSON, and their names for a person.
+/// Members of the JSON, and their names for people.
 constexpr std::pair<const char*, const char*> names[] = {
     {"scene", "scene"},
     {"method", "method"},
@@ -102,13 +102,13 @@ json numbers_of_place(const learnt_scene& learnt, std::uint32_t pixel) {
 }
 
 json numbers_of(const findings& found, const pixel_sampler& sampler) {
-  const wfpg::mixture_fractions shares = sampler.shares();
+  const wfpg::mixture_fractions fractions = sampler.fractions();
   const bool has_field = !sampler.field().empty();
   json numbers{{"field_resolution", has_field ? json(found.cells.resolution()) : json()},
                {"mixture_fraction", sampler.fraction()},
-               {"guide_share", shares.guide},
-               {"glossy_share", shares.glossy},
-               {"smooth_share", shares.smooth},
+               {"guide_share", fractions.guide},
+               {"glossy_share", fractions.glossy},
+               {"smooth_share", fractions.smooth},
                {"correlation", found.correlation},
                {"kl_divergence", found.divergence},
                {"kl_divergence_noise", found.divergence_noise},

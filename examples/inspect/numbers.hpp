@@ -1,4 +1,4 @@
-// What was measured, as JSON and as a table.
+// Measured numbers, as JSON and as a table.
 #pragma once
 
 #include "findings.hpp"
@@ -10,23 +10,23 @@ namespace inspect {
 
 using json = nlohmann::ordered_json;
 
-/// How far a pixel could be looked into.
+/// How much of a pixel could be measured.
 enum class pixel_kind {
   nothing,  ///< hits nothing
   delta,    ///< hits a BSDF that is sampled alone
-  surface   ///< all else
+  surface   ///< all others
 };
 
-/// Of the rendering, the pixel's point and its bin; names that no pixel of the kind has are left out. What is
-/// not finite is null.
+/// Numbers of the rendering, the pixel's point and its bin. Leaves out names that do not apply to the kind of
+/// pixel. Null if a number is not finite.
 json numbers_of_place(const learnt_scene& learnt, std::uint32_t pixel);
-/// Of the directions there; bins and bytes are numbers_of_place's.
+/// Numbers of the directions there. numbers_of_place() has those of bins and memory.
 json numbers_of(const findings& found, const pixel_sampler& sampler);
 
-/// What the pixel hits.
+/// The kind of the pixel's hit.
 pixel_kind kind_of(const learnt_scene& learnt, std::uint32_t pixel);
 
-/// The same in words, of an object with the members of both.
+/// The numbers in words. The object may have the members of both functions.
 std::vector<number_row> rows_of(const json& numbers);
 
 }  // namespace inspect

@@ -1,4 +1,4 @@
-// Look-ups of voxels, pixel by pixel.
+// Looks up voxels pixel by pixel.
 #include "octree_pictures.hpp"
 
 #include <wfpg/bins/spatial_binner.hpp>
@@ -19,7 +19,7 @@ render::image picture_of(const learnt_scene& learnt) {
   return render::make_image(rendered.width, rendered.height);
 }
 
-/// f(pixel, leaf, surface) for each pixel that hits a voxel.
+/// Calls f(pixel, leaf, surface) for each pixel that hits a voxel.
 template <class F>
 void for_each_voxel(const learnt_scene& learnt, const F& f) {
   const wfpg::sparse_voxel_octree_view tree = learnt.cache().octree();
@@ -31,7 +31,7 @@ void for_each_voxel(const learnt_scene& learnt, const F& f) {
   }
 }
 
-/// Any of three channels between dark and light, by a number's bits.
+/// A random colour from a number's bits, between dark and light in each channel.
 vec3 random_colour(std::uint32_t key) {
   const std::uint64_t bits = wfpg::hash(0, key);
   const auto channel = [bits](int shift) { return 0.05f + float(bits >> shift & 0xffu) / 300.0f; };

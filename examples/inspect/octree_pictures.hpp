@@ -1,4 +1,4 @@
-// The octree as the camera sees it: each pixel coloured by the voxel that its middle hits.
+// The octree as the camera sees it: the voxel at each pixel's centre gives the colour.
 #pragma once
 
 #include "colour_scale.hpp"
@@ -8,9 +8,9 @@
 
 namespace inspect {
 
-/// Luminance that the cache has of the voxels' sides, W/(m² sr).
+/// The cached luminance of the voxels' sides, W/(m² sr).
 struct exitance_pictures {
-  render::image facing;   ///< of the side toward the camera; negative where it has no data or nothing is hit
+  render::image facing;   ///< of the side toward the camera; negative without data or without a hit
   render::image turned;   ///< of the other side
   double greatest = 0.0;  ///< of both
 };
@@ -19,14 +19,14 @@ exitance_pictures exitance_of(const learnt_scene& learnt);
 /// Heat colours; blue where there is no data.
 render::image coloured_exitance(const render::image& exitance, const colour_scale& scale);
 
-/// The voxels' normals toward the camera, [-1, 1] as [0, 1]; black where nothing is hit.
+/// The voxels' normals toward the camera, [-1, 1] as [0, 1]. Black where nothing is hit.
 render::image normal_picture(const learnt_scene& learnt);
-/// A colour a bin, at random; black where there is none.
+/// A random colour for each bin. Black where there is none.
 render::image bin_picture(const learnt_scene& learnt);
-/// The level of the bins' nodes, by a scale that ends at the leaves'; blue where there is no bin.
+/// The level of the bins' nodes, on a scale that ends at the leaves' level. Blue where there is no bin.
 render::image level_picture(const learnt_scene& learnt, const colour_scale& scale);
 
-/// A picture with a frame around a pixel; coordinates from the upper left.
+/// A picture with a frame around a pixel. Coordinates are from the upper left.
 render::image marked(render::image picture, int x, int y);
 
 }  // namespace inspect

@@ -1,4 +1,4 @@
-// Leaves into grids.
+// Writes leaves into grids.
 #include "octree_vdb.hpp"
 
 #include <wfpg/bins/spatial_binner.hpp>

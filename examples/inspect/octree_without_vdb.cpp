@@ -1,4 +1,4 @@
-// What stands in for octree_vdb.cpp where there is no OpenVDB.
+// Replaces octree_vdb.cpp in builds without OpenVDB.
 #include "octree_vdb.hpp"
 
 #include <stdexcept>

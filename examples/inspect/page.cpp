@@ -1,4 +1,4 @@
-// HTML by hand; pictures are in it as base64 (RFC 4648).
+// Writes HTML with pictures as base64 (RFC 4648).
 #include "page.hpp"
 
 #include "app/output_files.hpp"

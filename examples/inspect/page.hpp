@@ -1,4 +1,4 @@
-// A page of pictures and numbers, in one HTML file that needs nothing else.
+// A page of pictures and numbers, in one self-contained HTML file.
 #pragma once
 
 #include "colour_scale.hpp"
@@ -12,7 +12,7 @@
 
 namespace inspect {
 
-/// A picture's PNG in the page's folder, and what is below it.
+/// A picture's PNG in the page's folder, and its caption.
 struct figure {
   std::string file, caption;
   bool starts_row = false;
@@ -25,7 +25,7 @@ struct section {
   std::vector<figure> figures;
 };
 
-/// What the numbers say: a name, and a value in words.
+/// A number's name, and its value in words.
 using number_row = std::pair<std::string, std::string>;
 
 struct page {
@@ -35,17 +35,17 @@ struct page {
   std::vector<section> sections;
 };
 
-/// Writes pictures into a folder that is there.
+/// Writes pictures into an existing folder.
 class picture_folder {
  public:
   explicit picture_folder(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   const std::filesystem::path& path() const { return folder_; }
-  /// NAME.png, small pictures enlarged. Throws std::runtime_error.
+  /// Writes NAME.png. Small pictures are enlarged. Throws std::runtime_error.
   figure write(const std::string& name, const std::string& caption, const render::image& picture,
                float exposure = 1.0f) const;
-  /// Cells as NAME-octahedral and NAME-latlong, .png by the scale and .exr as they are. Throws
-  /// std::runtime_error.
+  /// Writes cells as NAME-octahedral and NAME-latlong: .png with the scale's colours, and .exr with the
+  /// values. Throws std::runtime_error.
   std::vector<figure> write_cells(const std::string& name, const std::string& caption,
                                   const direction_grid& grid, const render::image& cells,
                                   const colour_scale& scale) const;
@@ -56,10 +56,10 @@ class picture_folder {
   std::filesystem::path folder_;
 };
 
-/// A value a cell as a grey picture.
+/// Values per cell as a grey picture.
 render::image grey_cells(const std::vector<double>& values);
 
-/// Writes index.html with all pictures in it, and the scales' bars. Throws std::runtime_error.
+/// Writes index.html with all pictures and the scales' bars in it. Throws std::runtime_error.
 void write_page(const picture_folder& folder, const page& shown);
 
 }  // namespace inspect

@@ -20,7 +20,7 @@ pixel_sampler::pixel_sampler(const wfpg::guide_view& view, std::uint32_t ray, co
   if (draws_product_) product_ = view.product(ray, surface_, words_);
 }
 
-wfpg::mixture_fractions pixel_sampler::shares() const {
+wfpg::mixture_fractions pixel_sampler::fractions() const {
   if (plain_.field.empty()) return {};
   return draws_product_ ? product_.fractions_of(surface_) : plain_.fractions_of(surface_);
 }
@@ -58,21 +58,21 @@ sample_counts count_samples(const pixel_sampler& sampler, const direction_grid& 
   sample_counts counts;
   counts.density.assign(grid.size(), 0.0);
   std::vector<vec3> directions, hints;
-  const double share = 1.0 / samples;
+  const double fraction_of_one = 1.0 / samples;
   for (int i = 0; i < samples; ++i) {
     const auto path = static_cast<std::uint32_t>(i);
     const wfpg::sampled_direction drawn = sampler.sample(random(path, 0).x, random(path, 1));
     if (!(drawn.pdf > 0.0f)) {
-      counts.failed += share;
+      counts.failed += fraction_of_one;
       continue;
     }
     std::vector<vec3>& kept = i % 2 == 0 ? directions : hints;
     if (kept.size() < tested) kept.push_back(drawn.direction);
-    if (glm::dot(drawn.direction, up) < 0.0f) counts.below += share;
+    if (glm::dot(drawn.direction, up) < 0.0f) counts.below += fraction_of_one;
     if (const auto cell = grid.cell_of(drawn.direction))
-      counts.density[*cell] += share / double(grid.solid_angle());
+      counts.density[*cell] += fraction_of_one / double(grid.solid_angle());
     else
-      counts.outside += share;
+      counts.outside += fraction_of_one;
   }
   counts.p = chi_square_p(sampler, directions, hints);
   return counts;

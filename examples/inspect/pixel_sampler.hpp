@@ -1,4 +1,5 @@
-// What draws a pixel's next directions: its field, or the product of that with its BSDF, and its BSDF.
+// The sampler of a pixel's next directions. It mixes its field, or the product of field and BSDF, with its
+// BSDF.
 #pragma once
 
 #include "directions.hpp"
@@ -13,7 +14,7 @@ namespace inspect {
 
 using render_surface = wfpg::surface<render::bsdf>;
 
-/// The mixture of one ray, as the renderer draws from it. The view's guider stays as it is meanwhile.
+/// The mixture of one ray, as the renderer samples it. The view's guider must not change meanwhile.
 class pixel_sampler {
  public:
   pixel_sampler(const wfpg::guide_view& view, std::uint32_t ray, const render_surface& at);
@@ -21,18 +22,18 @@ class pixel_sampler {
   pixel_sampler& operator=(const pixel_sampler&) = delete;
 
   const render_surface& surface() const { return surface_; }
-  /// Empty where the ray has none.
+  /// Empty if the ray has none.
   const wfpg::directional_field& field() const { return plain_.field; }
-  /// Of guided samples, before glossy parts take theirs; 0 without a field.
+  /// The fraction of guided samples, without that of glossy parts. 0 without a field.
   float fraction() const { return plain_.fraction; }
-  /// What of the samples each part draws.
-  wfpg::mixture_fractions shares() const;
+  /// The fractions of samples that each part gets.
+  wfpg::mixture_fractions fractions() const;
 
-  /// As basic_guide_mixture has them.
+  /// Samples and evaluates as basic_guide_mixture does.
   wfpg::sampled_direction sample(float u_technique, vec2 u) const;
   float pdf(vec3 direction) const;
 
-  /// The BSDF's value at a direction over the cosine that the field has in it already.
+  /// The BSDF's value at a direction, without the cosine that the field includes.
   double beside_field(vec3 direction) const;
 
  private:
@@ -43,21 +44,20 @@ class pixel_sampler {
   std::uint32_t words_[wfpg::max_product_words];
 };
 
-/// Samples of a mixture, counted.
+/// Counted samples of a mixture.
 struct sample_counts {
-  std::vector<double> density;  ///< a cell: samples over their number and the cell's solid angle
-  double below = 0.0;           ///< share of directions below the shading normal's horizon
-  double outside = 0.0;         ///< share of directions that lie in no cell
-  double failed = 0.0;          ///< share of samples without a direction
-  double p =
-      1.0;  ///< of a chi² test against pdf(): small where they disagree; of another half of the samples
+  std::vector<double> density;  ///< per cell: samples over their number and the cell's solid angle
+  double below = 0.0;           ///< fraction of directions below the shading normal's horizon
+  double outside = 0.0;         ///< fraction of directions in no cell
+  double failed = 0.0;          ///< fraction of samples without a direction
+  double p = 1.0;  ///< p of a chi² test against pdf(), with separate samples; small if they disagree
 };
 
-/// Counts `samples` > 0 samples in cells. The same every time.
+/// Counts `samples` > 0 samples in cells. Deterministic.
 sample_counts count_samples(const pixel_sampler& sampler, const direction_grid& grid, int samples);
 
-/// The p of a chi² test of directions against a sampler's pdf(), in shape: samples may fail. `hints`: others
-/// of the same source, that tell where it is dense.
+/// The p of a chi² test of directions against a sampler's pdf(). Only the shape counts, since samples may
+/// fail. `hints` are other directions of the same source that tell where it is dense.
 double chi_square_p(const pixel_sampler& sampler, const std::vector<vec3>& directions,
                     const std::vector<vec3>& hints);
 

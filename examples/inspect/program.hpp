@@ -5,8 +5,8 @@
 
 namespace inspect {
 
-/// Reads the command line, inspects, and names the page on `out`; what it is at, warnings and errors go to
-/// `log`. 0, or 2 on failure.
+/// Reads the command line, inspects, and prints the page's name on `out`. Progress, warnings and errors go to
+/// `log`. Returns 0, or 2 on failure.
 int run_program(int argc, const char* const* argv, std::ostream& out, std::ostream& log);
 
 }  // namespace inspect

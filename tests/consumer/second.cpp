@@ -1,4 +1,4 @@
-// A second translation unit with everything in it: nothing is defined twice.
+// A second translation unit with the same headers. Tests that nothing is defined twice.
 #include <wfpg/exec/omp.hpp>
 #include <wfpg/exec/tbb.hpp>
 #include <wfpg/wfpg.hpp>

@@ -1,5 +1,5 @@
-// The guider on the CUDA policy: its integer stages against the serial policy's, its directions but for
-// rounding, and one seed twice.
+// The guider on the CUDA policy. Its integer stages equal the serial policy's, and its directions agree
+// except for rounding. One seed gives the same bits twice.
 #include "cuda/walls.hpp"
 #include "support/guiding.hpp"
 #include "support/scenes.hpp"
@@ -80,7 +80,7 @@ void compare(field_lifetime lifetime, std::uint32_t product_resolution) {
     closely += close(device.directions[i], host.directions[i]);
     guided_rays += device.directions[i].technique == wfpg::sampling_technique::guide;
   }
-  // A cone that lands on a voxel's border reads another voxel where rounding differs.
+  // A cone at a voxel's border reads another voxel if rounding differs.
   CHECK(closely >= rays / 100 * 99);
   CHECK(guided_rays > rays / 4);
   const guided again = guide<cuda_policy>(lifetime, product_resolution);
@@ -90,12 +90,12 @@ void compare(field_lifetime lifetime, std::uint32_t product_resolution) {
 
 }  // namespace
 
-TEST_CASE("the guider on the CUDA policy does what it does on the serial one", "[cuda]") {
+TEST_CASE("the guider on the CUDA policy agrees with the serial one", "[cuda]") {
   for (const auto lifetime : {field_lifetime::kept, field_lifetime::transient})
     for (const std::uint32_t product_resolution : {0u, 8u}) compare(lifetime, product_resolution);
 }
 
-TEST_CASE("the CUDA policy tells of errors", "[cuda]") {
+TEST_CASE("the CUDA policy reports errors", "[cuda]") {
   const cuda_policy exec;
   CHECK_THROWS_AS((wfpg::buffer<char, cuda_policy>(exec, std::size_t(1) << 50)), wfpg::out_of_memory);
   const wfpg::buffer<std::uint32_t, cuda_policy> works_after(exec, std::vector<std::uint32_t>{1, 2, 3});
@@ -105,8 +105,7 @@ TEST_CASE("the CUDA policy tells of errors", "[cuda]") {
   CHECK(refused.find("is 1048576, expected at most ") != std::string::npos);
 }
 
-TEST_CASE("fields of 128 x 128 fit the shared memory of small devices, and twice that of large ones",
-          "[cuda]") {
+TEST_CASE("a field of 128 x 128 fits 99 KiB of shared memory, and two fit 228 KiB", "[cuda]") {
   constexpr std::size_t small = 99 * 1024, large = 228 * 1024;  // of compute capabilities 8.6 and 9.0
   constexpr std::size_t reserved = 1024;                        // of each block
   const std::size_t bytes = sizeof(std::uint32_t) * wfpg::grid_distribution::words(128) + 16 +

@@ -1,5 +1,5 @@
-// OptiX's caster against every triangle tried in double precision, and what it does with meshes and rays that
-// are not sound.
+// OptiX's caster, compared with a test of every triangle in double precision. Also meshes and rays that are
+// invalid.
 #include "casters/optix_caster.hpp"
 #include "support/random_meshes.hpp"
 
@@ -23,7 +23,7 @@ namespace {
 constexpr float environment = 0.25f;
 constexpr float quiet_nan = std::numeric_limits<float>::quiet_NaN();
 constexpr float infinity = std::numeric_limits<float>::infinity();
-// Nearer than this to a triangle's edge, or to an end of its ray, a hit may be found or not.
+// Within this distance of a triangle's edge, or of a ray's end, OptiX may hit or miss.
 constexpr double slack = 1.0e-4;
 
 struct answers {
@@ -32,7 +32,7 @@ struct answers {
   std::vector<wfpg::ray_hit> distances;
 };
 
-/// A mesh in OptiX's hands, and its device memory gone.
+/// Builds OptiX's scene of a mesh, and frees the mesh's device memory.
 render::optix_scene build(const cuda_policy& exec, const test_mesh& mesh) {
   const device_mesh<cuda_policy> on_device(exec, mesh);
   return {exec, on_device.view().positions, on_device.view().triangles, environment};
@@ -56,7 +56,7 @@ struct crossing {
   double to_end(const wfpg::ray& r) const { return std::fmin(distance - r.t_min, r.t_max - distance); }
 };
 
-/// Where a ray's line crosses a triangle's plane (Möller and Trumbore 1997); nothing where it is parallel.
+/// Where a ray's line crosses a triangle's plane (Möller and Trumbore 1997). Empty if they are parallel.
 std::optional<crossing> cross(const wfpg::ray& ray, const test_mesh& mesh, std::size_t triangle) {
   const dvec3 a(mesh.vertex(triangle, 0)), direction(ray.direction), from_a = dvec3(ray.origin) - a;
   const dvec3 ab = dvec3(mesh.vertex(triangle, 1)) - a, ac = dvec3(mesh.vertex(triangle, 2)) - a;
@@ -67,7 +67,7 @@ std::optional<crossing> cross(const wfpg::ray& ray, const test_mesh& mesh, std::
                   glm::dot(direction, q) / determinant};
 }
 
-/// The distance of the nearest triangle that any arithmetic has to find.
+/// The distance of the nearest triangle that OptiX must hit despite rounding.
 std::optional<double> nearest(const wfpg::ray& ray, const test_mesh& mesh) {
   std::optional<double> result;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -78,7 +78,7 @@ std::optional<double> nearest(const wfpg::ray& ray, const test_mesh& mesh) {
   return result;
 }
 
-/// What is wrong with the answers to a ray; null where nothing is.
+/// What is wrong with the answers to a ray. Null if nothing is.
 const char* mistake(const wfpg::ray& ray, const test_mesh& mesh, render::triangle_hit hit,
                     std::uint32_t hidden, wfpg::ray_hit at) {
   const auto expected = nearest(ray, mesh);
@@ -99,7 +99,7 @@ const char* mistake(const wfpg::ray& ray, const test_mesh& mesh, render::triangl
   return expected && *expected < found->distance - slack ? "a nearer triangle was missed" : nullptr;
 }
 
-/// The number of hits; fails at the first mistake.
+/// The number of hits. Fails at the first mistake.
 std::size_t count_hits(const test_mesh& mesh, const std::vector<wfpg::ray>& rays, const answers& found) {
   std::size_t hits = 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -121,7 +121,7 @@ std::vector<wfpg::ray> random_rays(std::size_t n, std::uint64_t seed) {
   return rays;
 }
 
-/// Triangles of the unit cube whose edges are about `size` long.
+/// Triangles in the unit cube with edges of about length `size`.
 test_mesh even_triangles(std::size_t n, float size, std::uint64_t seed) {
   random_numbers random(seed);
   test_mesh mesh;
@@ -143,7 +143,7 @@ bool all_miss(const answers& found) {
 
 }  // namespace
 
-TEST_CASE("OptiX finds the triangles that trying each of them finds", "[optix]") {
+TEST_CASE("OptiX finds the same triangles as a test of each of them", "[optix]") {
   const cuda_policy exec;
   const test_mesh mesh = even_triangles(2000, 0.1f, 1);
   const std::vector<wfpg::ray> rays = random_rays(20000, 2);
@@ -154,7 +154,7 @@ TEST_CASE("OptiX finds the triangles that trying each of them finds", "[optix]")
   CHECK(hits < 15000);
 }
 
-TEST_CASE("OptiX honours a ray's ends", "[optix]") {
+TEST_CASE("OptiX respects a ray's ends", "[optix]") {
   const cuda_policy exec;
   const test_mesh mesh = even_triangles(2000, 0.1f, 3);
   std::vector<wfpg::ray> rays = random_rays(20000, 4);
@@ -197,7 +197,7 @@ TEST_CASE("OptiX hits both sides of a triangle", "[optix]") {
   }
 }
 
-TEST_CASE("every ray misses where OptiX has no triangles", "[optix]") {
+TEST_CASE("all rays miss in a scene without triangles", "[optix]") {
   const cuda_policy exec;
   const std::vector<wfpg::ray> rays = random_rays(1000, 6);
   test_mesh without_triangles, without_positions;
@@ -209,7 +209,7 @@ TEST_CASE("every ray misses where OptiX has no triangles", "[optix]") {
   CHECK(nothing.hits.empty());
 }
 
-TEST_CASE("OptiX passes triangles that are degenerate, not finite or not there", "[optix]") {
+TEST_CASE("OptiX skips triangles that are degenerate, not finite or missing", "[optix]") {
   const cuda_policy exec;
   const test_mesh sound = even_triangles(500, 0.1f, 7);
   const std::vector<wfpg::ray> rays = random_rays(20000, 8);
@@ -234,7 +234,7 @@ TEST_CASE("OptiX passes triangles that are degenerate, not finite or not there",
   CHECK(all_miss(ask(exec, build(exec, mesh).caster(), rays)));
 }
 
-TEST_CASE("OptiX's launches may all be in flight at once", "[optix]") {
+TEST_CASE("several OptiX launches may be in flight at once", "[optix]") {
   cudaStream_t streams[2];
   for (cudaStream_t& stream : streams)
     REQUIRE(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking) == cudaSuccess);

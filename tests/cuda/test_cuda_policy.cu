@@ -1,5 +1,5 @@
-// The CUDA policy alone: samples in graphs and on streams of their host's, what they allocate, and errors
-// that the host left behind.
+// The CUDA policy: samples in graphs and on a host's streams, allocations, and errors that the host left
+// behind.
 #include "cuda/walls.hpp"
 #include "support/guiding.hpp"
 #include "support/scenes.hpp"
@@ -79,7 +79,7 @@ class renderer {
     guider_.end_sample();
   }
 
-  /// Of the last sample. Waits for it.
+  /// Directions of the last sample. Waits for them.
   std::vector<wfpg::sampled_direction> directions() const {
     std::vector<wfpg::sampled_direction> all;
     for (const auto& of_depth : directions_)
@@ -100,7 +100,7 @@ class renderer {
   std::uint32_t samples_ = 0;
 };
 
-/// What work on a stream becomes when it is captured.
+/// A CUDA graph of the work that is captured on a stream.
 class captured_graph {
  public:
   template <class Work>
@@ -133,7 +133,7 @@ constexpr std::uint32_t product_resolutions[] = {0, 8};
 
 }  // namespace
 
-TEST_CASE("a sample in a CUDA graph is the sample", "[cuda]") {
+TEST_CASE("a sample captured in a CUDA graph gives the same directions", "[cuda]") {
   for (const auto lifetime : lifetimes)
     for (const std::uint32_t product_resolution : product_resolutions) {
       INFO(name_of(lifetime) << ", products " << product_resolution);
@@ -144,7 +144,7 @@ TEST_CASE("a sample in a CUDA graph is the sample", "[cuda]") {
         captured.sample();
         direct.sample();
       }
-      const captured_graph graph(stream, [&] { captured.sample(); });  // levels are chosen anew in it
+      const captured_graph graph(stream, [&] { captured.sample(); });  // it adapts bin sizes in the graph
       graph.launch();
       direct.sample();
       CHECK(same_bits(captured.directions(), direct.directions()));
@@ -197,7 +197,7 @@ TEST_CASE("samples after the first guided one allocate nothing on the GPU", "[cu
 
 namespace {
 
-/// Bytes of the device that nobody has.
+/// Free bytes of the device.
 std::size_t free_bytes() {
   std::size_t free = 0, all = 0;
   check_cuda(cudaDeviceSynchronize(), "cudaDeviceSynchronize");
@@ -210,8 +210,8 @@ using bytes_of_device = wfpg::buffer<std::byte, cuda_policy>;
 
 }  // namespace
 
-// Alone on the GPU: other processes' memory counts, too.
-TEST_CASE("a policy keeps memory until it is trimmed or gone", "[cuda][pool]") {
+// Needs the whole GPU: memory of other processes counts too.
+TEST_CASE("a policy keeps memory until it is trimmed or destroyed", "[cuda][pool]") {
   const std::size_t before = free_bytes();
   const auto holds = [&] { return free_bytes() + much / 2 < before; };
   {
@@ -227,7 +227,7 @@ TEST_CASE("a policy keeps memory until it is trimmed or gone", "[cuda][pool]") {
   CHECK(!holds());
 }
 
-TEST_CASE("policies of one stream share no pool", "[cuda]") {
+TEST_CASE("policies of one stream do not share a pool", "[cuda]") {
   const own_stream stream;
   const cuda_policy first(stream), second(stream), copy = first;
   CHECK(first.resource() != second.resource());
@@ -237,7 +237,7 @@ TEST_CASE("policies of one stream share no pool", "[cuda]") {
   first.with_resource(&resource).trim();
 }
 
-TEST_CASE("a buffer outlives the policy that it was made with", "[cuda]") {
+TEST_CASE("a buffer outlives its policy", "[cuda]") {
   bytes_of_device block;
   {
     const cuda_policy exec;
@@ -250,14 +250,14 @@ TEST_CASE("a buffer outlives the policy that it was made with", "[cuda]") {
 
 namespace {
 
-/// Keeps a stream busy until the host says so, or for some seconds.
+/// Keeps a stream busy until the host sets the flag, or for some seconds.
 __global__ void wait_for_host(const volatile int* go) {
-  const long long begin = clock64(), enough = 10'000'000'000;  // 5 s or more
+  const long long begin = clock64(), enough = 10'000'000'000;  // at least 5 s
   while (!*go && clock64() - begin < enough) {
   }
 }
 
-/// Memory that host and device see.
+/// Memory that host and device share.
 class shared_flag {
  public:
   shared_flag() {
@@ -286,7 +286,7 @@ struct set_word {
 
 }  // namespace
 
-// Not under tools that run one kernel at a time.
+// Not for tools that run one kernel at a time.
 TEST_CASE("work on a stream waits for no other stream", "[cuda][overlap]") {
   for (const auto lifetime : lifetimes) {
     INFO(name_of(lifetime));
@@ -310,7 +310,7 @@ TEST_CASE("work on a stream waits for no other stream", "[cuda][overlap]") {
   }
 }
 
-TEST_CASE("a launch that failed before is reported by the next call", "[cuda]") {
+TEST_CASE("the next call reports a launch that failed before", "[cuda]") {
   const cuda_policy exec;
   const wfpg::buffer<std::uint32_t, cuda_policy> word(exec, 1);
   do_nothing<<<1, 5000>>>();
@@ -328,8 +328,8 @@ TEST_CASE("a launch that failed before is reported by the next call", "[cuda]") 
   CHECK(wfpg::read_element(exec, word.data()) == 7);
 }
 
-// In a process of its own, which has no GPU after it.
-TEST_CASE("a kernel that failed before is reported by every call", "[.][cuda][sticky]") {
+// Needs its own process, since it breaks the GPU's context.
+TEST_CASE("every call reports a kernel that failed before", "[.][cuda][sticky]") {
   const cuda_policy exec;
   const wfpg::buffer<std::uint32_t, cuda_policy> word(exec, 1);
   renderer guided(exec, options_of(field_lifetime::kept, 0));
@@ -341,6 +341,6 @@ TEST_CASE("a kernel that failed before is reported by every call", "[.][cuda][st
     CHECK(error.code() == cudaErrorLaunchFailure);
   }
   CHECK_THROWS_AS(exec.for_each(1, set_word{word.data()}), wfpg::cuda_error);
-  CHECK_THROWS_AS(guided.sample(), std::runtime_error);  // from Thrust, or from the policy
+  CHECK_THROWS_AS(guided.sample(), std::runtime_error);  // thrown by Thrust, or by the policy
   CHECK_THROWS_AS((wfpg::buffer<std::uint32_t, cuda_policy>(exec, 1)), wfpg::cuda_error);
 }

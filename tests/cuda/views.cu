@@ -1,5 +1,5 @@
-// Compiled, never run: each view of the library goes to a kernel by value and is called there, so that
-// whatever a device will run is annotated for it.
+// Compiled, never run. Passes each view of the library to a kernel by value and calls it there. This checks
+// that device code is annotated for the device.
 #include <wfpg/octree/svo_ray_caster.hpp>
 #include <wfpg/testing/check_bsdf.hpp>
 #include <wfpg/testing/check_ray_caster.hpp>
@@ -86,7 +86,7 @@ __global__ void use_cones(wfpg::svo_cone_caster caster, wfpg::ray r, wfpg::ray_h
   *out = caster(r, 0.01f);
 }
 
-// What detail/ runs inside for_each.
+// The functors that detail/ runs in for_each.
 template <class Functor>
 __global__ void run(Functor f) {
   f(threadIdx.x);
@@ -161,7 +161,7 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(d::gather_light_means{tree, {}, 0, nullptr});
   launch(d::choose_light_groups{tree, {}, 0, nullptr, nullptr, nullptr, 0.5f, nullptr});
 
-  // Checks for hosts.
+  // Checks that hosts run.
   launch(d::probe_bsdf<cuda_compile::grey>{});
   launch(d::draw_bsdf<cuda_compile::grey>{});
   launch(d::tabulate_bsdf<cuda_compile::grey>{});

@@ -1,4 +1,4 @@
-// A host renderer on the GPU in miniature: surfaces and light that kernels make up from a ray's number.
+// A small host renderer on the GPU. Kernels make surfaces and light from a ray's number.
 #pragma once
 
 #include "support/scenes.hpp"
@@ -10,7 +10,7 @@
 
 namespace wfpg_test {
 
-/// Points of the unit box's walls, of three BSDFs.
+/// Points on the unit box's walls, with three BSDFs.
 struct walls {
   std::uint64_t seed = 3;
   WFPG_HD test_surface operator()(std::uint32_t ray) const {

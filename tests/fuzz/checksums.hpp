@@ -1,4 +1,4 @@
-// Files of sections with their checksums put right, so that what is behind them is reached.
+// Corrects the checksums in files of sections, so that fuzzers reach the code behind them.
 #pragma once
 
 #include <wfpg/guide_file.hpp>
@@ -18,7 +18,7 @@ void set_number(std::string& bytes, std::size_t at, T value) {
   bytes.replace(at, sizeof(T), number);
 }
 
-/// The same bytes with right checksums, of a guide file inside of a section, too.
+/// The same bytes with correct checksums, also of a guide file inside of a section.
 inline std::string with_checksums(std::string bytes) {
   using wfpg::checksum;
   if (bytes.size() < 16) return bytes;
@@ -29,7 +29,7 @@ inline std::string with_checksums(std::string bytes) {
   for (std::size_t at = 16; bytes.size() - at >= 32;) {
     const auto said = wfpg::number_at<std::uint64_t>(&bytes[at + 8]);
     const std::size_t size = static_cast<std::size_t>(std::min<std::uint64_t>(said, bytes.size() - at - 32));
-    const std::size_t inner = at + 24 + 8;  // beyond the length of a text
+    const std::size_t inner = at + 24 + 8;  // after the length of a text
     if (size > 8 && bytes.compare(inner, 8, wfpg::detail::guide_file_kind.magic) == 0)
       bytes.replace(inner, size - 8, with_checksums(bytes.substr(inner, size - 8)));
     set_number(bytes, at + 16, sum(at, 16));

@@ -1,4 +1,4 @@
-// The glTF loader on any bytes: a scene that holds together, or an error with the path and a reason.
+// The glTF loader on any bytes: a valid scene, or an error with the path and a reason.
 #include "memory_file.hpp"
 #include "require.hpp"
 #include "scene/gltf_loader.hpp"
@@ -18,7 +18,7 @@ bool is_texture(const render::scene& scene, const render::texture_reference& ref
   return reference.index < 0 || static_cast<std::size_t>(reference.index) < scene.textures.size();
 }
 
-/// What the renderer relies on.
+/// Checks what the renderer relies on.
 void check(const render::scene& scene) {
   const std::size_t vertices = scene.positions.size();
   require(scene.normals.empty() || scene.normals.size() == vertices, "as many normals as positions");

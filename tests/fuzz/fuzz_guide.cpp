@@ -1,5 +1,5 @@
-// Guide files of any bytes: a guider that guides, or an error that names what is read. Each input is read as
-// it is, and with its checksums put right, so that what is behind them is reached.
+// Guide files of any bytes: a guider that guides, or an error that names the file. Each input is read as it
+// is, and again with correct checksums.
 #include "checksums.hpp"
 #include "guided_samples.hpp"
 
@@ -14,7 +14,7 @@ namespace {
 
 using namespace wfpg_fuzz;
 
-/// What the seeds were saved with; the others of the options that files hold are the file's own.
+/// The options that the seeds were saved with. The file gives the other options.
 wfpg_test::guider_options options_of(const std::string& bytes) {
   const auto word = [&bytes](std::size_t i) {
     return bytes.size() < 68 ? 0u : static_cast<unsigned char>(bytes[40 + 4 * i]);

@@ -1,5 +1,5 @@
-// Meshes of any floats and indices, at any resolution: an octree of sound nodes, and guiding from any
-// surfaces, or an error that names the argument.
+// Meshes of any floats and indices, at any resolution: a valid octree and guiding from any surfaces, or an
+// error. Errors name the argument.
 #include "guided_samples.hpp"
 
 #include <wfpg/octree/voxelizer.hpp>
@@ -15,7 +15,7 @@ namespace {
 
 using namespace wfpg_fuzz;
 
-/// Bytes, read from the first to the last; zeros beyond.
+/// Reads bytes from the first to the last, then zeros.
 class byte_reader {
  public:
   byte_reader(const std::uint8_t* data, std::size_t size) : data_(data), left_(size) {}
@@ -36,7 +36,7 @@ class byte_reader {
   std::size_t left_;
 };
 
-/// A mesh, its resolution, and how it is guided in.
+/// A mesh, its resolution, and the options of guiding.
 struct input {
   std::uint32_t resolution = 1;
   wfpg_test::guider_options options;
@@ -44,7 +44,7 @@ struct input {
   std::vector<wfpg::uvec3> triangles;
 };
 
-/// Powers of two that take milliseconds, and numbers that are to be refused.
+/// Powers of two that take milliseconds, and numbers that must be refused.
 std::uint32_t resolution_of(std::uint8_t byte) {
   if (byte < 128) return 1u << byte % 7;
   const std::uint32_t refused[] = {0u, 3u, 5u, 8192u, 0x80000000u, 0xffffffffu};
@@ -76,7 +76,7 @@ input read_input(byte_reader bytes) {
     const float x = bytes.get<float>(), y = bytes.get<float>(), z = bytes.get<float>();
     result.positions.push_back({x, y, z});
   }
-  // Indices of a byte; the last stands for the largest of 32 bits.
+  // Indices of a byte. The last value stands for the largest of 32 bits.
   const auto index = [&bytes] {
     const auto byte = bytes.get<std::uint8_t>();
     return byte == 255 ? 0xffffffffu : std::uint32_t(byte);
@@ -98,7 +98,7 @@ struct any_surfaces {
   }
 };
 
-/// Leaves are where their centres say, below their parents.
+/// Checks that leaves contain their centres and lie inside their parents.
 void check_octree(const wfpg::sparse_voxel_octree_view& tree) {
   for (wfpg::node_id leaf = tree.first_leaf(); leaf < tree.node_count(); ++leaf) {
     require(tree.leaf_at(tree.centre(leaf)) == leaf, "a leaf is found at its centre");

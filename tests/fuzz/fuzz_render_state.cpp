@@ -1,6 +1,5 @@
-// State files of renderings of any bytes: a rendering that goes on, and that can be interrupted once more
-// without a difference, or an error that names the file. Each input is read as it is, and with its checksums
-// put right, so that what is behind them is reached.
+// State files of any bytes: a rendering that resumes, or an error that names the file. A second interruption
+// changes nothing. Each input is read as it is, and again with correct checksums.
 #include "app/render.hpp"
 #include "checksums.hpp"
 #include "memory_file.hpp"
@@ -39,7 +38,7 @@ scene make_scene() {
   return world;
 }
 
-/// What the seeds were rendered with, by the names of options that they hold.
+/// The options that the seeds were rendered with, if their names are in the file.
 render_options options_of(const std::string& bytes) {
   const auto has = [&bytes](const char* text) { return bytes.find(text) != std::string::npos; };
   render_options options;
@@ -63,7 +62,7 @@ render_options options_of(const std::string& bytes) {
   return options;
 }
 
-/// Goes on with a state, to the end or for one sample.
+/// Resumes a state, to the end or for one sample.
 render_result go_on(const std::string& state, render_options options, bool is_whole) {
   static const scene world = make_scene();
   static const wfpg_fuzz::memory_file file;

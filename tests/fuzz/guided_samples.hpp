@@ -1,4 +1,4 @@
-// What fuzzers of guiding share: a few samples with a guider of any kind, and what has to hold of them.
+// Shared by the fuzzers of guiding: a few samples with any guider, and the checks of them.
 #pragma once
 
 #include "require.hpp"
@@ -37,7 +37,7 @@ struct lambert {
   bool transmits() const { return false; }
 };
 
-/// Points in the octree's leaves, facing along all axes. Precondition: there are leaves.
+/// Points in the octree's leaves that face along all axes. Precondition: there are leaves.
 struct leaf_surfaces {
   wfpg::sparse_voxel_octree_view tree;
 
@@ -65,7 +65,7 @@ inline void ask_lights(const wfpg::light_guide_view& lights, const wfpg::surface
   lights.deposit(ray, choice.key, static_cast<float>(ray % 4));
 }
 
-/// Two samples of one vertex at each of `rays` surfaces, and what it finds.
+/// Two samples of one vertex at each of `rays` surfaces. Checks the sampled directions.
 template <class Guider, class Surfaces>
 void guide(Guider& guider, const Surfaces& surfaces) {
   const wfpg::sparse_voxel_octree_view tree = guider.guide().octree().view();

@@ -11,7 +11,7 @@
 
 namespace wfpg_fuzz {
 
-/// A file that lives in memory, with a path that others can open.
+/// A file in memory, with a path that other code can open.
 class memory_file {
  public:
   memory_file() : descriptor_(memfd_create("input", 0)) { require(descriptor_ >= 0, "no file in memory"); }

@@ -1,4 +1,4 @@
-// What has to hold, whatever a fuzzer's input is.
+// Checks that must hold for every input of a fuzzer.
 #pragma once
 
 #include <cstdio>

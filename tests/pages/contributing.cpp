@@ -1,4 +1,4 @@
-// The policy of CONTRIBUTING.md, with the scheduler that a host has.
+// The policy of CONTRIBUTING.md, with a host's scheduler.
 #include <cstddef>
 
 namespace my {

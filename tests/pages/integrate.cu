@@ -1,4 +1,4 @@
-// The CUDA of docs/integrate.md. Where there is no OptiX the names of it that the page uses stand in for it.
+// The CUDA code of docs/integrate.md. Without OptiX, dummies define the names of it that the page uses.
 #include "integrate-4.inc"
 
 #include <cuda.h>

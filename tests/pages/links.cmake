@@ -1,11 +1,11 @@
-# cmake -Droot=DIR -P links.cmake: every relative link and picture of the documentation's pages is there.
+# cmake -Droot=DIR -P links.cmake: checks that relative links and pictures in the documentation exist.
 file(GLOB pages "${root}/*.md" "${root}/docs/*.md" "${root}/tools/*/*.md")
 set(broken "")
 foreach(page IN LISTS pages)
   file(READ "${page}" text)
   cmake_path(GET page PARENT_PATH directory)
   string(REGEX REPLACE "[;@]" "" text "${text}")
-  string(REPLACE "](" "@(" text "${text}")  # brackets join what is in a list
+  string(REPLACE "](" "@(" text "${text}")  # brackets would join list elements
   string(REGEX MATCHALL "@\\([^) ]+\\)" links "${text}")
   foreach(link IN LISTS links)
     string(REGEX REPLACE "^@\\(|#.*$|\\)$" "" target "${link}")

@@ -1,5 +1,5 @@
-# cmake -Droot=DIR -P options.cmake: every option of the library's guides is in docs/tuning.md. Options are the members
-# of structs whose names end in _options; those of checks are no guide's.
+# cmake -Droot=DIR -P options.cmake: checks that docs/tuning.md has every option of the library's guides. Options are
+# members of structs whose names end in _options, without those of checks.
 file(READ "${root}/docs/tuning.md" page)
 file(GLOB_RECURSE headers "${root}/include/wfpg/*.hpp")
 list(FILTER headers EXCLUDE REGEX "/testing/")
@@ -27,7 +27,7 @@ foreach(header IN LISTS headers)
       math(EXPR at "${at} + ${length}")
       string(SUBSTRING "${text}" ${at} -1 text)
       if(member STREQUAL "binning")
-        continue()  # its members are
+        continue()  # its members are listed
       endif()
       if(NOT page MATCHES "`([a-z]+\\.)*${member}`")
         string(APPEND missing " ${name}::${member}")

@@ -1,5 +1,5 @@
-// The host that docs/host.md and README.md talk about, and their code as it stands there: the functors of the
-// one are what the other's loop passes.
+// The host of docs/host.md and README.md, and their code unchanged. The loop of README.md passes the functors
+// of docs/host.md.
 #include <wfpg/base/types.hpp>
 
 #include <cstdint>

@@ -1,5 +1,4 @@
-// The defaults in docs/tuning.md are the library's: the one table that the page, the library and --help agree
-// on.
+// Tests that docs/tuning.md has the library's defaults. The page, the library and --help share one table.
 #include "support/catch.hpp"
 
 #include <wfpg/guides/octree/options.hpp>
@@ -84,7 +83,7 @@ std::vector<option_default> defaults() {
           {irradiance, "albedo", text_of(records.albedo)}};
 }
 
-/// The page's row of an option in a section; empty where there is none.
+/// The page's row of an option in a section. Empty if there is none.
 std::string row_of(const std::string& page, const option_default& option) {
   const std::size_t begin = page.find("\n## " + option.section + "\n");
   if (begin == std::string::npos) return "";

@@ -1,4 +1,4 @@
-// Whether the guided pictures of the tracer in docs/integrate.md are right.
+// Tests the guided pictures of the tracer in docs/integrate.md.
 #include "../support/catch.hpp"
 #include "tracer.hpp"
 

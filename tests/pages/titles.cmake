@@ -1,4 +1,4 @@
-# cmake -Droot=DIR -P titles.cmake: the tests that docs/algorithm.md names are there.
+# cmake -Droot=DIR -P titles.cmake: checks that the tests that docs/algorithm.md names exist.
 file(READ "${root}/docs/algorithm.md" page)
 string(FIND "${page}" "\n|" tables)
 string(SUBSTRING "${page}" ${tables} -1 page)
@@ -16,7 +16,7 @@ set(missing "")
 string(REGEX MATCHALL "\"[^\"]+\"" titles "${page}")
 foreach(title IN LISTS titles)
   string(REGEX REPLACE "^\"" "" title "${title}")
-  string(FIND "${tests}" "${title}," at)  # after what says whose tests these are
+  string(FIND "${tests}" "${title}," at)  # a prefix such as "field store: " may precede it
   if(at EQUAL -1)
     string(APPEND missing "\n  \"${title}")
   endif()

@@ -1,4 +1,4 @@
-// The header that docs/integrate.md makes of its first two blocks.
+// The header that the first two blocks of docs/integrate.md make up.
 #pragma once
 
 #include "integrate-1.inc"

@@ -1,4 +1,5 @@
-// The header that docs/guides.md makes of its first two blocks, its SARSA grid, and its irradiance records.
+// The header that the first two blocks of docs/guides.md make up, with its SARSA grid and its irradiance
+// records.
 #pragma once
 
 #include "guides-1.inc"

@@ -1,4 +1,4 @@
-# cmake -Droot=DIR -P words.cmake: README.md is read in five minutes.
+# cmake -Droot=DIR -P words.cmake: checks that README.md can be read in five minutes.
 set(most 700)
 file(READ "${root}/README.md" page)
 string(REGEX REPLACE ";|\\[|\\]" "." page "${page}")

@@ -1,4 +1,4 @@
-// Scenes with an environment map: one whose indirect light has little noise, so that little bias shows.
+// Scenes with an environment map. The indirect light of one has little noise, so that a small bias shows.
 #pragma once
 
 #include "scene/builtin_scenes.hpp"
@@ -10,7 +10,7 @@
 
 namespace wfpg_test {
 
-/// A map of 8 x 4 texels, of which one is five times as bright as the darkest.
+/// A map of 8 x 4 texels. The brightest is five times as bright as the darkest.
 inline render::environment_map patchy_sky(float brightness) {
   render::environment_map sky{8, 4, {}};
   for (int i = 0; i < sky.width * sky.height; ++i)
@@ -19,7 +19,7 @@ inline render::environment_map patchy_sky(float brightness) {
   return sky;
 }
 
-/// A room with a ceiling of two emitters, an open front and a map in front of it, seen from inside: light
+/// A room with a ceiling of two emitters, an open front and a map in front of it, seen from inside. Light
 /// comes from everywhere, and half of it is indirect.
 inline render::scene bright_room() {
   using render::vec3;

@@ -12,7 +12,7 @@
 
 namespace wfpg_test {
 
-/// How many triangles touch a voxel, and how many come so close that they may count.
+/// How many triangles touch a voxel, and how many are so near that they may count.
 struct touching {
   std::uint32_t certainly = 0;
   std::uint32_t perhaps = 0;
@@ -35,10 +35,11 @@ inline bool overlaps(const glm::dvec3 (&triangle)[3], glm::dvec3 centre, double 
   return true;
 }
 
-/// The voxels of one triangle, by descent from the whole grid: what does not touch a cube touches none in it.
+/// Collects the voxels of one triangle by descent from the whole grid. A cube that it does not touch is
+/// skipped.
 inline void collect(const glm::dvec3 (&triangle)[3], wfpg::uvec3 first, std::uint32_t size,
                     touched_voxels& found) {
-  const double tolerance = 0x1p-10 + 0x1p-12;  // the documented one, and the rounding of grid coordinates
+  const double tolerance = 0x1p-10 + 0x1p-12;  // the documented one, plus the rounding of grid coordinates
   const glm::dvec3 centre = glm::dvec3(first) + 0.5 * size;
   if (!overlaps(triangle, centre, 0.5 * size + tolerance)) return;
   if (size == 1) {

@@ -1,4 +1,4 @@
-// A scene with an octree and an exitance cache, and deposits into it by a policy.
+// A scene with an octree and an exitance cache. A policy deposits into it.
 #pragma once
 
 #include "support/deposits.hpp"
@@ -31,7 +31,7 @@ struct cached_scene {
   wfpg::sparse_voxel_octree_view octree() const { return tree.view(); }
   wfpg::exitance_cache_view view() const { return cache.view(); }
 
-  // What views say of one place or node.
+  // Queries of the views for one place or node.
   wfpg::node_id leaf_at(wfpg::vec3 p) const {
     const auto tree = octree();
     return evaluate(exec, [=] WFPG_HD() { return tree.leaf_at(p); });

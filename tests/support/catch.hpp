@@ -1,4 +1,4 @@
-// Catch2 of either major version under one name. Tests say TEST_CASE, CHECK and, unqualified, Approx.
+// Catch2 of major version 2 or 3 under one name. Tests use TEST_CASE, CHECK and, unqualified, Approx.
 #pragma once
 
 #if __has_include(<catch2/catch_all.hpp>)
@@ -9,7 +9,7 @@ using Catch::Approx;
 #endif
 
 #if defined(__CUDACC__)
-// Catch2's own macro makes an anonymous namespace, and nvcc takes one inside another for the same.
+// Catch2's own macro makes an anonymous namespace. nvcc confuses one inside another with the outer one.
 #undef TEST_CASE
 #define WFPG_TEST_JOINED_(a, b) a##b
 #define WFPG_TEST_JOINED(a, b) WFPG_TEST_JOINED_(a, b)

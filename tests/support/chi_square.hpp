@@ -15,10 +15,11 @@ using wfpg::testing::chi_square_test;
 using wfpg::testing::pool_bins;
 using wfpg::testing::upper_gamma;
 
-/// Many independent tests as one at significance 0.1%: none below 0.1% / n (Bonferroni), and the sum of all
-/// statistics, which is chi² of the sum of degrees, not below 0.1% either. The sum finds small errors that
-/// all share, the first finds a large one of a single test. Both halves together reject at most 0.2% of
-/// correct samplers; seeds are fixed, so a verdict does not change from run to run.
+/// Combines many independent chi² tests into one at significance 0.1%. No single p may be below 0.1% / n
+/// (Bonferroni). The sum of all statistics is chi² with the sum of degrees, and its p may not be below 0.1%
+/// either. The sum finds small errors that all tests share, Bonferroni a large one of a single test. Both
+/// together reject at most 0.2% of correct samplers. Seeds are fixed, so a verdict does not change from run
+/// to run.
 class chi_square_family {
  public:
   void add(const chi_square_result& result, const std::string& name) {

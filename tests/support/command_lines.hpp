@@ -14,7 +14,7 @@ struct outcome {
   std::string out, log;
 };
 
-/// Runs a program's run_program() with a command line's words.
+/// Runs a program's run_program() with the words of a command line.
 template <class Program>
 outcome run_command(const Program& program, const char* name, const std::vector<std::string>& arguments) {
   std::vector<const char*> argv{name};

@@ -1,4 +1,4 @@
-// Light that tests put into an exitance cache, by kernels.
+// Deposits of light in an exitance cache, by kernels.
 #pragma once
 
 #include "support/policies.hpp"

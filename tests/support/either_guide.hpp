@@ -1,4 +1,4 @@
-// Both of the octree's guides behind one type that chooses at run time, so that a test runs with each.
+// Both of the octree's guides in one type that chooses at run time. A test runs with each of them.
 #pragma once
 
 #include "support/unset.hpp"
@@ -33,7 +33,7 @@ struct guider_options : wfpg::kept_guide_options {
   }
 };
 
-/// A guide that is a kept_guide or a transient_guide, as its options say.
+/// A guide that is a kept_guide or a transient_guide, depending on its options.
 template <class Exec>
 class either_guide : public wfpg::guide_base {
   using kept = wfpg::kept_guide<Exec>;
@@ -103,7 +103,7 @@ class either_guide : public wfpg::guide_base {
   const wfpg::sparse_voxel_octree<Exec>& octree() const {
     return visit([](const auto& g) -> const wfpg::sparse_voxel_octree<Exec>& { return g.octree(); });
   }
-  /// Empty of transient fields, as the next.
+  /// Empty for transient fields, as is field_keys().
   wfpg::learnt_radiance_view learnt() const {
     const kept* const k = std::get_if<kept>(&guide_);
     return k ? k->learnt() : wfpg::learnt_radiance_view();
@@ -139,14 +139,14 @@ class either_guide : public wfpg::guide_base {
   either guide_;
 };
 
-/// f(options) with the options of the guide that they ask for.
+/// Calls f(options) with the options of the chosen guide.
 template <class F>
 decltype(auto) with_own_options(const guider_options& options, const F& f) {
   if (options.fields == field_lifetime::kept) return f(static_cast<const wfpg::kept_guide_options&>(options));
   return f(options.transient());
 }
 
-/// A guider whose fields live as its options say.
+/// A guider with the field lifetime of its options.
 template <class Exec>
 using octree_guider = wfpg::path_guider<Exec, either_guide<Exec>>;
 

@@ -1,4 +1,4 @@
-// Means of what paths gather, and how sure they are.
+// Means of the radiance that paths gather, and their variances.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-// Asking what lies in a policy's memory: functors run through the policy, and what they give comes back.
+// Reads memory of a policy: runs functors on the policy and returns their results to the host.
 #pragma once
 
 #include "support/policies.hpp"
@@ -9,7 +9,7 @@
 
 namespace wfpg_test {
 
-/// What f gives, in a std::vector: of bools bytes, which have addresses.
+/// Results of f in a std::vector. Bools become bytes, since they need addresses.
 template <class T>
 using result_of = std::conditional_t<std::is_same_v<std::decay_t<T>, bool>, unsigned char, std::decay_t<T>>;
 
@@ -20,16 +20,16 @@ struct evaluate_each {
   WFPG_HD void operator()(std::size_t i) const { results[i] = f(i); }
 };
 
-/// f(i) for i in [0, n).
+/// Returns f(i) for i in [0, n).
 template <class Exec, class F, class Result = result_of<decltype(std::declval<const F&>()(std::size_t(0)))>>
 std::vector<Result> evaluate(const Exec& exec, std::size_t n, const F& f) {
   const wfpg::buffer<Result, Exec> results(exec, n);
-  exec.fill_bytes(results.data(), 0, results.bytes());  // what lies between members is copied back too
+  exec.fill_bytes(results.data(), 0, results.bytes());  // padding between members is copied back too
   exec.for_each(n, evaluate_each<F, Result>{f, results.view()});
   return results.to_host(exec);
 }
 
-/// In how many i of [0, n) f(i) is true.
+/// Counts the i in [0, n) with f(i) true.
 template <class Exec, class F>
 std::size_t count_where(const Exec& exec, std::size_t n, const F& f) {
   std::size_t count = 0;
@@ -43,7 +43,7 @@ struct call_once {
   WFPG_HD auto operator()(std::size_t) const { return f(); }
 };
 
-/// f().
+/// Returns f().
 template <class Exec, class F, class Result = result_of<decltype(std::declval<const F&>()())>>
 Result evaluate(const Exec& exec, const F& f) {
   return evaluate(exec, std::size_t(1), call_once<F>{f})[0];
@@ -56,7 +56,7 @@ struct call_with {
   WFPG_HD auto operator()(std::size_t i) const { return f(arguments[i]); }
 };
 
-/// f(argument) for each of some arguments.
+/// Returns f(argument) for each argument.
 template <class Exec, class T, class F,
           class Result = result_of<decltype(std::declval<const F&>()(std::declval<const T&>()))>>
 std::vector<Result> evaluate(const Exec& exec, const std::vector<T>& arguments, const F& f) {

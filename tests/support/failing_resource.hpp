@@ -1,4 +1,4 @@
-// A memory resource that fails at one allocation of many, and the sweep over all of them.
+// A memory resource that fails at one allocation of many, and the loop over all of them.
 #pragma once
 
 #include "support/policies.hpp"
@@ -11,26 +11,26 @@
 
 namespace wfpg_test {
 
-/// Counts what is asked of it and what is given back, and fails at one of the allocations to come.
+/// Counts allocations and deallocations, and fails at one of the next allocations.
 class failing_resource : public wfpg::memory_resource {
  public:
   explicit failing_resource(wfpg::memory_resource* upstream = default_resource()) : upstream_(upstream) {}
 
-  /// Allocations that are not given back.
+  /// Allocations that are not freed yet.
   std::size_t live() const { return live_; }
   /// Allocations since fail_at().
   std::size_t asked() const { return asked_; }
   /// Whether one has failed since fail_at().
   bool failed() const { return asked_ >= fails_at_ && fails_at_ > 0; }
 
-  /// The k-th allocation from here on fails, counted from 1; 0: none does.
+  /// The k-th allocation from now on fails, counted from 1. 0: none fails.
   void fail_at(std::size_t k) {
     fails_at_ = k;
     asked_ = 0;
   }
 
  protected:
-  /// What it throws.
+  /// Throws the failure.
   [[noreturn]] virtual void refuse() const { throw std::bad_alloc(); }
 
  private:
@@ -50,7 +50,7 @@ class failing_resource : public wfpg::memory_resource {
   std::size_t live_ = 0, asked_ = 0, fails_at_ = 0;
 };
 
-/// Whether a call throws out_of_memory, which it may only where the resource has failed.
+/// Whether a call throws out_of_memory. It may do so only if the resource has failed.
 template <class F>
 bool runs_out(const failing_resource& resource, const F& call) {
   try {
@@ -62,8 +62,8 @@ bool runs_out(const failing_resource& resource, const F& call) {
   return false;
 }
 
-/// Calls f() with every allocation failing in its turn, until none is left to fail; how many there were. f
-/// takes whatever memory it asks for and gives all of it back.
+/// Calls f() repeatedly, with the k-th allocation failing in the k-th call, until none fails. Returns the
+/// number of failures. f must free all memory that it allocates.
 template <class F>
 std::size_t fail_at_each(failing_resource& resource, const F& f) {
   const std::size_t before = resource.live();
@@ -77,8 +77,8 @@ std::size_t fail_at_each(failing_resource& resource, const F& f) {
   }
 }
 
-/// Prints how many allocations failed in a test, which .ci/run adds up.
-inline void tell_failed(std::size_t allocations) {
+/// Prints how many allocations failed in a test. .ci/run adds them up.
+inline void print_failed(std::size_t allocations) {
   std::printf("allocations failed: %zu\n", allocations);
 }
 

@@ -1,5 +1,5 @@
-// Fields for the tests of samplers: cell values of many kinds, and a distribution built from them by a
-// policy.
+// Fields for the tests of samplers: cell values of many kinds, and distributions that a policy builds from
+// them.
 #pragma once
 
 #include "support/evaluate.hpp"
@@ -21,7 +21,7 @@ inline const char* name_of(field_kind kind) {
   return names[static_cast<std::uint32_t>(kind)];
 }
 
-/// F² values of a kind. `noise` has zeros among them, `extreme` spans 30 orders of magnitude.
+/// F² values of a kind. `noise` includes zeros, `extreme` spans 30 orders of magnitude.
 inline std::vector<float> field_values(field_kind kind, std::uint32_t resolution, std::uint64_t seed) {
   random_numbers random(seed);
   std::vector<float> values(std::size_t(resolution) * resolution, 0.0f);
@@ -37,7 +37,7 @@ inline std::vector<float> field_values(field_kind kind, std::uint32_t resolution
   return values;
 }
 
-/// The probabilities that cells should have, from their values alone.
+/// The expected probabilities of cells, from their values alone.
 inline std::vector<double> cell_probabilities(const std::vector<float>& values, float floor = 0.0f) {
   std::vector<double> result;
   double sum = 0.0;
@@ -47,7 +47,7 @@ inline std::vector<double> cell_probabilities(const std::vector<float>& values, 
   return result;
 }
 
-/// What a distribution is built from: cell values, and room for it.
+/// The words that a distribution is built in: cell values, and room for the rest.
 inline std::vector<std::uint32_t> words_of(const std::vector<float>& values, std::uint32_t resolution) {
   std::vector<std::uint32_t> words;
   for (float value : values) words.push_back(wfpg::float_bits(value));
@@ -65,7 +65,7 @@ struct build_grid {
   }
 };
 
-/// A distribution in the memory of a policy, built by it.
+/// A distribution in a policy's memory. The policy builds it.
 template <class Exec>
 class built_field {
  public:

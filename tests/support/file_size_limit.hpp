@@ -1,4 +1,4 @@
-// As on a full disk: files take no more than some bytes while this lives.
+// Limits the size of files while it lives, as a full disk does.
 #pragma once
 
 #include <sys/resource.h>

@@ -1,4 +1,4 @@
-// Rays at the floor of the lit unit box for kept fields, and what holds of any store and its views.
+// Rays at the floor of the lit unit box for kept fields, and checks for any store and its views.
 #pragma once
 
 #include "support/evaluate.hpp"
@@ -14,7 +14,7 @@
 
 namespace wfpg_test {
 
-/// A point of one of the floor's 16 nodes of level 2, away from its rims.
+/// A point in one of the floor's 16 nodes of level 2, away from its edges.
 inline vec3 floor_place(std::uint32_t node) {
   return {0.1f + 0.26f * float(node % 4), 0.0f, 0.1f + 0.26f * float(node / 4)};
 }
@@ -27,7 +27,7 @@ inline std::vector<test_surface> floor_rays(std::uint32_t n) {
   return wave;
 }
 
-/// Whether slots are live, free or freed, each once.
+/// Whether each slot is once in the lists of live, free or freed slots.
 template <class Exec>
 bool consistent(const kept_box<Exec>& box) {
   const auto counts = box.counts();
@@ -50,7 +50,7 @@ struct is_guided_otherwise {
   }
 };
 
-/// Rays without a field are their BSDF's alone.
+/// Rays without a field must sample only their BSDF.
 template <class Exec>
 std::size_t guided_otherwise(const kept_box<Exec>& box, const wfpg::guide_view& view,
                              const std::vector<test_surface>& wave) {

@@ -1,4 +1,4 @@
-// Which of a path's directions a guide of the renderer draws.
+// Which of a path's directions the renderer's guide samples.
 #pragma once
 
 #include "support/catch.hpp"
@@ -8,8 +8,8 @@
 
 namespace wfpg_test {
 
-/// A path of n segments draws n - 1 directions: a guide draws all of them, or where next-event estimation is
-/// on all but the last. In a path of two segments that is the first as well, and guided.
+/// A path of n segments samples n - 1 directions. A guide samples all of them, but with next-event estimation
+/// not the last. In a path of two segments the only direction is guided.
 inline void check_depths_are_guided(render::sampling_method method) {
   constexpr std::uint32_t all = 0xffffffffu;
   const auto picture = [](render::sampling_method by, bool nee, int max_depth, std::uint32_t depths) {

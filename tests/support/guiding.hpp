@@ -1,4 +1,4 @@
-// A guider in the unit box with a bright patch in its ceiling, and a path tracer of two bounces around it.
+// A guider in the unit box with a bright patch in its ceiling, and a path tracer of two bounces.
 #pragma once
 
 #include "support/either_guide.hpp"
@@ -19,7 +19,7 @@
 
 namespace wfpg_test {
 
-/// What std::invalid_argument says that a call throws; empty where it throws none.
+/// The message of a std::invalid_argument that a call throws. Empty if it throws none.
 inline std::string refusal(const std::function<void()>& call) {
   try {
     call();
@@ -75,7 +75,7 @@ inline guider_options box_options(wfpg::guiding_mode mode = wfpg::guiding_mode::
   return options;
 }
 
-/// A policy's array of surfaces, as a wave.
+/// Surfaces in a policy's memory, as a wave.
 template <class Exec>
 class wave_of_surfaces {
  public:
@@ -105,7 +105,7 @@ std::size_t count_guided(const Exec& exec, const wfpg::guide_view& view, std::si
                      [=] WFPG_HD(std::size_t ray) { return view.guides(static_cast<std::uint32_t>(ray)); });
 }
 
-/// What the BSDFs of rays say of the density of directions.
+/// Densities of directions by the BSDFs of their rays.
 struct density_of_bsdf {
   wfpg::array_view<const test_surface> surfaces;
   wfpg::array_view<const wfpg::sampled_direction> drawn;
@@ -121,7 +121,7 @@ std::vector<float> bsdf_densities(const Exec& exec, const std::vector<test_surfa
   return evaluate(exec, drawn.size(), density_of_bsdf{s.view(), d.view()});
 }
 
-/// A guider of the box that knows the patch.
+/// A guider of the box that has learnt the patch.
 template <class Exec>
 struct guided_box {
   Exec exec;
@@ -133,7 +133,7 @@ struct guided_box {
   explicit guided_box(field_lifetime lifetime)
       : guided_box(box_options(wfpg::guiding_mode::oriented, lifetime)) {}
 
-  /// Deposits the patch on 40² points a wall, and begins the sample after it.
+  /// Deposits the patch on 40² points a wall, and begins the next sample.
   void learn() {
     deposit_on_walls(exec, guider.guide().cache(), 40,
                      [](std::uint32_t face, float u, float v) { return emitted(face_point(face, u, v)); });
@@ -150,7 +150,7 @@ struct guided_box {
     guider.sample_directions(wave.get(), caster, directions.view());
     return directions.to_host(exec);
   }
-  /// The same of a wave that has come before: where fields are kept, its rays have theirs by now.
+  /// Samples a wave again that has come before. By now its rays have kept fields.
   template <class Caster = box_caster>
   std::vector<wfpg::sampled_direction> sample_again(const std::vector<test_surface>& surfaces,
                                                     const Caster& caster = {}) {
@@ -170,8 +170,8 @@ inline bool same_bits(const std::vector<wfpg::sampled_direction>& a,
                     [](const auto& x, const auto& y) { return same_bits(x, y); });
 }
 
-/// Whether two ways to draw drew the same: to the bit on a host. On a GPU each kernel rounds in its own way,
-/// and where a cone lies on a voxel's border its field reads another voxel: nearly the same, but for a few.
+/// Whether two ways of sampling give the same directions: bit for bit on a host, nearly on a GPU. There each
+/// kernel rounds in its own way. A cone on a voxel's border then reads another voxel, so a few may differ.
 inline bool same_draws(const std::vector<wfpg::sampled_direction>& a,
                        const std::vector<wfpg::sampled_direction>& b) {
   if (same_operations_same_bits) return same_bits(a, b);
@@ -182,8 +182,7 @@ inline bool same_draws(const std::vector<wfpg::sampled_direction>& a,
   return a.size() == b.size() && 100 * closely >= 99 * a.size();
 }
 
-/// Rays of every kind: Lambert, glossy, glass, mirror and black surfaces, inactive ones with nonsense in
-/// them.
+/// Rays of every kind: Lambert, glossy, glass, mirror and black surfaces. Inactive ones have invalid values.
 inline std::vector<test_surface> mixed_surfaces(std::size_t n, std::uint64_t seed) {
   auto surfaces = wall_surfaces(n, seed);
   for (std::size_t i = 0; i < n; ++i) {
@@ -202,7 +201,7 @@ struct path_step {
   float radiance = 0.0f;
 };
 
-/// The normal of the wall that a point of it is nearest to.
+/// The normal of the wall nearest to a point.
 WFPG_HD inline vec3 inward_normal(vec3 p) {
   std::uint32_t nearest = 0;
   float least = 2.0f;
@@ -215,14 +214,14 @@ WFPG_HD inline vec3 inward_normal(vec3 p) {
   return face_normal(nearest);
 }
 
-/// The box with its patch: all paths go on.
+/// The box with its patch. All paths continue.
 struct patch_box {
   static constexpr float survival = 1.0f;
   WFPG_HD float operator()(vec3 p) const { return emitted(p); }
 };
 
-/// Follows a sampled direction to the wall that it meets, and records what is there. A World emits what it
-/// says of a point, and of the paths a share goes on.
+/// Follows a sampled direction to the wall that it hits, and records a vertex there. `World` gives the
+/// emission at a point, and the fraction of paths that continue.
 template <class World>
 struct follow_path {
   World world;
@@ -257,15 +256,15 @@ struct follow_path {
   }
 };
 
-/// Which samples of which paths to trace: from points on the walls, over so many directions.
+/// Samples and paths to trace. Paths start at points on the walls and have `directions` bounces.
 struct paths_to_trace {
   std::uint32_t samples;
   std::size_t paths;
   std::uint32_t directions = 2;
-  std::uint64_t first = 0;  ///< sample: others have other points and numbers
+  std::uint64_t first = 0;  ///< first sample; each has its own points and numbers
 };
 
-/// Traces samples; what each path gathered.
+/// Traces samples. Returns the radiance of each path.
 template <class Exec, class Guide, class Caster, class World>
 std::vector<float> trace_paths(const Exec& exec, wfpg::path_guider<Exec, Guide>& guider,
                                const paths_to_trace& what, const Caster& caster, const World& world) {
@@ -294,7 +293,7 @@ std::vector<float> trace_paths(const Exec& exec, wfpg::path_guider<Exec, Guide>&
   }
   return picture;
 }
-/// Of two bounces, in the box with its patch.
+/// Traces paths of two bounces in the box with its patch.
 template <class Exec, class Guide, class Caster>
 std::vector<float> trace_paths(const Exec& exec, wfpg::path_guider<Exec, Guide>& guider,
                                std::uint32_t samples, std::size_t paths, const Caster& caster) {

@@ -15,7 +15,7 @@ inline double sum_of(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
 }
 
-/// A floor below a sky of radiance 1, seen from above its edge: the upper half of the picture hits nothing.
+/// A floor below a sky of radiance 1, seen from above its edge. Rays of the picture's upper half hit nothing.
 inline render::scene lit_floor(render::material_kind kind) {
   render::scene s;
   s.name = "floor";

@@ -1,4 +1,4 @@
-// A field store over the lit unit box, samples and waves for it, and a caster that notes its cones.
+// A field store over the lit unit box, samples and waves for it, and a caster that logs its cones.
 #pragma once
 
 #include "support/evaluate.hpp"
@@ -17,7 +17,7 @@
 
 namespace wfpg_test {
 
-/// Inline: the box's hits, and notes of the cones from any number of threads.
+/// Inline caster of the box. Logs cones from any number of threads.
 struct noting_caster {
   std::uint32_t* count;
   wfpg::array_view<wfpg::ray> cones;
@@ -29,7 +29,7 @@ struct noting_caster {
   }
 };
 
-/// Cones that were cast, the first so many of them kept.
+/// Counts cones, and stores the first ones.
 template <class Exec>
 class cone_log {
  public:
@@ -38,14 +38,14 @@ class cone_log {
 
   noting_caster caster() const { return {count_.data(), cones_.view(), {}}; }
   std::size_t count() const { return wfpg::read_element(exec_, count_.data()); }
-  /// The count, which begins anew.
+  /// Returns the count and resets it.
   std::size_t take() {
     const std::size_t counted = count();
     count_ = wfpg::buffer<std::uint32_t, Exec>(exec_, std::vector<std::uint32_t>{0});
     return counted;
   }
   std::vector<wfpg::ray> cones() const { return cones(std::min(count(), cones_.size())); }
-  /// The first n, also after take().
+  /// The first n cones, also after take().
   std::vector<wfpg::ray> cones(std::size_t n) const { return cones_.to_host(exec_, n); }
 
  private:
@@ -58,7 +58,7 @@ inline float patch_light(std::uint32_t face, float u, float v) {
   return emitted(face_point(face, u, v));
 }
 
-/// Options whose budget holds so many slots.
+/// Options whose budget is `slots` slots.
 inline wfpg::kept_field_options slots_of(std::uint32_t resolution, std::size_t slots,
                                          std::uint32_t recast = 4, bool learns = false) {
   wfpg::kept_field_options options;
@@ -74,7 +74,7 @@ struct note_number {
   WFPG_HD void operator()(std::size_t ray, std::uint32_t field) const { numbers[ray] = field; }
 };
 
-/// A store over the box with the patch. Fields are over nodes of level 2 until a marking.
+/// A store over the box with the patch. Bins are nodes of level 2 until levels are marked.
 template <class Exec>
 struct kept_box {
   lit_box<Exec> box{patch_light};
@@ -104,20 +104,20 @@ struct kept_box {
     return store.prepare(exec(), kept(wave), caster, buffer_bytes);
   }
   wfpg::guide_view prepare(const std::vector<test_surface>& wave) { return prepare(wave, log.caster()); }
-  /// A wave that makes no fields: each ray's number.
+  /// A wave that makes no fields. Returns each ray's field number.
   std::vector<std::uint32_t> find(const std::vector<test_surface>& wave) {
     const wfpg::buffer<std::uint32_t, Exec> numbers(exec(), wave.size());
     store.find_and_sample(exec(), kept(wave), note_number{numbers.view()});
     return numbers.to_host(exec());
   }
-  /// Cones that a wave casts.
+  /// The number of cones that a wave casts.
   std::size_t cones(const std::vector<test_surface>& wave) {
     log.take();
     prepare(wave);
     return log.take();
   }
-  /// Waves until every ray that can have a field of its own has it: of keys in one bucket a wave bears one.
-  wfpg::guide_view settle(const std::vector<test_surface>& wave) {
+  /// Repeats a wave until all its rays have fields. A wave allocates only one slot per hash bucket.
+  wfpg::guide_view prepare_all(const std::vector<test_surface>& wave) {
     std::uint64_t allocated = 0;
     do {
       allocated = counts().allocated;
@@ -125,10 +125,10 @@ struct kept_box {
     } while (counts().allocated != allocated);
     return prepare(wave);
   }
-  /// A sample of settled waves.
+  /// A sample of one repeated wave.
   wfpg::guide_view whole_sample(const std::vector<test_surface>& wave) {
     begin();
-    const wfpg::guide_view view = settle(wave);
+    const wfpg::guide_view view = prepare_all(wave);
     end();
     return view;
   }
@@ -136,7 +136,7 @@ struct kept_box {
   wfpg::kept_field_statistics counts() const { return store.statistics(exec()); }
   wfpg::field_store_state state() const { return wfpg::read_element(exec(), store.state()); }
   wfpg::field_wave_counts last_wave() const { return wfpg::read_element(exec(), store.last_wave()); }
-  /// A ray's field; its cells lie in the policy's memory.
+  /// A ray's field. Its cells are in the policy's memory.
   wfpg::directional_field field_of(const wfpg::guide_view& view, std::uint32_t ray) const {
     return evaluate(exec(), [=] WFPG_HD() { return view.mixture(ray).field; });
   }
@@ -160,7 +160,7 @@ inline std::vector<test_surface> rays_at(vec3 position, vec3 normal, std::size_t
   return std::vector<test_surface>(n, make_surface(position, normal, normal));
 }
 
-/// A ray's field in one number: frame, share and every weight.
+/// A hash of a ray's field: frame, fraction and every weight.
 WFPG_HD inline std::uint64_t field_bits(const wfpg::guide_mixture& mixture) {
   if (mixture.field.empty()) return 0;
   const wfpg::grid_distribution& grid = mixture.field.grid();

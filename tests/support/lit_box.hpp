@@ -1,4 +1,4 @@
-// The unit box with light on its walls: its octree and its cache.
+// The unit box with light on its walls, its octree and its cache.
 #pragma once
 
 #include "support/policies.hpp"
@@ -18,7 +18,7 @@ struct lit_box {
   wfpg::sparse_voxel_octree<Exec> tree;
   wfpg::exitance_cache<Exec> cache;
 
-  /// `radiance`: (std::uint32_t face, float u, float v) -> float
+  /// `radiance` is a function (std::uint32_t face, float u, float v) -> float.
   template <class Radiance>
   explicit lit_box(const Radiance& radiance, std::uint32_t resolution = 32) {
     const box_mesh<Exec> mesh(exec);

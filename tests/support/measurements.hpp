@@ -1,4 +1,4 @@
-// What tests of wfpg-quality share: its options, and what it leaves in a folder.
+// Shared by the tests of wfpg-quality: its options, and the files that it writes.
 #pragma once
 
 #include "settings.hpp"
@@ -20,7 +20,7 @@ inline quality::settings parsed(strings arguments) {
   return quality::parse_settings(arguments, out).value();
 }
 
-/// Files of the cache whose names begin so.
+/// Files of the cache whose names begin with `begin`.
 inline std::vector<std::filesystem::path> cached(const wfpg_test::temporary_folder& folder,
                                                  const std::string& begin, const std::string& extension) {
   std::vector<std::filesystem::path> found;

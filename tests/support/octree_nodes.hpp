@@ -1,4 +1,4 @@
-// An octree's nodes on the host: everything that its view says of each.
+// An octree's nodes on the host, with all that its view reports of each.
 #pragma once
 
 #include "support/evaluate.hpp"

@@ -1,4 +1,4 @@
-// A scene of one square, and what is asked of pictures.
+// A scene of one square, and queries of pictures.
 #pragma once
 
 #include "scene/scene.hpp"
@@ -22,7 +22,7 @@ inline bool same_bits(const std::vector<vec3>& a, const std::vector<vec3>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(vec3)) == 0;
 }
 
-/// One square of side 2 in the plane z = 0 that faces +z, of a given material.
+/// One square of side 2 in the plane z = 0 that faces +z, with a given material.
 inline render::scene square_of(const render::material& material) {
   render::scene s;
   s.name = "square";

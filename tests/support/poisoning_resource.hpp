@@ -1,4 +1,4 @@
-// A memory resource that fills what it hands out, so that what is read before it is written shows.
+// A memory resource that fills new memory with a value, so that reads before writes show.
 #pragma once
 
 #include "support/policies.hpp"
@@ -7,7 +7,7 @@
 
 namespace wfpg_test {
 
-/// Hands out memory of a policy's default resource with one value in every byte.
+/// Allocates memory of a policy's default resource, with one value in every byte.
 template <class Exec>
 class poisoning_resource : public wfpg::memory_resource {
  public:

@@ -1,11 +1,11 @@
-// The execution policies that tests run on, and a test case for each of them: WFPG_TEST_CASE defines one test
-// per policy and warp width, named "NAME - tbb32" and tagged [tbb][w32]. A CUDA compiler makes of the same
-// sources the CUDA policy's tests, "NAME - cuda" and tagged [cuda].
+// The execution policies of tests, and a test case for each. WFPG_TEST_CASE defines one test per policy and
+// warp width, named "NAME - tbb32" and tagged [tbb][w32]. A CUDA compiler makes the CUDA policy's tests from
+// the same sources, named "NAME - cuda" and tagged [cuda].
 //
-// A warp's text is the same on every policy: seq has narrow ones here, the others 32 lanes, as users have on
-// all. Tests of the policies themselves define WFPG_TEST_EACH_WIDTH first. Under sanitizers, where all is
-// slow, WFPG_TEST_POLICY and WFPG_TEST_WIDTH choose one of them for all other tests.
-// WFPG_TEST_SEVERAL_POLICIES says that seq, omp and tbb are tested side by side.
+// Warp code is the same on every policy. Here seq has narrow warps, the others 32 lanes, as users have. Tests
+// of the policies themselves define WFPG_TEST_EACH_WIDTH first. Under slow sanitizers, WFPG_TEST_POLICY and
+// WFPG_TEST_WIDTH choose one policy for all other tests. WFPG_TEST_SEVERAL_POLICIES is defined if seq, omp
+// and tbb are tested side by side.
 #pragma once
 
 #include "support/catch.hpp"
@@ -70,17 +70,17 @@
   template <class Exec>                       \
   void function()
 
-/// A test case on every policy; its body knows the policy as `Exec`. Use in an anonymous namespace.
+/// Defines a test case on every policy. Its body uses the policy as `Exec`. Use it in an anonymous namespace.
 #define WFPG_TEST_CASE(name, tags) WFPG_TEST_CASE_(WFPG_TEST_JOIN(policy_test_, __LINE__), name, tags)
 
 namespace wfpg_test {
 
 #if defined(__CUDACC__)
-/// The policy of tests that need no more than one.
+/// The policy of tests that need only one.
 using one_policy = wfpg::exec::cuda;
-/// One whose memory the host reads.
+/// A policy whose memory the host can read.
 using host_policy = wfpg::exec::seq;
-/// Whether loops run in the host's threads: only then they may throw, and have scratch memory of the
+/// Whether loops run in the host's threads. Only then may they throw and take scratch memory from the
 /// resource.
 constexpr bool loops_on_host = false;
 #else
@@ -93,18 +93,18 @@ using host_policy = one_policy;
 constexpr bool loops_on_host = true;
 #endif
 
-/// Whether a host's compiler may calculate as real numbers do.
+/// Whether a host's compiler may reorder floating-point operations.
 #if defined(__FAST_MATH__)
 constexpr bool fast_math = true;
 #else
 constexpr bool fast_math = false;
 #endif
 
-/// Whether the same floating-point operations give the same bits wherever they are written: not where the
-/// compiler fuses or reorders them by what surrounds them.
+/// Whether equal floating-point operations give equal bits everywhere. Not if the compiler fuses or reorders
+/// them depending on their context.
 constexpr bool same_operations_same_bits = loops_on_host && !fast_math;
 
-/// Whether two kernels gave the same number by the same floating-point operations: to the bit, or nearly.
+/// Whether two kernels got the same number from the same floating-point operations, exactly or nearly.
 WFPG_HD inline bool alike(float a, float b) {
   return same_operations_same_bits ? a == b : std::fabs(a - b) <= 2.0e-6f * std::fabs(b);
 }
@@ -112,7 +112,7 @@ WFPG_HD inline bool alike(wfpg::vec3 a, wfpg::vec3 b) {
   return same_operations_same_bits ? a == b : glm::distance(a, b) <= 2.0e-6f * glm::length(b);
 }
 
-/// Where a policy's memory comes from that was not told otherwise.
+/// The memory resource of a policy without a given one.
 inline wfpg::memory_resource* default_resource() {
 #if defined(__CUDACC__)
   static const wfpg::exec::cuda exec;
@@ -122,7 +122,7 @@ inline wfpg::memory_resource* default_resource() {
 #endif
 }
 
-/// The elements of a view in the policy's memory, on the host.
+/// Copies the elements of a view from the policy's memory to the host.
 template <class Exec, class T>
 std::vector<std::remove_const_t<T>> to_host(const Exec& exec, wfpg::array_view<T> view) {
   std::vector<std::remove_const_t<T>> host(view.size());
@@ -136,7 +136,7 @@ wfpg::array_view<const T> const_view(const wfpg::buffer<T, Exec>& buffer) {
   return buffer.view();
 }
 
-/// Reproducible random numbers that are the same on every platform.
+/// Reproducible random numbers that are equal on every platform.
 class random_numbers {
  public:
   explicit random_numbers(std::uint64_t seed) : state_(seed) {}

@@ -1,4 +1,4 @@
-// Products of a field and a BSDF, made by a policy, and what is drawn from them.
+// Products of a field and a BSDF, made by a policy, and directions sampled from them.
 #pragma once
 
 #include "support/fields.hpp"
@@ -21,7 +21,7 @@ struct product_size {
 constexpr product_size product_sizes[] = {{16, 4}, {16, 8}, {16, 16}, {24, 8},  {32, 4},  {32, 8},  {32, 16},
                                           {64, 4}, {64, 8}, {64, 16}, {128, 4}, {128, 8}, {128, 16}};
 
-/// A direction of the product alone, with what pdf() says of it, and one of its mixture with the BSDF.
+/// A direction of the product alone, with its pdf(), and one of its mixture with the BSDF.
 struct product_draw {
   drawn_direction product;
   float asked = 0.0f;
@@ -63,11 +63,11 @@ struct draw_product {
   }
 };
 
-/// A product in the memory of a policy.
+/// A product in a policy's memory.
 template <class Exec, class Bsdf>
 class made_product {
  public:
-  /// Over the hemisphere above `up`, or over the sphere. `seed` is of the points in blocks.
+  /// Over the hemisphere above `up`, or over the sphere. `seed` chooses the points in blocks.
   made_product(const Exec& exec, const product_size& size, const std::vector<float>& values, bool hemisphere,
                const wfpg::surface<Bsdf>& surface, std::uint64_t seed, std::size_t samples)
       : exec_(exec),
@@ -107,7 +107,7 @@ class made_product {
       return double(product.pdf(field.direction(middle))) * double(field.cell_solid_angle());
     });
   }
-  /// Directions drawn in each cell.
+  /// The number of directions sampled in each cell.
   std::vector<double> counts() const {
     const std::uint32_t n = field_.grid().resolution();
     std::vector<double> result(std::size_t(n) * n, 0.0);
@@ -132,7 +132,7 @@ class made_product {
   std::vector<product_draw> drawn_;
 };
 
-/// What the density, the samples and the queries of products have to be, of many of them.
+/// Checks densities, samples and queries of many products together.
 class product_family {
  public:
   template <class Exec, class Bsdf>

@@ -20,7 +20,7 @@ struct test_mesh {
     for (const wfpg::vec3 corner : {a, b, c}) positions.push_back(corner);
     triangles.push_back({first, first + 1, first + 2});
   }
-  /// Two triangles; the corners are a, a + u, a + u + v, a + v, and the normal is along u x v.
+  /// Adds two triangles. The corners are a, a + u, a + u + v, a + v, and the normal is along u x v.
   void add_quad(wfpg::vec3 a, wfpg::vec3 u, wfpg::vec3 v) {
     add(a, a + u, a + u + v);
     add(a, a + u + v, a + v);
@@ -36,7 +36,7 @@ struct test_mesh {
   }
 };
 
-/// A mesh in the memory of a policy.
+/// A mesh in a policy's memory.
 template <class Exec>
 struct device_mesh {
   wfpg::buffer<wfpg::vec3, Exec> positions;
@@ -52,8 +52,8 @@ wfpg::voxel_fragments<Exec> voxelized(const Exec& exec, const test_mesh& mesh, s
   return wfpg::voxelize(exec, device_mesh<Exec>(exec, mesh).view(), resolution);
 }
 
-/// Triangles in the unit cube whose sizes spread evenly, in ratio, between two lengths; every third is a
-/// sliver of at most a hundredth of its length.
+/// Triangles in the unit cube. Sizes are log-uniform between two lengths. Every third is a sliver of at most
+/// a hundredth of its length.
 inline test_mesh mixed_triangles(std::size_t n, float smallest, float largest, std::uint64_t seed) {
   random_numbers random(seed);
   test_mesh mesh;

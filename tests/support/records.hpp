@@ -1,4 +1,4 @@
-// Lamps for irradiance_records, and a box with a wall across it.
+// Lamps for irradiance_records, and a box with a dividing wall.
 #pragma once
 
 #include "support/evaluate.hpp"
@@ -18,7 +18,7 @@ namespace wfpg_test {
 template <class Exec, class Smooth = wfpg::no_smooth_surfaces>
 using records_guider = wfpg::path_guider<Exec, wfpg::irradiance_records<Exec, Smooth>>;
 
-/// A rectangle of the unit box's ceiling that shines down.
+/// A rectangle of the unit box's ceiling that emits downward.
 inline std::vector<wfpg::emitting_triangle> ceiling_lamp(float x0, float x1, float z0, float z1,
                                                          float radiance) {
   const vec3 a(x0, 1.0f, z0), b(x1, 1.0f, z0), c(x1, 1.0f, z1), d(x0, 1.0f, z1);
@@ -41,7 +41,7 @@ inline wfpg::irradiance_records_options records_options(std::size_t rays = 1024)
 /// A wall across the unit box, from floor to ceiling.
 constexpr float wall_x = 0.55f;
 
-/// The box with that wall. A ray that begins in it has left it.
+/// The box with that wall. A ray that begins inside the wall leaves it.
 struct walled_box_caster {
   WFPG_HD wfpg::ray_hit operator()(const wfpg::ray& r) const {
     wfpg::ray_hit hit = box_caster()(r);
@@ -58,7 +58,7 @@ struct lit_mesh {
   wfpg::buffer<wfpg::uvec3, Exec> triangles;
   wfpg::buffer<wfpg::emitting_triangle, Exec> emitters;
 
-  /// The unit box; `walled`: with the wall.
+  /// The unit box, with the wall if `walled`.
   lit_mesh(const Exec& exec, const std::vector<wfpg::emitting_triangle>& lamps, bool walled = false)
       : emitters(exec, lamps) {
     std::vector<vec3> points = box_positions();
@@ -80,7 +80,7 @@ struct lit_mesh {
   }
 };
 
-/// Begins a sample, and lets the guider have a wave in it.
+/// Begins a sample, and gives the guider a wave in it.
 template <class Guider, class Exec, class Caster>
 void begin_with_wave(const Exec& exec, Guider& guider, const Caster& caster) {
   guider.begin_sample();
@@ -100,7 +100,7 @@ struct record_at {
   }
 };
 
-/// The record of a place.
+/// The record at a place.
 template <class Exec>
 wfpg::irradiance_record record_of(const Exec& exec, const wfpg::irradiance_records_view& view, vec3 place) {
   return evaluate(exec, std::vector<vec3>{place}, record_at{view})[0];
@@ -118,7 +118,7 @@ std::vector<std::uint64_t> everything(const Exec& exec, const wfpg::irradiance_r
   return result;
 }
 
-/// The middles of the octree's voxels, empty ones too.
+/// The centres of the octree's voxels, empty ones too.
 inline std::vector<vec3> voxel_centres(const wfpg::voxel_grid& grid) {
   const std::uint32_t n = grid.resolution;
   std::vector<vec3> places;

@@ -1,4 +1,4 @@
-// What the tests of the renderer's files and scenes share: a temporary folder and checks of a scene.
+// Shared by the tests of the renderer's files and scenes: a temporary folder and checks of a scene.
 #pragma once
 
 #include "scene/scene.hpp"

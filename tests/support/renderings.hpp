@@ -21,9 +21,9 @@ namespace wfpg_test {
 
 inline constexpr int tiles = 8;        // along a side
 inline constexpr int tile_pixels = 4;  // along a tile's side
-inline constexpr int renderings = 24;  // independent, of each method, as a rule
+inline constexpr int renderings = 24;  // independent ones, by default for each method
 
-/// What a rendering is of, and how.
+/// A rendering's scene and options.
 struct rendering {
   std::string scene;
   bool nee = true;
@@ -34,16 +34,16 @@ struct rendering {
   wfpg::sarsa_update update = wfpg::sarsa_update::sarsa;
   wfpg::sarsa_sampler sampler = wfpg::sarsa_sampler::mixed_rejection;
   render::cones through = render::cones::scene;
-  bool settled = false;  ///< so long that in its second half fewer waves make fields and fewer samples teach
-  bool precise = false;  ///< of more samples, see check_precisely()
+  bool warmed_up = false;  ///< after warm-up: fewer waves make fields and fewer samples are recorded
+  bool precise = false;    ///< more samples, see check_precisely()
 
-  /// Independent renderings: fewer of those that are so long that they have little noise.
-  int count() const { return precise && settled ? renderings * 2 / 3 : renderings; }
+  /// The number of independent renderings. Long ones have little noise and need fewer.
+  int count() const { return precise && warmed_up ? renderings * 2 / 3 : renderings; }
   /// Samples a pixel of one rendering.
   int samples() const {
-    if (!precise) return settled ? 64 : 12;
-    if (method == render::sampling_method::pt) return nee ? 96 : 192;  // made once for all checks
-    if (settled) return 64;
+    if (!precise) return warmed_up ? 64 : 12;
+    if (method == render::sampling_method::pt) return nee ? 96 : 192;  // rendered once for all checks
+    if (warmed_up) return 64;
     const bool noisy = mode == render::guiding::plain || method == render::sampling_method::records;
     if (noisy) return nee ? 64 : 128;
     return nee && method != render::sampling_method::sarsa ? 24 : 32;
@@ -61,7 +61,7 @@ struct rendering {
     options.max_depth = 6;
     options.spp = samples();
     options.octree_resolution = 32;
-    if (settled) {  // leaves, and values, that want no more than a part of the paths
+    if (warmed_up) {  // so few leaves and values need only a fraction of the paths
       options.octree_resolution = 16;
       options.deposits_per_leaf = 1;
       options.sarsa.values_per_direction = 1;
@@ -81,14 +81,14 @@ struct rendering {
     options.records.octree_resolution = 32;
     options.records.record_level = 3;
     options.records.emitter_rays = 1 << 14;
-    // What quadtrees have learnt of so little leaves tails of noise that a t-test does not expect.
+    // Quadtrees with so little data have tails of noise that break a t-test.
     if (method == render::sampling_method::openpgl_dqt) options.guide_fraction = 0.3f;
     return options;
   }
   std::string name() const {
     const std::string view = scene + (where == render::device::cuda ? " on cuda" : "") + ", " +
-                             (settled ? "settled, " : "") + "next-event estimation " + (nee ? "on" : "off") +
-                             ", ";
+                             (warmed_up ? "warmed up, " : "") + "next-event estimation " +
+                             (nee ? "on" : "off") + ", ";
     if (method == render::sampling_method::sarsa)
       return view + "SARSA grid, update " + render::name_of(render::sarsa_update_names(), update) +
              ", sampler " + render::name_of(render::sarsa_sampler_names(), sampler);
@@ -114,8 +114,8 @@ inline std::vector<double> tiles_of(const render::image& picture) {
   return result;
 }
 
-/// The tiles of renderings with `count` seeds from `first_seed` on: those of other seeds are independent.
-/// Waves as small as these keep one core of a CPU busy, so that two pictures are rendered at once.
+/// Tiles of renderings with `count` seeds from `first_seed` on. Other seeds are independent. Such small waves
+/// keep one core busy, so two pictures are rendered at once.
 inline tile_means render_tiles(const render::render_options& options, const std::string& scene,
                                std::uint64_t first_seed, int count) {
   const render::scene world = make_test_scene(scene);
@@ -138,7 +138,7 @@ inline tile_means render_tiles(const render::render_options& options, const std:
   return result;
 }
 
-/// Of path tracing on the CPU, made once. `max_depth` 2: direct light alone; 0: all.
+/// Tiles of path tracing on the CPU, rendered once. `max_depth` 2: only direct light; 0: all light.
 inline const tile_means& unguided_tiles(const rendering& like, int factor, int max_depth = 0) {
   static std::map<std::tuple<std::string, bool, bool, int, int>, tile_means> made;
   const auto key = std::make_tuple(like.scene, like.nee, like.precise, factor, max_depth);
@@ -152,7 +152,7 @@ inline const tile_means& unguided_tiles(const rendering& like, int factor, int m
   return made.emplace(key, render_tiles(options, like.scene, first_seed, factor * renderings)).first->second;
 }
 
-/// Checks that the mean of what is rendered is path tracing's on the CPU, and gives what was.
+/// Checks that a rendering has the mean of path tracing on the CPU. Returns its tiles.
 inline tile_means check_rendering(const rendering& what) {
   const auto render = [&](int factor) {
     const auto first_seed = static_cast<std::uint64_t>(500 * (factor - 1));
@@ -167,8 +167,8 @@ inline tile_means check_rendering(const rendering& what) {
   return once;
 }
 
-/// Checks that in the bright room, with so many samples that 1% of bias in indirect light is found with
-/// probability 0.99: the standard error says so, and the check rejects what has that bias planted.
+/// Checks a rendering of the bright room that would show a bias of 1% in indirect light with probability
+/// 0.99. The standard error must be that small, and the check must reject a planted bias.
 inline void check_precisely(rendering what) {
   what.scene = "bright-room";
   what.precise = true;

@@ -1,4 +1,4 @@
-// What tests ask of the reports of <wfpg/testing>.
+// Checks of the reports of <wfpg/testing>.
 #pragma once
 
 #include "support/catch.hpp"
@@ -12,7 +12,7 @@ namespace wfpg_test {
 
 using wfpg::testing::check_report;
 
-/// The check failed, and its message says all of these.
+/// Checks that a report is a failure whose message has all of these words.
 inline void check_names(const check_report& report, const std::vector<std::string>& words) {
   INFO(report.message);
   CHECK(!report);

@@ -1,4 +1,4 @@
-// A guider with a sarsa_grid in the unit box, and light that it is taught at one place.
+// A guider with a sarsa_grid in the unit box, and light that it learns at one place.
 #pragma once
 
 #include "support/evaluate.hpp"
@@ -33,7 +33,7 @@ inline const char* name_of(wfpg::sarsa_update update) {
   return sarsa_update_names[static_cast<int>(update)];
 }
 
-/// Learns as it goes, from all paths.
+/// Options to learn from all paths.
 inline wfpg::sarsa_grid_options sarsa_options(std::size_t paths) {
   wfpg::sarsa_grid_options options;
   options.max_paths = paths;
@@ -47,7 +47,7 @@ inline wfpg::sarsa_grid_options sarsa_options(std::size_t paths) {
   return options;
 }
 
-/// Paths from one point along random directions, which find the radiance that `light` says.
+/// Paths from one point along random directions. `light` gives the radiance that they find.
 template <class Light>
 struct find_light {
   wfpg::path_recorder_view recorder;
@@ -64,7 +64,7 @@ struct find_light {
   }
 };
 
-/// A sample in which the guider learns the light at a point.
+/// Runs a sample in which the guider learns the light at a point.
 template <class Exec, class Light>
 void teach(const Exec& exec, sarsa_guider<Exec>& guider, vec3 from, const Light& light) {
   guider.begin_sample();
@@ -73,25 +73,25 @@ void teach(const Exec& exec, sarsa_guider<Exec>& guider, vec3 from, const Light&
   guider.end_sample();
 }
 
-/// Light from everywhere, and much of it from about a direction.
+/// Light from everywhere, and most of it from around one direction.
 struct bright_spot {
   vec3 toward;
-  float width = 0.9f;  // cosine of the spot's
+  float width = 0.9f;  // cosine of the spot's angle
   WFPG_HD float operator()(vec3 d) const {
     return 0.3f + 0.2f * d.x * d.y + (glm::dot(d, toward) > width ? 20.0f : 0.0f);
   }
 };
 
-/// The unit box as a furnace: walls that emit 1 and reflect 0.8, so that 5 arrives everywhere.
+/// The unit box as a furnace: walls emit 1 and reflect 0.8, so the radiance is 5 everywhere.
 constexpr float furnace_radiance = 1.0f / (1.0f - 0.8f);
 
-/// Of the paths as many go on as light does.
+/// The fraction of paths that continue equals the albedo.
 struct furnace {
   static constexpr float survival = 0.8f;
   WFPG_HD float operator()(vec3) const { return 1.0f; }
 };
 
-/// Samples of paths in the furnace, as long as they get.
+/// Traces samples of paths in the furnace, up to the maximal depth.
 template <class Exec>
 void trace_in_furnace(const Exec& exec, sarsa_guider<Exec>& guider, std::uint32_t samples) {
   const paths_to_trace what{samples, guider.options().max_paths, guider.options().max_depth - 1,
@@ -107,7 +107,7 @@ struct radiance_toward {
   }
 };
 
-/// Mean radiance that a grid knows to arrive at points of the walls from all around.
+/// The grid's mean incident radiance at points on the walls, over all directions.
 template <class Exec>
 double mean_radiance(const Exec& exec, const sarsa_guider<Exec>& guider) {
   constexpr std::size_t n = 20000;

@@ -1,6 +1,6 @@
-// A host renderer in miniature: the unit box from inside, whose hits are known exactly, as ray casters of
-// both forms; a BSDF of several kinds; surfaces and random numbers from arrays and hashes; a counting memory
-// resource.
+// A small host renderer: the unit box from inside, whose hits are known exactly. It has ray casters of both
+// forms, a BSDF of several kinds, and surfaces and random numbers from arrays and hashes. Also a counting
+// memory resource.
 #pragma once
 
 #include "support/deposits.hpp"
@@ -31,7 +31,7 @@ enum class bsdf_kind : std::uint32_t {
   black,    ///< sampling always fails
 };
 
-/// A BSDF of one of the kinds, around a shading normal.
+/// A BSDF of one of these kinds, around a shading normal.
 struct test_bsdf {
   bsdf_kind kind = bsdf_kind::lambert;
   vec3 normal{0.0f, 0.0f, 1.0f};
@@ -83,7 +83,7 @@ WFPG_HD inline test_surface make_surface(vec3 position, vec3 normal, vec3 outgoi
   return {position, normal, normal, outgoing, {kind, normal}, true};
 }
 
-/// Surfaces that lie in an array.
+/// Surfaces in an array.
 struct stored_surfaces {
   wfpg::array_view<const test_surface> surfaces;
   WFPG_HD test_surface operator()(std::uint32_t ray) const { return surfaces[ray]; }
@@ -132,8 +132,8 @@ struct box_mesh {
   }
 };
 
-/// Inline: the face that a ray from inside the unit box hits. With `open_top` rays leave through y = 1 and
-/// meet an environment of radiance 5.
+/// Inline caster: returns the face that a ray from inside the unit box hits. With `open_top`, rays leave
+/// through y = 1 and see an environment of radiance 5.
 struct box_caster {
   bool open_top = false;
 
@@ -154,7 +154,7 @@ struct box_caster {
   }
 };
 
-/// Batch: the same hits. Counts calls and rays; throws std::runtime_error at a call on request.
+/// Batch caster with the same hits. Counts calls and rays. Throws std::runtime_error at a chosen call.
 struct batch_box_caster {
   struct log {
     std::size_t calls = 0, rays = 0, largest = 0;
@@ -175,7 +175,7 @@ struct batch_box_caster {
   }
 };
 
-/// `n` surfaces on the six walls, at random, seen from inside.
+/// `n` surfaces at random places on the six walls, seen from inside.
 inline std::vector<test_surface> wall_surfaces(std::size_t n, std::uint64_t seed,
                                                bsdf_kind kind = bsdf_kind::lambert) {
   random_numbers random(seed);
@@ -191,8 +191,8 @@ inline std::vector<test_surface> wall_surfaces(std::size_t n, std::uint64_t seed
   return result;
 }
 
-/// Deposits `radiance(face, u, v)`, a function on the host, toward the inside, on a grid of n² points on each
-/// face.
+/// Deposits `radiance(face, u, v)`, a host function, on a grid of n² points on each face. Light leaves toward
+/// the inside.
 template <class Exec, class Radiance>
 void deposit_on_walls(const Exec& exec, const wfpg::exitance_cache_view& cache, int n,
                       const Radiance& radiance) {
@@ -205,7 +205,7 @@ void deposit_on_walls(const Exec& exec, const wfpg::exitance_cache_view& cache, 
   deposit_all(exec, cache, light);
 }
 
-/// Counts what is asked of a resource.
+/// Counts allocations and bytes of a resource.
 class counting_resource : public wfpg::memory_resource {
  public:
   explicit counting_resource(wfpg::memory_resource* upstream = default_resource()) : upstream_(upstream) {}

@@ -1,5 +1,5 @@
-// Files of sections as bytes, taken apart and put together by what their header documents rather than by the
-// library's own reader.
+// Files of sections as bytes. Takes them apart and joins them by their documented format, without the
+// library's reader.
 #pragma once
 
 #include "support/catch.hpp"
@@ -53,7 +53,7 @@ inline section_place section_of(const std::string& bytes, const std::string& nam
   return {};
 }
 
-/// The same file with another payload in a section, and right checksums.
+/// The same file with another payload in a section, and correct checksums.
 inline std::string with_payload(const std::string& bytes, const std::string& name,
                                 const std::string& payload) {
   const section_place place = section_of(bytes, name);
@@ -69,7 +69,7 @@ inline std::string payload_of(const std::string& bytes, const std::string& name)
   return bytes.substr(place.payload, place.size);
 }
 
-/// The same file with another number in a section, at so many bytes from its beginning.
+/// The same file with another number in a section, `at` bytes from its beginning.
 inline std::string with_number(const std::string& bytes, const std::string& name, std::size_t at,
                                std::size_t n, std::uint64_t value) {
   std::string payload = payload_of(bytes, name);

@@ -1,5 +1,5 @@
-// What every sampler of directions has to pass: its frequencies, its energy, its moments, and that it reports
-// the density that it answers when asked. Made of <wfpg/testing>'s own parts.
+// Checks that every sampler of directions must pass: frequencies, energy, moments, and densities of queries.
+// Built from the parts of <wfpg/testing>.
 #pragma once
 
 #include "support/chi_square.hpp"
@@ -17,13 +17,13 @@
 
 namespace wfpg_test {
 
-/// A direction, and the density per steradian that the sampler says it drew it with.
+/// A sampled direction, and the density per steradian that the sampler reports.
 struct drawn_direction {
   wfpg::vec3 direction{0.0f};
   float pdf = 0.0f;
 };
 
-/// The densities of directions that a function on the host gives one by one.
+/// Densities of directions, from a host function called one by one.
 template <class F>
 auto each(const F& f) {
   return [f](const std::vector<wfpg::vec3>& directions) {
@@ -33,7 +33,7 @@ auto each(const F& f) {
   };
 }
 
-/// The same of a functor that a policy runs.
+/// Densities of directions, from a functor that a policy runs.
 template <class Exec, class F>
 struct densities_by {
   Exec exec;
@@ -45,20 +45,20 @@ struct densities_by {
 template <class Exec, class F>
 densities_by(Exec, F) -> densities_by<Exec, F>;
 
-/// What was found; `frequencies` is for a chi_square_family that judges many samplers together.
+/// The result of a check. `frequencies` is for a chi_square_family that judges many samplers together.
 struct sampler_report : wfpg::testing::check_report {
   chi_square_result frequencies;
 };
 
 struct sampler_check_options {
-  double total = 1.0;            ///< what the density integrates to: the share of samples that succeed
-  double tolerance = 1.0e-3;     ///< of that integral, beside the quadrature's own error
-  float query = 1.0e-5f;         ///< relative, between a reported density and the one asked for
-  double significance = 1.0e-3;  ///< the probability that a correct sampler is rejected, about
-  bool moments = true;           ///< six more quadratures, each as long as all else
+  double total = 1.0;            ///< integral of the density: the fraction of samples that succeed
+  double tolerance = 1.0e-3;     ///< of that integral, beyond the quadrature's own error
+  float query = 1.0e-5f;         ///< relative error between reported and queried densities
+  double significance = 1.0e-3;  ///< approximate probability that a correct sampler is rejected
+  bool moments = true;           ///< six more quadratures, which double the time
 };
 
-/// Checks one sampler; the first that fails is in words.
+/// Checks one sampler. The message describes the first check that fails.
 ///   query        a direction has unit length, and a positive density that is pdf() of it
 ///   energy       pdf() integrates to `total`
 ///   frequencies  chi² of directions over adaptive bins of the sphere, pooled where fewer than 5 are expected
@@ -92,7 +92,7 @@ class sampler_check {
   using bins_type = wfpg::testing::sphere_bins;
   static constexpr double tests = 7.0;  // frequencies and moments share the significance
 
-  /// Of pdf() times `factor`, at least 0.
+  /// Integral of pdf() times `factor`, at least 0.
   template <class Factor>
   bins_type integrate(const Factor& factor) const {
     const auto values = [&](const std::vector<wfpg::vec3>& directions) {
@@ -139,7 +139,7 @@ class sampler_check {
   std::string moments(const bins_type& bins) const {
     for (int k = 0; k < 6; ++k) {
       const bool square = k >= 3;
-      // Of a quantity in [0, 1], which a quadrature takes.
+      // Compares a quantity in [0, 1] with its quadrature.
       const auto quantity = [&](wfpg::vec3 d) {
         const float c = d[k % 3];
         return square ? c * c : 0.5f * (1.0f + c);
@@ -164,20 +164,20 @@ class sampler_check {
   std::vector<wfpg::vec3> hints_, counted_;
 };
 
-/// The same in one call. `pdf`: (const std::vector<vec3>&) -> std::vector<float>.
+/// Checks a sampler in one call. `pdf`: (const std::vector<vec3>&) -> std::vector<float>.
 template <class Density>
 sampler_report check_sampler(const std::vector<drawn_direction>& drawn, const Density& pdf,
                              const sampler_check_options& options = {}) {
   return sampler_check<Density>(drawn, pdf, options).run();
 }
 
-/// Means of a picture's tiles, and of the whole picture, over independent renderings of one method, each with
+/// Means of a picture's tiles, and of the whole picture, over independent renderings of one method. Each has
 /// its own variance.
 class tile_means {
  public:
   explicit tile_means(std::size_t tiles) : tiles_(tiles) {}
 
-  /// The tiles of one rendering.
+  /// Adds the tiles of one rendering.
   void add(const std::vector<double>& tiles) {
     ++renderings_;
     for (std::size_t i = 0; i < tiles_.size(); ++i) tiles_[i].add(tiles[i]);
@@ -187,11 +187,11 @@ class tile_means {
   std::size_t size() const { return tiles_.size(); }
   double mean(std::size_t tile) const { return mean(tiles_[tile]); }
   double variance_of_mean(std::size_t tile) const { return variance_of_mean(tiles_[tile]); }
-  /// Of all tiles together: what is independent from tile to tile cancels.
+  /// Mean of all tiles together. Noise that is independent between tiles averages out.
   double picture_mean() const { return mean(picture_); }
   double variance_of_picture_mean() const { return variance_of_mean(picture_); }
 
-  /// As if each rendering had `factor` times its light beyond `rest`, a known mean of each tile.
+  /// The means if each rendering had `factor` times its light beyond `rest`, a known mean of each tile.
   tile_means scaled_beyond(const std::vector<double>& rest, double factor) const {
     tile_means result = *this;
     for (std::size_t i = 0; i < size(); ++i)
@@ -228,25 +228,25 @@ class tile_means {
   moments picture_;
 };
 
-/// Beyond this many standard errors two pictures' means differ: of correct ones 4 in 1000 do, with 24
-/// renderings of each.
+/// The means of two pictures differ if they are farther apart than this many standard errors. Of correct ones
+/// 4 in 1000 do, with 24 renderings of each.
 inline constexpr double picture_threshold = 3.2;
 
-/// The standard error of the difference between two methods' pictures, all tiles together.
+/// The standard error of the difference between two methods' pictures, over all tiles.
 inline double picture_error(const tile_means& truth, const tile_means& tested) {
   return std::sqrt(truth.variance_of_picture_mean() + tested.variance_of_picture_mean());
 }
 
-/// The bias that check_unbiased() finds in a picture's mean with probability 0.99: 2.33 standard errors
+/// The bias that check_unbiased() finds in a picture's mean with probability 0.99. It is 2.33 standard errors
 /// beyond the threshold.
 inline double found_bias(const tile_means& truth, const tile_means& tested) {
   return (picture_threshold + 2.33) * picture_error(truth, tested);
 }
 
-/// Checks that two renderers have one mean, by tiles that each know their variance. With some 20 renderings
-/// or more of each, Student's t exceeds 6 in no tile of correct ones and 4 in 0.02% of them. A bias too small
-/// for one tile shows in all of them together: in the picture's mean where it has one sign, and else in the
-/// mean of t², which is 1 within four standard errors.
+/// Checks that two renderers have the same mean, by tiles with known variances. With 20 renderings or more of
+/// each, Student's t of correct ones exceeds 6 in no tile and 4 in 0.02% of them. A bias too small for one
+/// tile shows in all together. If its sign is constant it shows in the picture's mean. Otherwise it shows in
+/// the mean of t², which is 1 within four standard errors.
 inline wfpg::testing::check_report check_unbiased(const tile_means& truth, const tile_means& tested) {
   double sum_of_squares = 0.0, count = 0.0, beyond = 0.0;
   for (std::size_t tile = 0; tile < truth.size(); ++tile) {
@@ -279,10 +279,10 @@ inline wfpg::testing::check_report check_unbiased(const tile_means& truth, const
   return {};
 }
 
-/// The same of renderers that render for it. Of correct ones a check of 64 tiles fails by chance once in 55
-/// times, so that one that fails is made anew with four times as many renderings: a bias is twice as many
-/// standard errors there, and chance does not come back. `truth` and `tested`: (int factor) -> tile_means of
-/// `factor` times as many renderings as suffice, independent of those of another factor.
+/// Checks that two renderers have the same mean, and repeats a failed check. A check of 64 tiles of correct
+/// renderers fails by chance once in 55 times. The repetition has four times as many renderings, so a bias is
+/// twice as many standard errors. `truth` and `tested` are functions (int factor) -> tile_means. They return
+/// `factor` times the usual renderings, independent of those of another factor.
 template <class Truth, class Tested>
 wfpg::testing::check_report check_renderers_unbiased(const Truth& truth, const Tested& tested) {
   const wfpg::testing::check_report report = check_unbiased(truth(1), tested(1));

@@ -1,4 +1,4 @@
-// Samples of a small guider in all forms of calls, step by step, so that a test lets one of the steps fail.
+// Samples of a small guider in all forms of calls, step by step, so that a test can make any step fail.
 #pragma once
 
 #include "support/evaluate.hpp"
@@ -14,10 +14,10 @@
 
 namespace wfpg_test {
 
-/// Of one sample.
+/// The number of paths in the largest sample.
 constexpr std::size_t most_paths = 1500;
 
-/// Little, since it is sampled anew for each thing that fails.
+/// Small options, since a test samples again for each failure.
 inline guider_options stepwise_options(field_lifetime lifetime, std::uint32_t products) {
   guider_options options = tracing_options(most_paths, wfpg::guiding_mode::oriented, lifetime);
   options.octree_resolution = 8;
@@ -31,7 +31,7 @@ inline guider_options stepwise_options(field_lifetime lifetime, std::uint32_t pr
   return options;
 }
 
-/// f(options) of both lifetimes, with and without products.
+/// Calls f(options) for both lifetimes, with and without products.
 template <class F>
 void for_each_stepwise_options(const F& f) {
   for (const field_lifetime lifetime : lifetimes)
@@ -63,8 +63,8 @@ struct choose_lights {
   }
 };
 
-/// Samples in all forms of calls, step by step, each with more paths than the one before it, so that it
-/// allocates; what hosts allocate themselves is not of the guider's resource.
+/// Samples in all forms of calls, step by step. Each sample has more paths than the one before, so that it
+/// allocates. Allocations of the host do not use the guider's resource.
 template <class Exec, class Guide = either_guide<Exec>>
 class stepwise_samples {
  public:
@@ -72,7 +72,7 @@ class stepwise_samples {
 
   explicit stepwise_samples(wfpg::path_guider<Exec, Guide>& guider) : guider_(guider) {}
 
-  /// Directions that were drawn.
+  /// The directions sampled so far.
   const std::vector<wfpg::sampled_direction>& drawn() const { return drawn_; }
 
   void start(std::uint32_t sample) {
@@ -139,7 +139,7 @@ struct density_of_view {
   }
 };
 
-/// A whole sample: some rays are guided, and each direction has the density that the fields give it.
+/// Runs a whole sample. Some rays must be guided, and each direction must have its field's density.
 template <class Exec, class Guide>
 void check_guides(wfpg::path_guider<Exec, Guide>& guider) {
   const Exec exec;
@@ -147,7 +147,7 @@ void check_guides(wfpg::path_guider<Exec, Guide>& guider) {
   const wave_of_surfaces<Exec> wave(exec, surfaces);
   const wfpg::buffer<wfpg::sampled_direction, Exec> drawn(exec, surfaces.size());
   guider.begin_sample();
-  for (int settle = 0; settle < 4; ++settle) guider.prepare(wave.get(), box_caster{});
+  for (int warm_up = 0; warm_up < 4; ++warm_up) guider.prepare(wave.get(), box_caster{});
   guider.sample_directions(wave.get(), box_caster{}, drawn.view());
   const wfpg::guide_view view = guider.prepare(wave.get(), box_caster{});
   CHECK(count_guided(exec, view, surfaces.size()) > 100);

@@ -38,7 +38,7 @@ class temporary_folder {
   std::filesystem::path path_;
 };
 
-/// How many entries a folder has.
+/// The number of entries in a folder.
 inline std::size_t files_in(const temporary_folder& folder) {
   const std::filesystem::directory_iterator entries(folder.path());
   return static_cast<std::size_t>(std::distance(begin(entries), end(entries)));

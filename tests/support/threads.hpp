@@ -1,4 +1,4 @@
-// The same work by other numbers of threads.
+// Repeats work with several numbers of threads.
 #pragma once
 
 #include "support/policies.hpp"
@@ -12,8 +12,8 @@
 
 namespace wfpg_test {
 
-/// f(in words) with one, two and five threads of TBB and of OpenMP. On a GPU, whose threads run in another
-/// order every time anyway, three times.
+/// Calls f(description) with one, two and five threads of TBB and of OpenMP. On a GPU it calls f three times,
+/// since its threads run in another order every time.
 template <class F>
 void with_threads(const F& f) {
 #if defined(__CUDACC__)

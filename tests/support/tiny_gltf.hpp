@@ -1,4 +1,4 @@
-// A .gltf or .glb of one triangle whose parts a test replaces, good or hostile.
+// A .gltf or .glb file of one triangle. A test replaces its parts, valid or hostile.
 #pragma once
 
 #include "scene/gltf_loader.hpp"
@@ -35,8 +35,8 @@ std::string raw(const std::vector<T>& values) {
   return bytes;
 }
 
-/// A .gltf of one triangle, whose parts a test replaces. Buffer: 36 bytes of positions, 6 of indices, 2
-/// unused.
+/// A .gltf of one triangle, whose parts a test replaces. Its buffer has 36 bytes of positions, 6 of indices
+/// and 2 unused.
 struct tiny_gltf {
   std::string buffer = raw<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}) + raw<std::uint16_t>({0, 1, 2, 0});
   std::map<std::string, std::string> parts = {
@@ -65,7 +65,7 @@ struct tiny_gltf {
     return text + R"("buffers": [{"byteLength": )" + std::to_string(buffer.size()) + uri + "}]}";
   }
 
-  /// The same as a binary file.
+  /// The same content as a binary file.
   std::string glb() const {
     std::string text = json(false);
     text.resize((text.size() + 3) / 4 * 4, ' ');
@@ -80,7 +80,7 @@ struct tiny_gltf {
     return render::load_gltf(folder.write("tiny.gltf", json()));
   }
 
-  /// The message of the error that loading throws.
+  /// The message of the error when it is loaded.
   std::string error() const { return error_of(json()); }
 
   static std::string error_of(const std::string& content) {

@@ -1,4 +1,4 @@
-// Finished renderings in a directory: what an interrupted run has done is not done again.
+// Finished renderings in a directory, so that an interrupted run does not repeat them.
 #pragma once
 
 #include "app/image_io.hpp"
@@ -12,9 +12,9 @@
 
 namespace quality {
 
-/// What tells a rendering from all others, with a name for people.
+/// Identifies a rendering, with a name for people.
 struct run_key {
-  std::string label;  ///< the beginning of the files' names
+  std::string label;  ///< prefix of the files' names
   json content;       ///< an object; all that the result depends on
 
   std::string hash() const { return hash_of(content.dump()); }
@@ -25,18 +25,18 @@ struct cache_entry {
   std::optional<render::image> picture;
 };
 
-/// A JSON file a rendering, and an OpenEXR beside it where it has a picture. A file appears under its name
-/// when it is complete; the JSON is last. One that is damaged is warned of and counts as absent.
+/// Stores a JSON file per rendering, and an OpenEXR if it has a picture. A file gets its name when it is
+/// complete, the JSON last. A damaged rendering causes a warning and counts as absent.
 class run_cache {
  public:
-  /// Makes the directory. Warnings go to `log`, which outlives the cache. Throws std::invalid_argument where
+  /// Makes the directory. Warnings go to `log`, which must outlive the cache. Throws std::invalid_argument if
   /// files cannot be made in it.
   run_cache(std::filesystem::path directory, std::ostream& log);
 
-  /// Whether it looks finished; find may still see damage.
+  /// Whether a rendering looks finished. find() may still find damage.
   bool contains(const run_key& key) const;
 
-  /// `read(entry)` of a finished rendering. What `read` throws counts as damage.
+  /// Returns `read(entry)` of a finished rendering. An exception of `read` counts as damage.
   template <class Read>
   auto find(const run_key& key, const Read& read) const
       -> std::optional<decltype(read(std::declval<cache_entry&>()))> {

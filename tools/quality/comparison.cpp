@@ -34,7 +34,7 @@ measured_run measure_run(const planned_measurement& planned, const render::scene
   return result;
 }
 
-/// By method, the mean over seeds.
+/// The mean over seeds, by method.
 std::vector<single_samples> measure_single(const settings& given, const scene_plan& plan,
                                            const render::scene& scene, const reference& truth, runner& runs) {
   std::vector<std::vector<single_samples>> by_method(given.methods.size());
@@ -52,7 +52,7 @@ std::vector<single_samples> measure_single(const settings& given, const scene_pl
   return means;
 }
 
-/// Of all runs, and of the reference's halves; nothing where there is no HDR-FLIP.
+/// Adds the errors of all runs and returns that of the reference's halves. Nothing without HDR-FLIP.
 std::optional<double> add_flip(std::vector<measured_run>& runs, const reference_files& files,
                                const fs::path& folder) {
   std::vector<std::pair<fs::path, fs::path>> pairs{{files.halves[0], files.halves[1]}};

@@ -1,4 +1,4 @@
-// One scene, planned and measured: its reference, its renderings, their errors, pictures and plots.
+// Plans and measures one scene: its reference, renderings, errors, pictures and plots.
 #pragma once
 
 #include "reference.hpp"
@@ -9,7 +9,7 @@
 
 namespace quality {
 
-/// A rendering and its place among methods, budgets and seeds.
+/// A rendering and its indices of method, budget and seed.
 struct planned_measurement {
   planned_run run;
   std::size_t method = 0, budget = 0;
@@ -21,17 +21,17 @@ struct scene_plan {
   std::string identity;
   reference_plan reference;
   std::vector<planned_measurement> runs;
-  std::vector<planned_measurement> single_samples;  ///< budget is not used
+  std::vector<planned_measurement> single_samples;  ///< the budget is unused
 
-  /// In the order in which they are done.
+  /// All renderings in the order of work.
   std::vector<planned_run> all() const;
 };
 
-/// `scene` is complete. Throws std::invalid_argument where a crop is not within its pictures.
+/// `scene` must be complete. Throws std::invalid_argument if a crop exceeds its pictures.
 scene_plan plan_scene(const settings& given, const scene_choice& scene);
 
-/// Does what is planned, writes pictures and plots to the output directory, and returns what results.json
-/// says of the scene. Throws what rendering and writing throw.
+/// Executes the plan, writes pictures and plots to the output directory, and returns the scene's part of
+/// results.json. Throws what rendering and writing throw.
 json measure_scene(const settings& given, const scene_plan& plan, runner& runs);
 
 }  // namespace quality

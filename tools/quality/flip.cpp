@@ -1,4 +1,4 @@
-// The script flip.py, which the build embeds, and what it answers.
+// Runs the script flip.py, which the build embeds, and reads its answer.
 #include "flip.hpp"
 
 #include "app/output_files.hpp"
@@ -16,14 +16,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// For a POSIX shell.
+/// Quotes a path for a POSIX shell.
 std::string quoted(const fs::path& path) {
   std::string result = "'";
   for (const char c : path.string()) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return result + "'";
 }
 
-/// Files that are gone when it is.
+/// Temporary files that are deleted at its end.
 class exchange {
  public:
   explicit exchange(const fs::path& folder)

@@ -1,5 +1,5 @@
-"""HDR-FLIP of pairs of pictures. usage: python3 flip.py PAIRS.json OUT.json; exit code 3 where flip-evaluator
-or numpy, which it hands pictures over in, are missing."""
+"""HDR-FLIP of pairs of pictures. usage: python3 flip.py PAIRS.json OUT.json
+The exit code is 3 if flip-evaluator is missing, or numpy, whose arrays hold the pictures."""
 import json
 import math
 import sys

@@ -1,4 +1,4 @@
-// Tables of GitHub's kind.
+// Tables in GitHub's Markdown.
 #include "markdown.hpp"
 
 #include "summary.hpp"
@@ -14,7 +14,7 @@ std::string formatted(const char* format, double value) {
   return text;
 }
 
-/// "1.2e-03 ± 4e-05", with a mark where the reference's noise is large.
+/// "1.2e-03 ± 4e-05", with a mark if the reference's noise is large.
 std::string error_cell(const json& error) {
   if (error["mean"].is_null()) return "hidden \\*";
   std::string cell = formatted("%.3g", error["mean"]);
@@ -85,7 +85,7 @@ std::string table_of(const json& budget) {
   return table;
 }
 
-/// Whether means agree, where there are seeds enough to tell.
+/// Whether means agree, if there are enough seeds.
 std::string agreement_of(const json& budget) {
   std::string text;
   for (const json& method : budget["methods"]) {
@@ -113,7 +113,7 @@ std::string non_finite_warning(const json& budget) {
   return text;
 }
 
-/// Errors after all samples, by the way to combine them, with the reference's noise in them.
+/// Errors after all samples, by combination of samples. They include the reference's noise.
 std::string combinations_of(const json& single) {
   std::string table;
   for (const auto& [method, samples] : single.items())

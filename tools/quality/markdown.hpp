@@ -1,4 +1,4 @@
-// results.md from results.json's content.
+// Makes results.md from the content of results.json.
 #pragma once
 
 #include "system.hpp"
@@ -7,7 +7,7 @@
 
 namespace quality {
 
-/// A table a scene and budget, pictures and plots beside it.
+/// A table per scene and budget, with pictures and plots.
 std::string markdown_of(const json& results);
 
 }  // namespace quality

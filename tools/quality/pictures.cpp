@@ -1,4 +1,4 @@
-// Crops and colours.
+// Crops and colours of pictures.
 #include "pictures.hpp"
 
 #include "app/colour_map.hpp"
@@ -14,16 +14,16 @@ namespace {
 using render::vec3;
 
 constexpr float middle = 0.25f;  // about half of sRGB's range
-constexpr double shown_share = 0.99;
+constexpr double shown_fraction = 0.99;
 constexpr int least_crop = 24;
 
-double percentile(std::vector<double> values, double share) {
-  const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
+double percentile(std::vector<double> values, double fraction) {
+  const auto at = values.begin() + std::ptrdiff_t(fraction * double(values.size() - 1));
   std::nth_element(values.begin(), at, values.end());
   return *at;
 }
 
-/// Sums over the rectangles from the upper left corner, one row and one column of zeros before them.
+/// Sums over the rectangles from the upper left corner. The first row and column are zeros.
 std::vector<double> summed_area(const std::vector<double>& errors, int width, int height) {
   double greatest = 0.0;
   for (const double e : errors)
@@ -82,7 +82,7 @@ double shown_greatest(const std::vector<double>& errors) {
   std::vector<double> positive;
   for (const double e : errors)
     if (e > 0.0 && std::isfinite(e)) positive.push_back(e);
-  return positive.empty() ? 1.0 : percentile(std::move(positive), shown_share);
+  return positive.empty() ? 1.0 : percentile(std::move(positive), shown_fraction);
 }
 
 render::image framed(render::image picture, const window& at, float exposure) {

@@ -17,7 +17,7 @@ namespace {
 
 constexpr int failure = 2;
 
-/// A tiny picture by each method, so that options or devices that cannot be are found before hours of others.
+/// Renders a tiny picture by each method. This finds invalid options or devices before hours of work.
 void try_methods(const settings& given) {
   const render::scene furnace = render::make_builtin_scene("furnace");
   for (const method& sampled : given.methods) {

@@ -1,4 +1,4 @@
-// Estimates from what renderings of the same scene and method took; of others, from all.
+// Estimates times from renderings of the same scene and method, or from all.
 #include "progress.hpp"
 
 #include <cmath>

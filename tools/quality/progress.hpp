@@ -1,4 +1,4 @@
-// How many renderings are left and about how long they take.
+// How many renderings are left, and about how long they take.
 #pragma once
 
 #include "cache.hpp"
@@ -14,24 +14,24 @@ namespace quality {
 /// "45 s", "3 min", "2.5 h".
 std::string title_of_seconds(double seconds);
 
-/// Counts planned renderings down, in the order in which they are done; a line to `log` for each.
+/// Counts planned renderings down in the order of work. Writes a line to `log` for each.
 class run_progress {
  public:
-  /// Those that the cache has take no time. `log` outlives this.
+  /// Renderings in the cache take no time. `log` must outlive this.
   run_progress(const std::vector<planned_run>& planned, const run_cache& cache, std::ostream& log);
 
-  /// The next rendering begins.
+  /// Call it when the next rendering begins.
   void begin(const planned_run& run);
-  /// It was in the cache.
+  /// Call it if the rendering was in the cache.
   void found(const planned_run& run);
-  /// It has taken so long.
+  /// Call it when the rendering has taken `seconds`.
   void done(const planned_run& run, double seconds);
 
  private:
-  /// Work that is left, of one rate.
+  /// Remaining work of one rate.
   struct remaining {
     double work = 0.0;     ///< samples of pixels
-    double seconds = 0.0;  ///< of renderings that have a budget in seconds
+    double seconds = 0.0;  ///< of renderings with a budget in seconds
     double done_work = 0.0, done_seconds = 0.0;
   };
 

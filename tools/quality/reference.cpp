@@ -1,4 +1,4 @@
-// Chunks of references and their mean.
+// Renders chunks of references, and averages them.
 #include "reference.hpp"
 
 #include <algorithm>
@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::array<const char*, 2> names = {"path tracing", "guided"};
 constexpr std::array<const char*, 2> arguments = {"--method pt", "--method wfpg"};
-/// Far from the seeds of what is measured.
+/// Far from the seeds of measured renderings.
 constexpr std::array<int, 2> first_seeds = {1000001, 2000001};
 
 planned_run plan_chunk(const scene_choice& scene, const std::string& identity, std::size_t half, int index,

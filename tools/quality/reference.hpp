@@ -1,5 +1,5 @@
-// References: half by path tracing and half guided, so that neither flatters itself, in chunks of different
-// random numbers, so that a long one goes on where it was interrupted.
+// References: half by path tracing and half guided, so that neither method is favoured. Each half has chunks
+// of different random numbers, so that an interrupted reference can be resumed.
 #pragma once
 
 #include "runner.hpp"
@@ -13,7 +13,7 @@ namespace quality {
 struct reference_plan {
   std::array<std::vector<planned_run>, 2> halves;
 
-  /// Tells references apart.
+  /// Identifies a reference.
   std::string hash() const;
 };
 
@@ -26,7 +26,7 @@ struct reference {
   render::image_error noise;  ///< of the picture, from its halves
 };
 
-/// Renders what the cache does not have.
+/// Renders the chunks that the cache does not have.
 reference make_reference(const reference_plan& plan, const render::scene& scene, runner& runs);
 
 }  // namespace quality

@@ -1,4 +1,4 @@
-// Takes renderings from the cache, or does them and keeps them there.
+// Takes renderings from the cache, or renders and caches them.
 #pragma once
 
 #include "cache.hpp"
@@ -11,10 +11,10 @@ namespace quality {
 
 class runner {
  public:
-  /// Both outlive the runner.
+  /// Both must outlive the runner.
   runner(const run_cache& cache, run_progress& progress) : cache_(cache), progress_(progress) {}
 
-  /// `read` of what the cache has of the run, or of what `make` gives, which is stored before.
+  /// Returns `read` of the run's cache entry. If there is none, stores the result of `make` first.
   template <class Make, class Read>
   auto get(const planned_run& run, const Make& make, const Read& read)
       -> decltype(read(std::declval<cache_entry&>())) {
@@ -38,7 +38,7 @@ class runner {
   run_progress& progress_;
 };
 
-/// What `read` of a runner throws for an entry without the picture that it should have.
+/// The picture of a cache entry. Throws if the entry lacks it or has another size.
 inline render::image& picture_of(cache_entry& entry, const render::render_options& options) {
   if (!entry.picture || entry.picture->width != options.width || entry.picture->height != options.height)
     throw std::runtime_error("its picture is missing or of another size");

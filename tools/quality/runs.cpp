@@ -8,9 +8,9 @@
 namespace quality {
 namespace {
 
-constexpr int format = 1;  // of what the cache keeps
+constexpr int format = 1;  // version of the cache's content
 
-/// JSON writes infinity as null.
+/// JSON has null for infinity.
 double number_of(const json& value) {
   return value.is_null() ? std::numeric_limits<double>::infinity() : value.get<double>();
 }
@@ -77,7 +77,7 @@ json key_of_scene(const scene_choice& scene, const std::string& identity) {
            {"height", scene.options.height},
            {"max_depth", scene.options.max_depth},
            {"nee", scene.options.nee}};
-  // References are worth finding that were made before there was a choice.
+  // References from before this option existed keep their keys.
   if (scene.options.roulette_depth != render::render_options().roulette_depth)
     key["roulette_depth"] = scene.options.roulette_depth;
   return key;

@@ -1,4 +1,4 @@
-// Strips of crops and of error maps, from the left the methods in their order; plots of means over seeds.
+// Strips of crops and of error maps, with the methods in order from the left. Plots of means over seeds.
 #include "scene_files.hpp"
 
 #include "pictures.hpp"
@@ -12,13 +12,13 @@ constexpr int gap = 4;  // pixels
 constexpr int least_side = 256;
 constexpr int first_seed = 1;
 
-/// Sums over seeds of what a rendering had after some samples.
+/// Sums over seeds of a rendering's values after some samples.
 struct sums {
   double error = 0.0, seconds = 0.0;
   int seeds = 0;
 };
 
-/// By samples, of one method and budget.
+/// Sums by number of samples, for one method and budget.
 std::map<int, sums> sums_of(const std::vector<measured_run>& runs, std::size_t method, std::size_t budget,
                             double render::image_error::*measure) {
   std::map<int, sums> result;
@@ -34,7 +34,7 @@ std::map<int, sums> sums_of(const std::vector<measured_run>& runs, std::size_t m
   return result;
 }
 
-/// Where the plots' curves come from: the budget that takes longest.
+/// The budget of the plots' curves: the one that takes longest.
 std::size_t longest_budget(const std::vector<measured_run>& runs) {
   std::size_t longest = 0;
   double seconds = -1.0;
@@ -122,7 +122,7 @@ json scene_files::write_pictures(const std::vector<measured_run>& runs, std::siz
   pictures.push_back(truth_.picture);
   for (const render::image& picture : pictures) {
     crop_row.push_back(enlarged_to(crop_of(picture), least_side));
-    // Exposed before the white gaps are added.
+    // Exposure comes first, since the gaps are white already.
     for (render::vec3& pixel : crop_row.back().pixels) pixel *= exposure;
   }
   render::write_png(path(crops).string(), render::side_by_side(crop_row, gap));
@@ -145,7 +145,7 @@ json scene_files::write_plots(const std::vector<measured_run>& runs) const {
     for (std::size_t i = 0; i < given_.methods.size(); ++i) {
       render::curve over_samples{given_.methods[i].name, {}}, over_seconds = over_samples;
       for (const auto& [samples, sum] : sums_of(runs, i, budget, m.value)) {
-        // With a budget in seconds the last samples of some seeds are others' too seldom.
+        // With a budget in seconds, not all seeds reach the last sample counts.
         if (sum.seeds != given_.seeds) continue;
         const double error = without_noise(sum.error / sum.seeds, noise, m.is_squared);
         over_samples.points.emplace_back(samples, error);

@@ -19,14 +19,14 @@ struct reference_files {
 
 class scene_files {
  public:
-  /// Writes the reference and its halves. All three arguments outlive this. Throws std::runtime_error that
-  /// names the path.
+  /// Writes the reference and its halves. All three arguments must outlive this. Throws std::runtime_error
+  /// that names the path.
   scene_files(const settings& given, const scene_choice& scene, const reference& truth);
 
   const reference_files& reference() const { return reference_; }
 
-  /// Writes pictures of the first seed, and plots; returns their names. `single` is a method's each, or
-  /// empty.
+  /// Writes pictures of the first seed, and plots. Returns their names. `single` has an element for each
+  /// method, or is empty.
   json write(const std::vector<measured_run>& runs, const std::vector<single_samples>& single) const;
 
  private:

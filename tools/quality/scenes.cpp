@@ -1,4 +1,4 @@
-// Loading, and hashes of files.
+// Loads scenes, and hashes their files.
 #include "scenes.hpp"
 
 #include "app/image_io.hpp"
@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The contents of the buffers and images that lie beside a .gltf file.
+/// The contents of the buffers and images that a .gltf file refers to.
 std::string referred_content(const fs::path& path, const std::string& content) {
   std::string result;
   const json document = json::parse(content);

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What holds where an option is not given.
+/// Values of options that are not given.
 struct preset {
   std::vector<std::string> scenes, methods;
   std::vector<int> spp;
@@ -59,10 +59,10 @@ const std::vector<method> known_methods = {
     {"paper", "--method wfpg " + paper_arguments},
     {"paper-product", "--method wfpg-product --product-resolution 8 " + paper_arguments}};
 
-/// Those of references are above.
+/// Larger seeds are those of references.
 constexpr int most_seeds = 1000000;
 
-/// The command line as it is written.
+/// The options of the command line.
 struct given_arguments {
   std::string preset = "standard";
   std::vector<std::string> scenes, methods, definitions;
@@ -145,7 +145,7 @@ window parse_window(const std::string& text) {
   return w;
 }
 
-/// Parses options without a program around them, then calls `check`; errors say where the text came from.
+/// Parses a text of options alone, then calls `check`. Errors name the origin of the text.
 void parse_part(
     CLI::App& app, const std::string& what, const std::string& text,
     const std::function<void()>& check = [] {}) {
@@ -206,7 +206,7 @@ method find_method(const std::string& name, const std::vector<method>& defined) 
   return {name, "--method " + name};
 }
 
-/// Those that are named, then those defined but not named.
+/// Named methods first, then those that are defined but not named.
 std::vector<method> parse_methods(const std::vector<std::string>& names,
                                   const std::vector<std::string>& texts) {
   std::vector<method> defined, methods;
@@ -229,7 +229,7 @@ std::string quoted(const std::vector<std::string>& arguments) {
   return result;
 }
 
-/// Two of one name would write the same files.
+/// Two budgets of one name would write the same files.
 void check_budgets(const settings& given) {
   std::set<std::string> names;
   for (const budget& allowed : given.budgets)
@@ -253,7 +253,7 @@ settings completed(given_arguments given) {
     parse_part(app, "preset", std::string("--size ") + defaults.size);
   }
   result.scenes = parse_scenes(given.scenes.empty() ? defaults.scenes : given.scenes, given.base);
-  // Methods of one's own are measured beside path tracing where no others are named.
+  // Own methods are measured beside path tracing if no others are named.
   const bool is_own = given.methods.empty() && !given.definitions.empty();
   result.methods = parse_methods(is_own                  ? std::vector<std::string>{"pt"}
                                  : given.methods.empty() ? defaults.methods

@@ -11,7 +11,8 @@ namespace {
 
 using pixels = std::vector<glm::dvec3>;
 
-/// The pictures of samples 1, 2, ..., each alone, from those after each sample, in which all count alike.
+/// The pictures of single samples 1, 2, ... Computed from pictures after each sample, in which all have equal
+/// weight.
 std::vector<render::image> render_alone(const render::scene& scene, render::render_options options,
                                         wfpg::sample_combination combination) {
   options.combine = combination;
@@ -31,7 +32,7 @@ void append(error_series& series, const render::image& picture, const render::im
   for (const measure& m : measures) series.by_measure[m.name].push_back(error.*m.value);
 }
 
-/// Errors of the picture after each sample; infinite where none counts yet.
+/// Errors of the picture after each sample. Infinite while no sample has weight.
 error_series combine(const std::vector<render::image>& alone, wfpg::sample_combination combination,
                      const render::image& reference) {
   error_series series;

@@ -1,4 +1,4 @@
-// Means over seeds and their ratios, with what they are uncertain by.
+// Means over seeds and their ratios, with uncertainties.
 #pragma once
 
 #include <optional>
@@ -6,10 +6,10 @@
 
 namespace quality {
 
-/// Of independent values. Spreads are absent of one value.
+/// Statistic of independent values. A single value has no spreads.
 struct statistic {
   double mean = 0.0;
-  std::optional<double> deviation;       ///< standard deviation of a value, n - 1 in its denominator
+  std::optional<double> deviation;       ///< standard deviation of a value, with n - 1 in the denominator
   std::optional<double> standard_error;  ///< of the mean
 };
 
@@ -21,7 +21,7 @@ struct ratio {
   std::optional<double> standard_error;  ///< to first order in both spreads
 };
 
-/// Of two independent means; absent where one is not positive and finite.
+/// Ratio of two independent means. Absent if one is not positive and finite.
 std::optional<ratio> ratio_of(const statistic& numerator, const statistic& denominator);
 
 }  // namespace quality

@@ -58,7 +58,7 @@ json summary_of_measure(const compared& c) {
   if (!(error.mean > 0.0)) result["mean"] = json();
   result["measured"] = or_null(over(c.runs, c.value).mean);
   result["noise"] = or_null(c.noise);
-  result["noise_is_large"] = !(c.noise <= large_noise_share * error.mean);
+  result["noise_is_large"] = !(c.noise <= large_noise_fraction * error.mean);
   result["ratio"] = gain ? json(gain->value) : json();
   result["ratio_standard_error"] = gain ? or_null(gain->standard_error) : json();
   const std::optional<ratio> slowness = ratio_of(over(c.runs, seconds_of), over(c.baseline, seconds_of));

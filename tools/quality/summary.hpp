@@ -1,4 +1,4 @@
-// What many renderings of a scene come to: means, spreads and ratios, as JSON.
+// Summary of many renderings of a scene: means, spreads and ratios, as JSON.
 #pragma once
 
 #include "runs.hpp"
@@ -24,8 +24,8 @@ inline constexpr std::array<measure, 4> measures = {
      {"mae", "mean absolute error", &render::image_error::mae, false},
      {"smape", "SMAPE", &render::image_error::smape, false}}};
 
-/// Noise of a reference above this share of an error is said beside it.
-inline constexpr double large_noise_share = 0.1;
+/// Tables report a reference's noise if it is larger than this fraction of an error.
+inline constexpr double large_noise_fraction = 0.1;
 
 /// One rendering, measured.
 struct measured_run {
@@ -36,21 +36,21 @@ struct measured_run {
   std::optional<double> flip;
 };
 
-/// How good a reference is, in each measure.
+/// A reference's noise in each measure.
 struct reference_noise {
   render::image_error error;
   std::optional<double> flip;  ///< half of the halves' difference
 };
 
-/// An object for each budget, with one for each method in it: samples, seconds, segments, bytes, cones,
-/// hits of lights and errors, with ratios to the baseline, which is the method called pt, or the first.
-/// Errors are less the noise where they are squared; one that the noise hides is null.
+/// An object for each budget, with one for each method: samples, seconds, segments, bytes, cones, hits of
+/// lights and errors. Ratios are to the baseline, which is the method called pt, or the first. Squared errors
+/// have the reference's noise subtracted. An error below the noise is null.
 json summary_of(const settings& given, const std::vector<measured_run>& runs, const reference_noise& noise);
 
-/// The index of the method that ratios are to.
+/// The index of the baseline of ratios.
 std::size_t baseline_of(const std::vector<method>& methods);
 
-/// A squared error without noise; others as they are.
+/// A squared error without noise. Other errors are unchanged.
 double without_noise(double error, double noise, bool is_squared);
 
 }  // namespace quality

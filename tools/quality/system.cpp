@@ -15,7 +15,7 @@
 namespace quality {
 namespace {
 
-/// The first line of /proc/cpuinfo that names the model; empty where there is none.
+/// The first line of /proc/cpuinfo that names the model. Empty if there is none.
 std::string processor() {
   std::ifstream file("/proc/cpuinfo");
   for (std::string line; std::getline(file, line);)
@@ -34,7 +34,7 @@ std::string without_newline(std::string text) {
   return text;
 }
 
-/// Asked for once.
+/// Queried once.
 std::string gpu_and_driver() {
   static const std::string names = without_newline(
       output_of("nvidia-smi --query-gpu=name,driver_version --format=csv,noheader 2>/dev/null").value_or(""));

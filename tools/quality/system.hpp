@@ -1,4 +1,4 @@
-// What the machine and its files tell: hashes, other programs' output, and where results were measured.
+// The machine and its files: hashes, other programs' output, and where results were measured.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -11,23 +11,23 @@ namespace quality {
 
 using json = nlohmann::ordered_json;
 
-/// 64 bits (FNV-1a) as 16 hexadecimal digits: tells contents apart, no protection against forgery.
+/// 64 bits (FNV-1a) as 16 hexadecimal digits. It identifies contents and does not protect against forgery.
 std::string hash_of(const std::string& bytes);
 
 /// All bytes of a file. Throws std::runtime_error that names the path.
 std::string content_of(const std::filesystem::path& path);
 
-/// What a shell command prints, or nothing where it fails.
+/// The output of a shell command, or nothing if it fails.
 std::optional<std::string> output_of(const std::string& command);
 
-/// The library's, such as 0.1.0.
+/// The library's version, such as 0.1.0.
 std::string version();
 
-/// The hash of this program's own file, or the library's version where that cannot be read: programs of
-/// different code measure anew.
+/// The hash of this program's own file, or the library's version if it cannot be read. Programs of different
+/// code measure again.
 std::string program_hash();
 
-/// Processor, threads, system and compiler; with `with_gpu` the GPU and its driver.
+/// Processor, threads, system and compiler. With `with_gpu` also the GPU and its driver.
 json machine(bool with_gpu);
 
 }  // namespace quality

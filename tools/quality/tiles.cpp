@@ -10,10 +10,10 @@
 namespace quality {
 namespace {
 
-/// What a difference without noise counts as.
+/// The z of a difference without noise.
 constexpr double certain = 1000.0;
 
-/// The normal deviate that is as improbable as t.
+/// The normal deviate of the same probability as t.
 double deviate_of(double t, double degrees) {
   const double z = std::sqrt(degrees * std::log1p(t * t / degrees));
   return std::copysign(z * (8.0 * degrees + 1.0) / (8.0 * degrees + 3.0), t);

@@ -5,8 +5,8 @@
 
 namespace render {
 
-/// Black, purple, red, orange, white for 0 to 1, lighter all the way; linear RGB. What is beyond is as the
-/// end.
+/// Black, purple, red, orange, white for 0 to 1, with increasing brightness. Linear RGB. Values beyond are
+/// clamped.
 vec3 heat_colour(float value);
 
 }  // namespace render

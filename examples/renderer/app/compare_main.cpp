@@ -1,4 +1,5 @@
-// wfpg-compare: prints how far a picture is from a reference. Exit code 0, or 2 with a message on failure.
+// wfpg-compare: prints the error of a picture against a reference. Exit code 0, or 2 with a message on
+// failure.
 #include "app/image_io.hpp"
 #include "app/metrics.hpp"
 #include "app/render_arguments.hpp"

@@ -1,6 +1,6 @@
-// wfpg-demo: path tracing and path tracing guided by transient fields, by kept ones and by their products
-// with BSDFs at equal samples, beside a reference, as pictures, a table, and plots of error over time. Where
-// Open PGL is installed it takes part, on CPUs.
+// wfpg-demo: compares path tracing with guiding by transient fields, by kept fields and by their products
+// with BSDFs. All have equal samples and a reference. The output is pictures, a table, and plots of error
+// over time. Open PGL takes part on CPUs if it is installed.
 #include "app/image_io.hpp"
 #include "app/metrics.hpp"
 #include "app/output_files.hpp"
@@ -30,12 +30,12 @@ using render::sampling_method;
 
 constexpr int samples = 64;  // of the compared pictures
 
-/// Where the demonstration renders.
+/// Size and zoom of pictures on a device.
 struct demo_device {
   const char* name;
   render::device where;
   int size;      // pixels along a side
-  int shown_at;  // screen pixels along a pixel of the PNGs
+  int shown_at;  // screen pixels for a pixel of the PNGs
 };
 constexpr demo_device demo_devices[] = {{"cpu", render::device::cpu, 128, 3},
                                         {"cuda", render::device::cuda, 512, 1}};
@@ -44,7 +44,7 @@ struct demo_scene {
   const char* name;
   bool nee;
   float exposure;    // of the PNGs
-  int reference_pt;  // samples of the reference's two halves, chosen to take about as long
+  int reference_pt;  // samples of the reference's two halves, chosen to take about equal time
   int reference_wfpg;
 };
 constexpr demo_scene demo_scenes[] = {{"cornell-enclosed", false, 1.0f, 1024, 384},
@@ -61,7 +61,7 @@ constexpr demo_method demo_methods[] = {{"pt", sampling_method::pt},
                                         {"transient", sampling_method::wfpg, render::fields::transient},
                                         {"wfpg", sampling_method::wfpg},
                                         {"wfpg-product", sampling_method::wfpg_product}};
-// Pictures of few samples want leaves smaller than the default: 1000 where time counts, 250 where error does.
+// Pictures of few samples need leaves smaller than the default: 1000 for equal time, 250 for equal samples.
 constexpr demo_method openpgl_methods[] = {
     {"openpgl-vmm-1000", sampling_method::openpgl_vmm, render::fields::kept, 1000},
     {"openpgl-vmm-250", sampling_method::openpgl_vmm, render::fields::kept, 250},
@@ -77,7 +77,7 @@ std::vector<demo_method> methods_on(const demo_device& on) {
 struct method_result {
   const char* method;
   render_result rendering;
-  image_error error;  // the reference's own noise subtracted
+  image_error error;  // with the reference's own noise subtracted
 };
 
 render_result render_once(const demo_scene& demo, const demo_device& on, const char* what,
@@ -98,7 +98,7 @@ struct reference {
   image_error noise;
 };
 
-// Half by path tracing and half guided, so that the reference flatters neither.
+// Half by path tracing and half guided, so that neither method is favoured.
 reference make_reference(const demo_scene& demo, const demo_device& on) {
   render_options options;
   options.method = sampling_method::pt;
@@ -136,7 +136,7 @@ method_result run_method(const demo_scene& demo, const demo_device& on, const de
   return result;
 }
 
-/// Error after 4, 8, 16, ... samples over the seconds that they took.
+/// Error after 4, 8, 16, ... samples, over their time in seconds.
 render::curve error_over_time(const method_result& result, const reference& truth) {
   render::curve curve{result.method, {}};
   for (const render::checkpoint& at : result.rendering.checkpoints) {

@@ -1,4 +1,4 @@
-// What a guider says of itself, put into a render_report.
+// Copies a guider's statistics into a render_report.
 #pragma once
 
 #include "app/render.hpp"
@@ -11,7 +11,7 @@
 
 namespace render {
 
-/// What a guider says whatever its guide: memory, and time by stage.
+/// Memory and time by stage, which every guide reports.
 template <class Exec, class Guide>
 void report_any_guider(const wfpg::path_guider<Exec, Guide>& guider, render_report& report) {
   const wfpg::memory_report memory = guider.memory();
@@ -22,7 +22,7 @@ void report_any_guider(const wfpg::path_guider<Exec, Guide>& guider, render_repo
     report.seconds.emplace_back("guide " + std::string(stage), seconds);
 }
 
-/// Of records: the last build's.
+/// Numbers of irradiance records, from the last build.
 template <class Exec, class Smooth>
 void report_records(const wfpg::path_guider<Exec, wfpg::irradiance_records<Exec, Smooth>>& guider,
                     std::uint64_t segments, render_report& report) {
@@ -34,7 +34,7 @@ void report_records(const wfpg::path_guider<Exec, wfpg::irradiance_records<Exec,
     report.cones_per_segment = static_cast<double>(found.cones) / static_cast<double>(segments);
 }
 
-/// What a guider has counted since it said `before`.
+/// Subtracts statistics of an earlier time from `counted`.
 inline void subtract(wfpg::guider_statistics& counted, const wfpg::guider_statistics& before) {
   counted.guided_samples -= before.guided_samples;
   for (std::size_t depth = 0; depth < before.depths.size(); ++depth) {
@@ -47,7 +47,8 @@ inline void subtract(wfpg::guider_statistics& counted, const wfpg::guider_statis
   counted.kept.refreshed -= before.kept.refreshed;
 }
 
-/// The octree's. `segments`: rays that paths were extended by in all samples, since the guider said `before`.
+/// Numbers of the octree's guides. `segments` are rays that extended paths in all samples, since the
+/// statistics `before`.
 template <class Exec, class Guide>
 void report_guider(const wfpg::path_guider<Exec, Guide>& guider, std::uint64_t segments,
                    render_report& report, const wfpg::guider_statistics& before = {}) {

@@ -1,5 +1,5 @@
-// OpenEXR through the C++ library, PNG through stb_image_write; errors of both become std::runtime_error with
-// the path in front.
+// OpenEXR through its C++ library, PNG through stb_image_write. Their errors become std::runtime_error that
+// begins with the path.
 #include "app/image_io.hpp"
 
 #include "app/output_files.hpp"
@@ -32,7 +32,7 @@ static_assert(sizeof(vec3) == 3 * sizeof(float), "pixels are handed to OpenEXR a
 
 constexpr const char* channel_names[3] = {"R", "G", "B"};
 
-/// Beyond this many pixels a header is taken for damaged rather than obeyed.
+/// A header with more pixels than this counts as damaged.
 constexpr std::int64_t max_pixels = std::int64_t(1) << 28;
 
 void require_consistent(const image& picture) {
@@ -60,7 +60,7 @@ image sized_for(const Imath::Box2i& window) {
   return make_image(int(width), int(height));
 }
 
-/// Three interleaved float channels; `window` is where the first pixel lies.
+/// Three interleaved float channels. `window` gives the place of the first pixel.
 Imf::FrameBuffer frame_buffer(float* first, const Imath::Box2i& window) {
   Imf::FrameBuffer buffer;
   for (int c = 0; c < 3; ++c)
@@ -70,7 +70,7 @@ Imf::FrameBuffer frame_buffer(float* first, const Imath::Box2i& window) {
   return buffer;
 }
 
-/// Of few digits.
+/// A number with few digits.
 std::string in_words(float number) {
   std::ostringstream text;
   text << number;
@@ -91,8 +91,8 @@ image read_exr_pixels(const std::string& path) {
   return picture;
 }
 
-/// A stream as OpenEXR writes to it. It throws nothing, since OpenEXR's destructors write too: who has the
-/// stream asks it at the end.
+/// A stream for OpenEXR's output. It throws nothing, since OpenEXR's destructors write too. Its owner checks
+/// it at the end.
 class exr_stream : public Imf::OStream {
  public:
   exr_stream(std::ostream& out, const std::string& path) : Imf::OStream(path.c_str()), out_(out) {}
@@ -105,8 +105,7 @@ class exr_stream : public Imf::OStream {
   std::ostream& out_;
 };
 
-/// A file as stb_image reads it, which takes what is missing at its end for zeros: that it asked for more is
-/// noted.
+/// A file for stb_image. stb_image reads zeros after its end, so this notes that it asked for more.
 struct noted_file {
   std::ifstream stream;
   bool is_cut_off = false;
@@ -144,7 +143,7 @@ void write_exr_pixels(std::ostream& out, const std::string& path, const image& p
   Imf::Header header(picture.width, picture.height);
   for (const char* name : channel_names) header.channels().insert(name, Imf::Channel(Imf::FLOAT));
   const Imath::Box2i window = header.dataWindow();
-  // The frame buffer's type has no const; an output file only reads from it.
+  // The frame buffer's type has no const. An output file only reads from it.
   float* first = const_cast<float*>(&picture.pixels[0].x);
   exr_stream stream(out, path);
   Imf::OutputFile file(stream, header);

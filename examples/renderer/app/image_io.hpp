@@ -1,4 +1,4 @@
-// Pictures in memory and in files: OpenEXR in and out, PNG out.
+// Pictures in memory and in files: reads and writes OpenEXR, writes PNG.
 #pragma once
 
 #include "scene/scene.hpp"
@@ -8,7 +8,7 @@
 
 namespace render {
 
-/// Linear RGB (Rec. 709 primaries), row by row; row 0 is the top.
+/// Linear RGB (Rec. 709 primaries), row by row. Row 0 is the top.
 struct image {
   int width = 0;
   int height = 0;
@@ -18,34 +18,34 @@ struct image {
 /// A black picture. Throws std::invalid_argument unless both sides are positive.
 image make_image(int width, int height);
 
-/// The R, G and B channels, half or float, of a single-part OpenEXR file; other channels are ignored.
+/// Reads the R, G and B channels, half or float, of a single-part OpenEXR file. Other channels are ignored.
 /// Throws std::runtime_error that names the path and the reason.
 image read_exr(const std::string& path);
 
-/// The environment of an OpenEXR or Radiance HDR (.hdr) file, twice as wide as high or not. Throws
-/// std::runtime_error that names the path and the reason, also of radiance that is negative or not finite.
+/// Reads the environment of an OpenEXR or Radiance HDR (.hdr) file, of any aspect ratio. Throws
+/// std::runtime_error that names the path and the reason, also for negative or not finite radiance.
 environment_map read_environment(const std::string& path);
 
-/// Replaces a file by an OpenEXR picture, R, G and B as 32-bit float; a failure leaves the old file. Throws
-/// std::runtime_error that names the path and the reason.
+/// Replaces a file by an OpenEXR picture with R, G and B as 32-bit floats. A failure leaves the old file.
+/// Throws std::runtime_error that names the path and the reason.
 void write_exr(const std::string& path, const image& picture);
 
-/// Replaces a file by a PNG picture, 8-bit sRGB: values times `exposure`, clamped to [0, 1], through the sRGB
-/// curve. NaN becomes black. A failure leaves the old file. Throws std::runtime_error that names the path and
-/// the reason.
+/// Replaces a file by a PNG picture, 8-bit sRGB. Values are multiplied by `exposure`, clamped to [0, 1], and
+/// encoded with the sRGB curve. NaN becomes black. A failure leaves the old file. Throws std::runtime_error
+/// that names the path and the reason.
 void write_png(const std::string& path, const image& picture, float exposure = 1.0f);
 
-/// Pictures from left to right with `gap` >= 0 white columns between them; lower ones are filled up in white.
+/// Pictures from left to right with `gap` >= 0 white columns between them. Lower ones are padded in white.
 image side_by_side(const std::vector<image>& pictures, int gap);
 
-/// Each pixel as a square of `times` by `times`, which is positive.
+/// Enlarges each pixel to a square of `times` by `times`, which is positive.
 image enlarged(const image& picture, int times);
 
-/// The `width` by `height` pixels from column `left` and row `top` on. Throws std::invalid_argument where
-/// they are not within the picture.
+/// The `width` by `height` pixels from column `left` and row `top`. Throws std::invalid_argument if they
+/// exceed the picture.
 image cropped(const image& picture, int left, int top, int width, int height);
 
-/// The radiance that an sRGB-encoded value in [0, 1] stands for (IEC 61966-2-1), and back.
+/// The radiance of an sRGB-encoded value in [0, 1] (IEC 61966-2-1), and the inverse.
 float srgb_to_linear(float encoded);
 float linear_to_srgb(float linear);
 

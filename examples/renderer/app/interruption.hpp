@@ -1,12 +1,12 @@
-// Signals that ask a program to end, noted rather than obeyed at once.
+// Notes signals that ask a program to end, instead of ending at once.
 #pragma once
 
 namespace render {
 
-/// From now on the first SIGINT or SIGTERM is only noted, and the second ends the program as ever.
+/// From now on the first SIGINT or SIGTERM is only noted. The second one ends the program.
 void note_interruptions();
 
-/// Whether there was one.
+/// Whether a signal was noted.
 bool is_interrupted();
 
 }  // namespace render

@@ -1,5 +1,5 @@
 // wfpg-render: renders a scene with or without guiding. SIGINT and SIGTERM end it after the sample in flight,
-// with its picture and state. Exit code 0; 2 with a message on failure; 3 where it was interrupted.
+// with its picture and state. Exit code 0, 2 with a message on failure, or 3 after an interruption.
 #include "app/render_program.hpp"
 
 #include <iostream>

@@ -1,14 +1,14 @@
-// The renderer's methods and what each of them is and can do, in one table.
+// The renderer's methods and their properties, in one table.
 #pragma once
 
 namespace render {
 
-/// Path tracing; guided by wfpg's fields, or by their products with BSDFs; by its SARSA grid; by its
-/// irradiance records; by Open PGL's mixtures of von Mises-Fisher lobes, which know of parallax, or by its
-/// quadtrees of directions.
+/// Sampling methods. pt is path tracing. wfpg guides by fields, wfpg_product by products of fields and BSDFs.
+/// sarsa guides by a SARSA grid, records by irradiance records. openpgl_vmm guides by Open PGL's mixtures of
+/// von Mises-Fisher lobes with parallax, openpgl_dqt by its quadtrees of directions.
 enum class sampling_method { pt, wfpg, wfpg_product, sarsa, records, openpgl_vmm, openpgl_dqt };
 
-/// What gives directions beside BSDFs: nothing, fields over an octree, a grid, records, Open PGL's field.
+/// The guide beside BSDFs: none, fields over an octree, a grid, records, or Open PGL's field.
 enum class guide_kind { none, octree, sarsa, records, openpgl };
 
 struct method_properties {
@@ -16,7 +16,7 @@ struct method_properties {
   const char* name;  ///< of --method, and in reports
   guide_kind guide;
   bool learns;        ///< from its samples: later ones have less noise
-  bool can_be_saved;  ///< a rendering's state, to go on from later
+  bool can_be_saved;  ///< a rendering's state can be saved and resumed
 };
 
 inline constexpr method_properties all_methods[] = {

@@ -13,8 +13,8 @@ namespace render {
 namespace {
 
 constexpr double relative_floor = 1e-2;
-constexpr double trimmed_share = 1e-3;
-constexpr double robust_share = 1e-4;
+constexpr double trimmed_fraction = 1e-3;
+constexpr double robust_fraction = 1e-4;
 
 /// One pixel's measures, means over its channels.
 struct pixel_error {
@@ -54,9 +54,9 @@ pixel_error error_where_finite(vec3 test, vec3 reference) {
   return {infinite, infinite, infinite, infinite, infinite};
 }
 
-/// The mean without the largest `share` of the values, which it reorders.
-double trimmed_mean(std::vector<double>& values, double share) {
-  const auto dropped = static_cast<std::size_t>(share * static_cast<double>(values.size()));
+/// The mean without the largest `share` of the values. Reorders them.
+double trimmed_mean(std::vector<double>& values, double fraction) {
+  const auto dropped = static_cast<std::size_t>(fraction * static_cast<double>(values.size()));
   const auto first_kept = values.begin() + static_cast<std::ptrdiff_t>(dropped);
   std::nth_element(values.begin(), first_kept, values.end(), std::greater<double>());
   double sum = 0.0;
@@ -64,17 +64,17 @@ double trimmed_mean(std::vector<double>& values, double share) {
   return sum / static_cast<double>(values.size() - dropped);
 }
 
-/// Sums up relative errors a pixel, which it reorders.
+/// Sums relative errors of pixels. Reorders them.
 void add_relative(std::vector<double>& relative, image_error& error) {
   const double count = static_cast<double>(relative.size());
   const double sum = std::accumulate(relative.begin(), relative.end(), 0.0);
   error.relmse = sum / count;
-  error.relmse_trimmed = trimmed_mean(relative, trimmed_share);
-  error.relmse_robust = trimmed_mean(relative, robust_share);
+  error.relmse_trimmed = trimmed_mean(relative, trimmed_fraction);
+  error.relmse_robust = trimmed_mean(relative, robust_fraction);
   if (std::isinf(sum)) {
     error.worst_share = 1.0;
   } else if (sum > 0.0) {
-    const double kept = error.relmse_robust * (count - std::floor(robust_share * count));
+    const double kept = error.relmse_robust * (count - std::floor(robust_fraction * count));
     error.worst_share = std::max(0.0, 1.0 - kept / sum);
   }
 }

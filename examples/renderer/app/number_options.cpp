@@ -1,4 +1,4 @@
-// Texts are checked and, where CLI11 would take them otherwise, rewritten.
+// Checks texts and, where CLI11 would read them otherwise, rewrites them.
 #include "app/number_options.hpp"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::uint64_t most_bytes = std::uint64_t(1) << 40;
 
-/// The number that decimal digits are; nothing where there is another character, none at all, or too many.
+/// The number of a text of decimal digits. Empty for other characters, no digits, or too many.
 std::optional<std::uint64_t> digits_of(const std::string& text) {
   std::uint64_t value = 0;
   const char* const end = text.data() + text.size();
@@ -22,7 +22,7 @@ std::optional<std::uint64_t> digits_of(const std::string& text) {
   return read.ec == std::errc() && read.ptr == end ? std::optional<std::uint64_t>(value) : std::nullopt;
 }
 
-/// The number that a decimal fraction is; neither hexadecimal nor infinite nor NaN.
+/// The number of a decimal fraction. Neither hexadecimal nor infinite nor NaN.
 std::optional<double> fraction_of(const std::string& text) {
   if (text.empty() || text.find_first_not_of("0123456789+-.eE") != std::string::npos) return std::nullopt;
   char* end = nullptr;
@@ -53,7 +53,7 @@ std::string range_name(std::uint64_t least, std::uint64_t most) {
   return std::to_string(least) + " to " + std::to_string(most);
 }
 
-/// `accept` returns the text as CLI11 is to read it, or nothing.
+/// `accept` returns the text that CLI11 reads, or nothing.
 CLI::Validator validator(const std::string& expected, const std::string& help,
                          const std::function<std::optional<std::string>(const std::string&)>& accept) {
   return CLI::Validator(

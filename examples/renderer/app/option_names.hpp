@@ -1,4 +1,4 @@
-// What options are called, on command lines and in reports.
+// Names of options' values, on command lines and in reports.
 #pragma once
 
 #include "app/render.hpp"
@@ -16,7 +16,7 @@ const std::map<std::string, cones>& cones_names();
 const std::map<std::string, wfpg::sarsa_update>& sarsa_update_names();
 const std::map<std::string, wfpg::sarsa_sampler>& sarsa_sampler_names();
 
-/// What a value is called there. Precondition: it has a name.
+/// The name of a value. Precondition: it has one.
 template <class T>
 const std::string& name_of(const std::map<std::string, T>& names, T value) {
   auto named = names.begin();

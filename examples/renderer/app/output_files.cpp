@@ -1,4 +1,4 @@
-// Writing is the library's replace_file().
+// The library's replace_file() writes the files.
 #include "app/output_files.hpp"
 
 #include <wfpg/state/section_file.hpp>
@@ -30,7 +30,7 @@ void check_extension(const named_file& output) {
                             " (pictures are .exr by --output and .png by --png)");
 }
 
-/// The file behind links, which may not be there yet, by its one absolute name.
+/// The absolute name of the file behind links. It need not exist.
 fs::path identity_of(const std::string& path) {
   std::error_code error;
   const fs::path known = fs::canonical(path, error);

@@ -1,4 +1,4 @@
-// SVG by hand: a frame, decades as grid lines, curves with their names at their ends.
+// Writes SVG: a frame, decades as grid lines, curves with names at their ends.
 #include "app/plot.hpp"
 
 #include "app/output_files.hpp"
@@ -12,7 +12,7 @@
 namespace render {
 namespace {
 
-// In pixels. To the right of the frame there is room for the curves' names.
+// Sizes in pixels. The curves' names are to the right of the frame.
 constexpr double frame_width = 440.0, height = 420.0;
 constexpr double left = 80.0, top = 40.0, bottom = 55.0;  // margins
 constexpr double right_end = left + frame_width;
@@ -25,7 +25,7 @@ bool is_drawn(const std::pair<double, double>& point) {
   return point.first > 0.0 && point.second > 0.0 && std::isfinite(point.first) && std::isfinite(point.second);
 }
 
-/// The range around some values, and where a value lies in it.
+/// The range around some values, and the place of a value in it.
 struct log_axis {
   double low, high;   // powers of ten, at digits: 0.3 is twice 10^0
   double begin, end;  // pixels
@@ -37,15 +37,15 @@ struct log_axis {
     constexpr double rounding = 1e-9;
     return std::log10(value) > low - rounding && std::log10(value) < high + rounding;
   }
-  /// Whether a grid line at so many times a power of ten has its value beside it: the fewer powers there are,
-  /// the more often.
+  /// Whether the grid line at `digit` times a power of ten has a label. Axes with fewer powers have more
+  /// labels.
   bool is_named(int digit) const {
     const double powers = high - low;
     return digit == 1 || powers < 0.7 || (powers < 2.0 && (digit == 2 || digit == 5));
   }
 };
 
-/// Ends at 1, 2, ... 9 times a power of ten.
+/// The axis ends at 1, 2, ... 9 times a power of ten.
 log_axis make_axis(const std::vector<double>& values, double begin, double end) {
   log_axis axis{0.0, 1.0, begin, end};
   if (values.empty()) return axis;
@@ -91,8 +91,8 @@ std::string grid_line(const log_axis& axis, bool vertical, double value, bool is
                             : label(left - 8.0, at + 4.0, name, "text-anchor='end'"));
 }
 
-/// Lines at 1, 2, ... 9 times each power of ten, and the powers' names, on short axes those of 2 and 5 times
-/// too.
+/// Lines at 1, 2, ... 9 times each power of ten, and labels at the powers. Short axes also have labels at 2
+/// and 5 times.
 std::string grid(const log_axis& axis, bool vertical) {
   std::string result;
   for (double power = std::floor(axis.low); power <= axis.high; power += 1.0)
@@ -130,7 +130,7 @@ bool overlap(const end_label& a, const end_label& b) {
   return std::abs(a.y - b.y) < line_height && std::max(a.x, b.x) < end;
 }
 
-/// Names beside their ends, moved up where they would lie on one another.
+/// Names beside their curves' ends. Overlapping names are moved up.
 std::string draw(std::vector<end_label> labels) {
   std::sort(labels.begin(), labels.end(), [](const end_label& a, const end_label& b) { return a.y > b.y; });
   std::string result;

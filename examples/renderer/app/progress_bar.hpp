@@ -1,4 +1,4 @@
-// Progress on stderr: a bar that redraws itself in a terminal, a line now and then elsewhere.
+// Progress on stderr: a bar that redraws itself in a terminal, otherwise a line now and then.
 #pragma once
 
 #include "app/render.hpp"

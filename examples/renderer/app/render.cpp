@@ -1,4 +1,4 @@
-// Options made complete and checked; the choice of the device.
+// Completes and checks options, and chooses the device.
 #include "app/render.hpp"
 
 #include "app/option_names.hpp"
@@ -20,7 +20,7 @@ extern template render_result render_on<embree_scene>(const wfpg::exec::tbb&, co
 
 namespace {
 
-/// State on disk is of what can be saved.
+/// Files of guides and states need a method that can be saved.
 void require_guided_files(const render_options& options) {
   using wfpg::require;
   const std::string& method = name_of(method_names(), options.method);

@@ -1,4 +1,4 @@
-// The renderer guided by Open PGL, and what its field says of itself.
+// The renderer guided by Open PGL, and the statistics of its field.
 #include "app/render_impl.hpp"
 #include "casters/embree_caster.hpp"
 #include "tracer/openpgl_guider.hpp"
@@ -11,7 +11,7 @@
 namespace render {
 namespace {
 
-/// Of all vertices, and a little more, since what a ray hits is beside them by rounding.
+/// Bounds of all vertices, slightly enlarged, since rounding moves hits.
 pgl_box3f bounds_of(const scene& scene) {
   wfpg::bounds3 box;
   for (const vec3& p : scene.positions) box = wfpg::bounds_union()(box, {p, p});
@@ -32,8 +32,8 @@ openpgl_options openpgl_options_of(const scene& scene, const render_options& opt
   return guided;
 }
 
-/// Bytes of the file that the field stores itself in, since its statistics leave out quadtrees' nodes; 0
-/// where the directory for temporary files takes none.
+/// Size of the file that the field writes, since its statistics leave out quadtrees' nodes. 0 if the
+/// directory for temporary files has no room.
 std::size_t stored_bytes(const openpgl::cpp::Field& field) {
   namespace fs = std::filesystem;
   std::error_code error;
@@ -44,7 +44,7 @@ std::size_t stored_bytes(const openpgl::cpp::Field& field) {
   return error ? 0 : static_cast<std::size_t>(bytes);
 }
 
-/// The column of a table of two lines, one of names, that numbers the leaves; 0 where there is none.
+/// The number of leaves, from a table of two lines, one of names. 0 if there is no such column.
 std::size_t regions_of(const openpgl::cpp::FieldStatistics& statistics) {
   std::istringstream names(statistics.HeaderCSVString()), values(statistics.ToCSVString());
   std::string name, value;
@@ -55,7 +55,7 @@ std::size_t regions_of(const openpgl::cpp::FieldStatistics& statistics) {
 
 void report_openpgl(const openpgl_guider& guider, render_report& report) {
   const std::size_t segments = guider.paths().segment_bytes(), samples = guider.paths().sample_bytes();
-  // Of a field that has been shown no sample there is nothing to ask.
+  // A field without samples has no statistics.
   if (samples > 0) {
     report.persistent_bytes = stored_bytes(guider.field());
     report.used_bytes = report.persistent_bytes;

@@ -10,7 +10,7 @@
 namespace render {
 namespace {
 
-/// OptiX's structure of a scene, as render_on wants it.
+/// OptiX's structure of a scene, as render_on needs it.
 class optix_accelerated {
  public:
   static constexpr const char* name = "optix";

@@ -38,7 +38,7 @@ struct arguments {
   render_options options;
 };
 
-/// Files are checked before the scene is loaded: rendering takes longer than that.
+/// Checks files before the scene is loaded, since rendering takes long.
 void check_files(const arguments& given) {
   const render_options& options = given.options;
   std::vector<named_file> outputs = {{"--output", given.output, ".exr"},
@@ -46,7 +46,7 @@ void check_files(const arguments& given) {
                                      {"--stats", given.stats, ""},
                                      {"--save-guide", given.save_guide, ""},
                                      {"--save-state", given.save_state, ""}};
-  // An interrupted rendering goes on from its newer state.
+  // An interrupted rendering continues from its newer state.
   if (given.save_state.empty()) outputs.push_back({"--resume", options.resume, ""});
   check_outputs(outputs, {{"SCENE", is_builtin_scene(given.scene.name) ? "" : given.scene.name, ""},
                           {"--environment", given.scene.environment, ""},
@@ -81,7 +81,7 @@ void add_state_options(CLI::App& app, arguments& given) {
       ->excludes(load);
 }
 
-/// What goes on from an interrupted rendering, or to more samples.
+/// Writes the state of a rendering that can be resumed, also with more samples.
 void save_state(const arguments& given, const render_result& result, std::ostream& log) {
   const bool updates = given.save_state.empty() && result.is_stopped;
   const std::string& state = updates ? given.options.resume : given.save_state;
@@ -102,7 +102,8 @@ void say(std::ostream& log, const std::exception& error) {
   log << "wfpg-render: " << reason_of(error) << '\n';
 }
 
-/// Writes all that was asked for, whatever of it fails, and says what does: rendering takes longer than that.
+/// Writes all requested files, even if some fail, and reports failures. Rendering takes long, so no result is
+/// lost.
 bool write_all(const arguments& given, const render_result& result, const std::optional<image>& reference,
                std::ostream& out, std::ostream& log) {
   bool is_written = true;
@@ -125,8 +126,7 @@ bool write_all(const arguments& given, const render_result& result, const std::o
   return is_written;
 }
 
-/// The picture that the rendering is compared with, if there is one. Throws std::invalid_argument where it is
-/// of another size.
+/// The picture that the rendering is compared with, if any. Throws std::invalid_argument if its size differs.
 std::optional<image> read_reference(const arguments& given, const scene& scene) {
   if (given.reference.empty()) return std::nullopt;
   const render_options options = completed(scene, given.options);

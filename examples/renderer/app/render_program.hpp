@@ -5,9 +5,9 @@
 
 namespace render {
 
-/// Reads the command line, renders, and writes what was asked for. The error against a reference goes to
-/// `out`; warnings, and errors of one line each, to `log`; progress to stderr. 0; 2 on failure; 3 where
-/// SIGINT or SIGTERM, which it handles from then on, ended it.
+/// Reads the command line, renders, and writes the requested files. The error against a reference goes to
+/// `out`, warnings and errors of one line each to `log`, progress to stderr. Handles SIGINT and SIGTERM from
+/// then on. Returns 0, 2 on failure, or 3 if a signal ended it.
 int run_program(int argc, const char* const* argv, std::ostream& out, std::ostream& log);
 
 }  // namespace render

@@ -1,4 +1,4 @@
-// The renderer on the policy exec::seq: one thread, for debugging and as the others' reference.
+// The renderer on the policy exec::seq: one thread, for debugging and as a reference for the others.
 #include "app/render_impl.hpp"
 #include "casters/embree_caster.hpp"
 

@@ -1,4 +1,4 @@
-// Stands in for render_cuda.cu where there is no CUDA compiler.
+// Replaces render_cuda.cu in builds without a CUDA compiler.
 #include "app/render.hpp"
 
 #include <stdexcept>

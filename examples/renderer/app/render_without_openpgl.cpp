@@ -1,4 +1,4 @@
-// Stands in for render_openpgl.cpp where there is no Open PGL.
+// Replaces render_openpgl.cpp in builds without Open PGL.
 #include "app/render.hpp"
 
 #include <stdexcept>

@@ -1,4 +1,4 @@
-// Stands in for render_optix.cu where there are no headers of OptiX.
+// Replaces render_optix.cu in builds without OptiX's headers.
 #include "app/render.hpp"
 
 #include <stdexcept>

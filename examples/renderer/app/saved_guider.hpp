@@ -1,4 +1,4 @@
-// Guiders of renderings that go on, or that begin with what another one has learnt.
+// Guiders of renderings that are resumed, or that begin with another rendering's guide.
 #pragma once
 
 #include "app/render.hpp"
@@ -11,9 +11,9 @@
 
 namespace render {
 
-/// A guider over a scene's triangles, which `mesh` has on the device: in the state of a guide file's bytes
-/// where a rendering goes on, or of the file that options name; else it knows nothing yet. Throws
-/// wfpg::file_error, also where the guide is of another scene.
+/// A guider over a scene's triangles, which `mesh` has on the device. Its state comes from a guide file's
+/// bytes if the rendering is resumed, or from the file in the options. Otherwise it is new. Throws
+/// wfpg::file_error, also for a guide of another scene.
 template <class Exec, class Options>
 auto begin_guider(const Exec& exec, const scene& scene, const wfpg::triangle_mesh_view& mesh, Options guided,
                   const render_options& options, const std::string& saved) {
@@ -27,7 +27,7 @@ auto begin_guider(const Exec& exec, const scene& scene, const wfpg::triangle_mes
   return wfpg::load_guide(exec, bytes, guided, options.resume + ": its guide");
 }
 
-/// A guide file's bytes, where options ask for them.
+/// A guide file's bytes, if the options ask for them.
 template <class Exec, class Guide>
 std::string saved_guide(const wfpg::path_guider<Exec, Guide>& guider, const render_options& options) {
   if (!options.keep_guide && !options.keep_state) return {};

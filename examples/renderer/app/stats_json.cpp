@@ -1,4 +1,4 @@
-// Reports to JSON.
+// Converts reports to JSON.
 #include "app/stats_json.hpp"
 
 #include "app/output_files.hpp"

@@ -1,10 +1,10 @@
-// Ray casting through a bounding volume hierarchy, inside kernels of any policy: nodes of four children whose
-// boxes are quantised (64 bytes, after Ylitie et al. 2017, "Efficient Incoherent Ray Traversal on GPUs
-// Through Compressed Wide BVHs"), triangles in the order of the leaves.
+// Casts rays through a BVH, inside kernels of any policy. Nodes have four children with quantised boxes (64
+// bytes). They follow Ylitie et al. 2017, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide
+// BVHs". Triangles are in the order of the leaves.
 //
-// No ray passes between two triangles that share an edge or a corner: as in Woop et al. 2013, "Watertight
-// Ray/Triangle Intersection", corners are projected along the ray, each by itself, and edges are then decided
-// with exact signs; boxes are wider than what rounding can do.
+// No ray passes between two triangles that share an edge or a corner. As in Woop et al. 2013, "Watertight
+// Ray/Triangle Intersection", each corner is projected along the ray alone. Edges are then decided with exact
+// signs. Boxes are enlarged by more than the rounding errors.
 #pragma once
 
 #include "casters/cut_outs.hpp"
@@ -17,7 +17,7 @@
 
 namespace render {
 
-/// What a child of a node is: another node, or up to seven triangles in a row.
+/// A child of a node: another node, or up to seven consecutive triangles.
 class bvh_child {
  public:
   bvh_child() = default;
@@ -43,8 +43,8 @@ class bvh_child {
   std::uint32_t word_;
 };
 
-/// Four children and their boxes: 0 to 255 steps from an origin, a byte for each child. Children that are
-/// none come last and have boxes that are empty.
+/// Four children and their boxes. A box is 0 to 255 steps from an origin, a byte per child. Missing children
+/// come last and have empty boxes.
 struct alignas(16) bvh_node {
   static constexpr int width = 4;
 
@@ -55,7 +55,7 @@ struct alignas(16) bvh_node {
   bvh_child children[width] = {bvh_child::none(), bvh_child::none(), bvh_child::none(), bvh_child::none()};
 };
 
-/// A triangle of the hierarchy.
+/// A triangle of the BVH.
 struct alignas(16) bvh_triangle {
   vec3 a;
   std::uint32_t index;  ///< in the scene
@@ -67,14 +67,14 @@ struct alignas(16) bvh_triangle {
 
 namespace detail {
 
-/// a b - c d, so exact that its sign is right (Jeannerod et al. 2013, on Kahan's algorithm).
+/// a b - c d, exact enough for the right sign (Jeannerod et al. 2013, on Kahan's algorithm).
 WFPG_HD inline float difference_of_products(float a, float b, float c, float d) {
   const float cd = c * d;
   const float error = std::fma(c, d, -cd);
   return std::fma(a, b, -cd) - error;
 }
 
-/// A ray as it meets boxes and triangles.
+/// A ray prepared for boxes and triangles.
 struct bvh_ray {
   vec3 origin;
   float t_min;
@@ -97,23 +97,23 @@ struct bvh_ray {
   }
 
  private:
-  // Of no direction is it infinite, so that no slab's distance is NaN.
+  // Finite for every direction, so that no slab's distance is NaN.
   WFPG_HD static float inverse_of(float x) { return 1.0f / (fabsf(x) > 1e-18f ? x : copysignf(1e-18f, x)); }
 };
 
-/// One axis of a node's boxes, in distances along a ray: those of byte q lie at q' slope + near or + far,
-/// where q' is byte_float().
+/// One axis of a node's boxes, in distances along a ray. The face of byte q is at q' slope + near or + far,
+/// with q' = byte_float().
 struct bvh_slabs {
   float slope, near, far;
   std::uint32_t one;
-  std::uint32_t first, last;  ///< bytes of the faces that the ray meets first, and last
+  std::uint32_t first, last;  ///< bytes of the faces that the ray enters and leaves by
 
   WFPG_HD bvh_slabs(const bvh_node& node, const bvh_ray& ray, int axis) {
     one = ray.one;
     const float inverse = ray.inverse[axis];
     const float distance = (node.origin[axis] - ray.origin[axis]) * inverse;
     slope = node.step[axis] * inverse * 0x1p15f;
-    // Of the subtraction, the product and the inverse; the rest is less than the boxes' own margin.
+    // Covers the subtraction, the product and the inverse. The rest is below the boxes' own margin.
     const float error = fabsf(distance) * 0x1p-21f;
     near = distance - slope - error;
     far = distance - slope + error;
@@ -125,8 +125,8 @@ struct bvh_slabs {
   WFPG_HD float exit(int child) const { return byte_float(last, child, one) * slope + far; }
 };
 
-/// The children of a node that a ray meets, nearest first: their entries' distances as bits of floats, of
-/// which the last two bits are the child's number; `none` behind them.
+/// The children of a node that a ray hits, nearest first. Each is its entry distance as bits of a float,
+/// whose last two bits are the child's number. `none` follows the last.
 struct bvh_entries {
   static constexpr std::uint32_t none = ~0u;
   std::uint32_t keys[bvh_node::width];
@@ -152,10 +152,10 @@ struct bvh_entries {
 
 }  // namespace detail
 
-/// Casts rays, from any kernel. Trivially copyable; valid while the bvh_scene it is from lives.
+/// Casts rays, from any kernel. Trivially copyable. Valid while its bvh_scene lives.
 class bvh_caster {
  public:
-  /// Children that wait for their turn: three a level of a hierarchy.
+  /// Children waiting on the stack: three per level.
   static constexpr std::uint32_t stack_size = 64;
   static constexpr std::uint32_t most_levels = stack_size / (bvh_node::width - 1);
 
@@ -164,7 +164,7 @@ class bvh_caster {
              const environment_view& environment)
       : nodes_(nodes), triangles_(triangles), cut_outs_(cut_outs), environment_(environment) {}
 
-  /// The guider's form: distance, or the environment's luminance.
+  /// The guider's interface: distance, or the environment's luminance.
   WFPG_HD wfpg::ray_hit operator()(const wfpg::ray& ray) const {
     const hit found = nearest(ray);
     if (!found.triangle.is_hit()) return {-1.0f, wfpg::luminance(environment_.radiance(ray.direction))};
@@ -173,7 +173,7 @@ class bvh_caster {
 
   WFPG_HD triangle_hit intersect(const wfpg::ray& ray) const { return nearest(ray).triangle; }
 
-  /// True where anything lies inside (t_min, t_max).
+  /// Whether anything is hit inside (t_min, t_max).
   WFPG_HD bool occluded(const wfpg::ray& ray) const {
     return (cut_outs_ ? nearest(ray) : cast<true>(ray)).triangle.is_hit();
   }
@@ -184,12 +184,12 @@ class bvh_caster {
     float distance = 0.0f;
   };
 
-  /// A child on the stack, and the distance's bits where the ray enters it.
+  /// A child on the stack, and the bits of the ray's entry distance.
   struct waiting {
     std::uint32_t child, entry;
   };
 
-  /// With fewer lanes on their way to a leaf, those that are there do not wait for them.
+  /// If fewer lanes are still descending, the lanes at leaves do not wait for them.
   static constexpr int least_company = 24;
 
   WFPG_HD hit nearest(const wfpg::ray& ray) const {
@@ -200,7 +200,7 @@ class bvh_caster {
   template <bool Any>
   WFPG_HD hit cast(const wfpg::ray& asked) const {
     hit found;
-    // A ray that is none would meet every box.
+    // An invalid ray would hit every box.
     if (!nodes_ || !wfpg::is_finite(asked.origin) || !wfpg::is_finite(asked.direction)) return found;
     detail::bvh_ray ray(asked, one_);
     waiting stack[stack_size];
@@ -223,7 +223,7 @@ class bvh_caster {
     }
   }
 
-  /// The nearest child that the ray meets; the others have to wait.
+  /// Returns the nearest child that the ray hits, and pushes the others onto the stack.
   WFPG_HD bvh_child descend(bvh_child at, const detail::bvh_ray& ray, waiting* stack,
                             std::uint32_t& depth) const {
     const bvh_node node = nodes_[at.index()];
@@ -235,14 +235,14 @@ class bvh_caster {
     return entries.keys[0] != detail::bvh_entries::none ? child_of(node, entries.keys[0]) : bvh_child::none();
   }
 
-  // An index into registers would put them into memory.
+  // Indexing registers would put them into memory.
   WFPG_HD static bvh_child child_of(const bvh_node& node, std::uint32_t key) {
     const bvh_child even = key & 2u ? node.children[2] : node.children[0];
     const bvh_child odd = key & 2u ? node.children[3] : node.children[1];
     return key & 1u ? odd : even;
   }
 
-  /// True where the triangle is the nearest hit so far, which it then becomes.
+  /// Whether the triangle is the nearest hit so far. If so, it becomes the hit.
   WFPG_HD static bool meet(const bvh_triangle& t, detail::bvh_ray& ray, hit& found) {
     const vec3 a = t.a - ray.origin, b = t.b - ray.origin, c = t.c - ray.origin;
     const vec2 pa = projected(a, ray), pb = projected(b, ray), pc = projected(c, ray);
@@ -265,7 +265,7 @@ class bvh_caster {
   WFPG_HD static vec2 projected(vec3 p, const detail::bvh_ray& ray) {
     return {along(p, ray.tangent), along(p, ray.bitangent)};
   }
-  // Written out, so that a corner is the same point in each of its triangles, however compilers round.
+  // Written out, so that compilers round a corner equally in each of its triangles.
   WFPG_HD static float along(vec3 p, vec3 axis) {
     return std::fma(p.x, axis.x, std::fma(p.y, axis.y, p.z * axis.z));
   }
@@ -274,7 +274,7 @@ class bvh_caster {
   const bvh_triangle* triangles_ = nullptr;
   const scene_view* cut_outs_ = nullptr;
   environment_view environment_;
-  std::uint32_t one_ = detail::byte_float_base;  // where compilers do not know it
+  std::uint32_t one_ = detail::byte_float_base;  // hides the value from compilers
 };
 
 }  // namespace render

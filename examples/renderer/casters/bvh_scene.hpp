@@ -1,7 +1,7 @@
-// Building the hierarchy of bvh_caster.hpp on any policy. Triangles are sorted by the Morton codes of their
-// centroids and split where codes do, as in Karras 2012, "Maximizing Parallelism in the Construction of BVHs,
-// Octrees, and k-d Trees"; from the root down each node splits its range of them, and the part with the
-// largest surface again, until it has four. The same scene gives the same hierarchy.
+// Builds the BVH of bvh_caster.hpp on any policy. Triangles are sorted by the Morton codes of their centroids
+// and split where codes do. This follows Karras 2012, "Maximizing Parallelism in the Construction of BVHs,
+// Octrees, and k-d Trees". From the root down each node splits its range of triangles, then the part with the
+// largest surface, until it has four parts. The same scene gives the same BVH.
 //
 // Cost: one sort, and O(log n) box look-ups a node. Memory while it builds: 150 bytes a triangle.
 #pragma once
@@ -26,7 +26,7 @@
 namespace render {
 
 struct bvh_options {
-  std::uint32_t leaf_triangles = 1;  ///< of a leaf, at most, in [1, 7]
+  std::uint32_t leaf_triangles = 1;  ///< most triangles of a leaf, in [1, 7]
 };
 
 namespace detail {
@@ -45,7 +45,7 @@ WFPG_HD inline float half_area(const bounds3& box) {
   return e.x * e.y + e.y * e.z + e.z * e.x;
 }
 
-/// A mesh's triangles, of which the hierarchy leaves out those that no ray can hit.
+/// A mesh's triangles. The BVH leaves out those that no ray can hit.
 struct bvh_mesh {
   wfpg::triangle_mesh_view mesh;
 
@@ -68,7 +68,7 @@ struct bvh_mesh {
   WFPG_HD bounds3 box(std::size_t triangle) const {
     return box_around(corner(triangle, 0), corner(triangle, 1), corner(triangle, 2));
   }
-  /// The box of the triangle's centre.
+  /// The box that contains only the triangle's centre.
   WFPG_HD bounds3 operator()(std::size_t triangle) const {
     if (!is_usable(triangle)) return {};
     const vec3 centre = box(triangle).centre();
@@ -80,7 +80,7 @@ struct box_union {
   WFPG_HD bounds3 operator()(const bounds3& a, const bounds3& b) const { return box_around(a, b); }
 };
 
-/// Triangles that are left out have the largest key.
+/// Keys for sorting. Skipped triangles have the largest key.
 struct morton_keys {
   static constexpr std::uint64_t left_out = ~std::uint64_t(0);
   bvh_mesh mesh;
@@ -100,7 +100,7 @@ struct morton_keys {
   }
 };
 
-/// The sorted triangles, as the caster reads them, and their boxes.
+/// Writes the sorted triangles for the caster, and their boxes.
 struct order_triangles {
   bvh_mesh mesh;
   array_view<const std::uint32_t> order;
@@ -114,14 +114,14 @@ struct order_triangles {
   }
 };
 
-/// Boxes of ranges of the sorted triangles. Level k holds those of 2^k triangles each.
+/// Boxes of ranges of the sorted triangles. Level k has the boxes of 2^k triangles each.
 struct range_boxes {
   static constexpr std::uint32_t most_levels = 29;
   bounds3* levels[most_levels];
   std::uint32_t sizes[most_levels];
   std::uint32_t level_count = 0;
 
-  /// Of triangles [first, end).
+  /// The box of triangles [first, end).
   WFPG_HD bounds3 box(std::uint32_t first, std::uint32_t end) const {
     bounds3 result;
     for (std::uint32_t level = 0; first < end; ++level) {
@@ -150,7 +150,7 @@ struct bvh_range {
   WFPG_HD std::uint32_t size() const { return end - first; }
 };
 
-/// Where ranges are split: where the highest bit changes that is not the same in all keys, or in the middle.
+/// Splits ranges at the highest bit that differs between keys, or in the middle.
 struct bvh_splitter {
   array_view<const std::uint64_t> keys;
   range_boxes boxes;
@@ -171,14 +171,14 @@ struct bvh_splitter {
   }
 };
 
-/// Makes the nodes of one level from their ranges; children that are nodes are counted and get their number
+/// Makes the nodes of one level from their ranges. Counts children that are nodes; they get their number
 /// later.
 struct make_nodes {
   bvh_splitter splitter;
   std::uint32_t leaf_triangles;
   const bvh_range* ranges;
   bvh_node* nodes;
-  bvh_range* child_ranges;  ///< four a node; empty of children that are no nodes
+  bvh_range* child_ranges;  ///< four per node; empty for children that are not nodes
   std::uint32_t* child_nodes;
 
   WFPG_HD void operator()(std::size_t i) const {
@@ -198,7 +198,7 @@ struct make_nodes {
   }
 
  private:
-  /// A node's children on the way.
+  /// A node's children while it is split.
   struct parts {
     bvh_range ranges[bvh_node::width];
     bounds3 boxes[bvh_node::width];
@@ -210,7 +210,7 @@ struct make_nodes {
     }
   };
 
-  /// Splits the largest part; false where none can be split.
+  /// Splits the largest part. False if none can be split.
   WFPG_HD bool expand(parts& made) const {
     int chosen = -1;
     float largest = -1.0f;
@@ -230,7 +230,7 @@ struct make_nodes {
     return true;
   }
 
-  /// With a margin of an eighth of a step on every side.
+  /// Adds a margin of an eighth of a step on every side.
   WFPG_HD static bvh_node quantised(const parts& made) {
     bounds3 whole;
     for (int i = 0; i < made.count; ++i) whole = box_around(whole, made.boxes[i]);
@@ -257,7 +257,7 @@ struct make_nodes {
   }
 };
 
-/// Gives the children of a level's nodes their numbers, and the next level its ranges.
+/// Numbers the children of a level's nodes, and sets the next level's ranges.
 struct number_children {
   const bvh_range* child_ranges;
   const std::uint32_t* prefix;  ///< child nodes of the nodes up to this one
@@ -278,15 +278,15 @@ struct number_children {
 
 }  // namespace detail
 
-/// Owns the hierarchy over a mesh's triangles, in the memory of a policy. Triangles without area, or with
-/// vertices that are not finite or beyond 1e15, are left out: no ray hits them.
+/// Owns the BVH over a mesh's triangles, in a policy's memory. Leaves out triangles without area, or with
+/// vertices that are not finite or beyond 1e15. No ray hits them.
 template <class Exec>
 class bvh_scene {
  public:
   static constexpr const char* name = "bvh";
 
-  /// `environment`: radiance where rays hit nothing, luminance. Reads the mesh only here. Throws
-  /// out_of_memory, std::invalid_argument for options out of range and 2^28 triangles or more.
+  /// `environment` is the luminance of rays that miss. Reads the mesh only here. Throws out_of_memory, and
+  /// std::invalid_argument for options out of range or 2^28 triangles or more.
   bvh_scene(const Exec& exec, const wfpg::triangle_mesh_view& mesh, float environment,
             const bvh_options& options = {})
       : environment_(vec3(environment)) {
@@ -298,7 +298,7 @@ class bvh_scene {
     if (!mesh.triangles.empty()) build(exec, {mesh}, options);
   }
 
-  /// Over a scene whose arrays the policy has already.
+  /// Over a scene whose arrays are already in the policy's memory.
   bvh_scene(const Exec& exec, const scene& host, const scene_view& arrays)
       : bvh_scene(exec, {arrays.positions, arrays.triangles}, 0.0f) {
     environment_ = arrays.environment;
@@ -349,7 +349,7 @@ class bvh_scene {
     }
   }
 
-  /// False where there are more levels than the caster's stack is made for.
+  /// False if there are more levels than the caster's stack allows.
   bool build_nodes(const Exec& exec, const detail::bvh_splitter& splitter, const bvh_options& options) {
     const auto n = static_cast<std::uint32_t>(splitter.keys.size());
     const wfpg::buffer<bvh_node, Exec> nodes(exec, n);  // each splits its triangles

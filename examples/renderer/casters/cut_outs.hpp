@@ -1,4 +1,4 @@
-// Surfaces that an alpha mask cuts holes into: a ray that hits a hole goes on behind it.
+// Alpha masks that cut holes into surfaces. A ray that hits a hole continues behind it.
 #pragma once
 
 #include "scene/device_scene.hpp"
@@ -7,14 +7,14 @@
 
 namespace render {
 
-/// The first hit that is not in a hole. `cast(ray)` gives the first hit as `triangle` and `distance`, inside
-/// (t_min, t_max) alone; `scene` is null where nothing is cut out.
+/// The first hit that is not in a hole. `cast(ray)` returns the first hit as `triangle` and `distance`, only
+/// inside (t_min, t_max). `scene` is null if it has no holes.
 template <class Cast>
 WFPG_HD auto cast_through_cut_outs(const scene_view* scene, wfpg::ray ray, const Cast& cast) {
   for (;;) {
     const auto found = cast(ray);
     if (!scene || !found.triangle.is_hit() || !scene->is_cut_out(found.triangle)) return found;
-    const float distance = glm::max(found.distance, 1e-30f);  // nothing smaller need have a successor
+    const float distance = glm::max(found.distance, 1e-30f);  // smaller numbers may have no successor
     ray.t_min = wfpg::bits_float(wfpg::float_bits(distance) + 1u);
   }
 }

@@ -27,7 +27,7 @@ embree_scene::embree_scene(const scene& host) : environment_(host.environment) {
   device_.reset(rtcNewDevice(nullptr));
   check(device_.get(), "making a device");
   scene_.reset(rtcNewScene(device_.get()));
-  // Rays that pass between two triangles of a closed wall are light that should not be there.
+  // Without this, rays pass between two triangles of a closed wall and leak light.
   rtcSetSceneFlags(scene_.get(), RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(scene_.get(), RTC_BUILD_QUALITY_HIGH);
   const RTCGeometry geometry = rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE);

@@ -15,13 +15,13 @@
 
 namespace render {
 
-/// Casts rays, from any thread. Trivially copyable; valid while the embree_scene it is from lives.
+/// Casts rays, from any thread. Trivially copyable. Valid while its embree_scene lives.
 class embree_caster {
  public:
   embree_caster(RTCScene scene, const scene_view* cut_outs, const environment_view& environment)
       : scene_(scene), cut_outs_(cut_outs), environment_(environment) {}
 
-  /// The guider's form: distance, or the environment's luminance.
+  /// The guider's interface: distance, or the environment's luminance.
   wfpg::ray_hit operator()(const wfpg::ray& ray) const {
     const hit found = nearest(ray);
     if (!found.triangle.is_hit()) return {-1.0f, wfpg::luminance(environment_.radiance(ray.direction))};
@@ -30,7 +30,7 @@ class embree_caster {
 
   triangle_hit intersect(const wfpg::ray& ray) const { return nearest(ray).triangle; }
 
-  /// True where anything lies inside (t_min, t_max).
+  /// Whether anything is hit inside (t_min, t_max).
   bool occluded(const wfpg::ray& ray) const {
     if (cut_outs_) return nearest(ray).triangle.is_hit();
     RTCRay shadow = convert(ray);
@@ -62,7 +62,7 @@ class embree_caster {
     return result;
   }
 
-  /// One of Embree's calls with nothing that is not its default, which version 3 wants made.
+  /// Calls Embree with default arguments, which version 3 needs explicitly.
   template <class Call, class Ray>
   void ask(Call call, Ray& ray) const {
 #if RTC_VERSION_MAJOR >= 4
@@ -93,10 +93,11 @@ class embree_scene {
  public:
   static constexpr const char* name = "embree";
 
-  /// Builds with all the machine's threads. Throws std::runtime_error where Embree fails.
-  /// Precondition: the scene has neither cut-outs nor a sky.
+  /// Builds with all the machine's threads. Throws std::runtime_error if Embree fails. Precondition: the
+  /// scene has neither holes nor a sky.
   explicit embree_scene(const scene& host);
-  /// The same with both. `arrays` are the scene's, in host memory, and outlive this.
+  /// Builds a scene that may have holes and a sky. `arrays` are the scene's, in host memory, and must outlive
+  /// this.
   template <class Exec>
   embree_scene(const Exec&, const scene& host, const scene_view& arrays) : embree_scene(host) {
     environment_ = arrays.environment;

@@ -1,4 +1,4 @@
-// Fields whose cones find light through the octree alone, in the place of the scene's ray caster.
+// Cones that find light through the octree alone, in place of the scene's ray caster.
 #pragma once
 
 #include "app/render.hpp"
@@ -32,7 +32,7 @@ class octree_caster {
   bool gathers_;
 };
 
-/// A guider, which outlives this, but for its caster.
+/// A guider with this caster. The guider must outlive it.
 template <class Exec, class Guider>
 class octree_cone_guider {
  public:

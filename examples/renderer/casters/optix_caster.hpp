@@ -1,4 +1,4 @@
-// OptiX as the ray caster of the renderer and of the guider, batch by batch, on the CUDA policy.
+// OptiX as the batch ray caster of the renderer and of the guider, on the CUDA policy.
 #pragma once
 
 #include "casters/optix_tracer.hpp"
@@ -14,9 +14,9 @@
 
 namespace render {
 
-/// Casts batches of rays that lie in device memory, ordered on the policy's stream; waits for nothing. Hits
-/// lie inside (t_min, t_max), from zero on; a ray that is not finite misses. Trivially copyable; valid while
-/// the optix_scene it is from lives. `hits` and `hidden` hold one element a ray.
+/// Casts batches of rays in device memory, ordered on the policy's stream. Does not wait. Hits are inside
+/// (t_min, t_max), from zero on. A ray that is not finite misses. Trivially copyable. Valid while its
+/// optix_scene lives. `hits` and `hidden` have one element a ray.
 class optix_caster {
  public:
   optix_caster(const optix_tracer& tracer, float environment) : tracer_(&tracer), environment_(environment) {}
@@ -26,13 +26,13 @@ class optix_caster {
     launch(exec, optix_query::intersect, rays, hits.data());
   }
 
-  /// 1 where anything lies inside (t_min, t_max), else 0.
+  /// Writes 1 if anything is hit inside (t_min, t_max), else 0.
   void occluded(const wfpg::exec::cuda& exec, wfpg::array_view<const wfpg::ray> rays,
                 wfpg::array_view<std::uint32_t> hidden) const {
     launch(exec, optix_query::occluded, rays, hidden.data());
   }
 
-  /// The guider's form: distance, or the environment's luminance.
+  /// The guider's interface: distance, or the environment's luminance.
   void cast(const wfpg::exec::cuda& exec, wfpg::array_view<const wfpg::ray> rays,
             wfpg::array_view<wfpg::ray_hit> hits) const {
     launch(exec, optix_query::cast, rays, hits.data());
@@ -44,8 +44,8 @@ class optix_caster {
               T* answers) const {
     for (std::size_t first = 0; first < rays.size(); first += optix_tracer::max_rays) {
       const std::size_t count = wfpg::min(rays.size() - first, optix_tracer::max_rays);
-      // Each launch has parameters of its own, taken, written and given back in the stream's order. The
-      // vector may go at once: what a copy reads from pageable memory it has read when the call returns.
+      // Each launch has its own parameters, allocated, copied and freed in the stream's order. The vector may
+      // be destroyed at once, since a copy from pageable memory has been read when the call returns.
       const std::vector<optix_parameters> one{
           {rays.data() + first, answers + first, environment_, tracer_->tree()}};
       const wfpg::buffer<optix_parameters, wfpg::exec::cuda> parameters(exec, one);
@@ -68,7 +68,7 @@ struct make_finite {
   }
 };
 
-/// A triangle of which a corner is not finite, or is none, collapses, so that no ray hits it.
+/// A triangle with a corner that is not finite or missing collapses, so that no ray hits it.
 struct collapse_invalid {
   wfpg::array_view<const vec3> positions;
   wfpg::array_view<const uvec3> triangles;
@@ -87,11 +87,10 @@ struct collapse_invalid {
 /// Owns OptiX's pipeline and acceleration structure of a mesh.
 class optix_scene {
  public:
-  /// Builds on the policy's device and waits for it. Positions and triangles are device memory and are not
-  /// read later; degenerate triangles, and those with corners that are not finite or not there, are never
-  /// hit. `environment`: luminance of what rays see that miss, W/(m² sr). The policy's stream and memory must
-  /// outlive this. Throws wfpg::out_of_memory, wfpg::cuda_error, and std::runtime_error that says what OptiX
-  /// needs where it is not there.
+  /// Builds on the policy's device and waits. Positions and triangles are device memory and not read later.
+  /// Degenerate triangles, and those with corners that are not finite or missing, are never hit.
+  /// `environment` is the luminance of rays that miss, W/(m² sr). The policy's stream and memory must outlive
+  /// this. Throws wfpg::out_of_memory, wfpg::cuda_error, and std::runtime_error that names what OptiX needs.
   optix_scene(const wfpg::exec::cuda& exec, wfpg::array_view<const vec3> positions,
               wfpg::array_view<const uvec3> triangles, float environment)
       : environment_(environment) {
@@ -105,7 +104,7 @@ class optix_scene {
 
   optix_caster caster() const { return {*tracer_, environment_}; }
 
-  /// Bytes of device memory that are kept.
+  /// Bytes of device memory that it keeps.
   std::size_t bytes() const { return tracer_->bytes(); }
 
  private:

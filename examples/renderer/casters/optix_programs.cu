@@ -1,5 +1,5 @@
-// OptiX's device programs: one for each question that a batch of rays asks. Traversal leaves its answer in
-// the hit object, so that there are no programs for hits and misses, and no payload.
+// OptiX's device programs, one for each query of a batch of rays. Traversal leaves its answer in the hit
+// object. No programs for hits and misses and no payload are needed.
 #include "casters/optix_parameters.hpp"
 #include "scene/device_scene.hpp"
 
@@ -13,10 +13,10 @@ __constant__ render::optix_parameters parameters;
 
 namespace {
 
-/// True where the ray hits anything inside (t_min, t_max), which the hit object then tells of.
+/// Whether the ray hits anything inside (t_min, t_max). The hit object then has the hit.
 __device__ __forceinline__ bool hits(const wfpg::ray& ray, unsigned flags) {
   using wfpg::is_finite;
-  // What OptiX does with other than finite numbers and distances from zero on is not defined.
+  // OptiX's behaviour is undefined for numbers that are not finite and for negative distances.
   const float t_min = fmaxf(ray.t_min, 0.0f), t_max = fminf(ray.t_max, wfpg::ray().t_max);
   const bool in_order = ray.t_min < ray.t_max && t_min < t_max;
   if (!in_order || !is_finite(ray.origin) || !is_finite(ray.direction)) return false;

@@ -21,7 +21,7 @@
 
 namespace render {
 
-// The text of optix_programs.cu in PTX, made by the build.
+// The PTX of optix_programs.cu. The build makes it.
 extern const char* const optix_programs_ptx;
 
 namespace {
@@ -42,7 +42,7 @@ void check(cudaError_t code, const char* call) {
   throw wfpg::device_error(code, cudaGetErrorString(code), call);
 }
 
-/// Calls `make(log, size)`, whose log becomes part of the error.
+/// Calls `make(log, size)`. On failure its log becomes part of the error.
 template <class F>
 void check_with_log(const char* what, const F& make) {
   std::array<char, 4096> log{};
@@ -51,7 +51,7 @@ void check_with_log(const char* what, const F& make) {
   check(result, what, log.data());
 }
 
-/// Loads the driver's part of OptiX and makes the device's context current.
+/// Loads the driver's part of OptiX, and makes the device's context current.
 void initialise() {
   check(cudaFree(nullptr), "OptiX needs an NVIDIA GPU and its driver; cudaFree");
   const OptixResult result = optixInit();
@@ -71,13 +71,13 @@ struct release {
 template <class Handle>
 using owner = std::unique_ptr<std::remove_pointer_t<Handle>, release>;
 
-/// Memory and copies ordered on a stream: what wfpg::buffer asks of a policy.
+/// Memory and copies ordered on a stream, with the interface that wfpg::buffer needs of a policy.
 struct stream_memory {
   cudaStream_t stream;
   wfpg::memory_resource* memory;
 
   wfpg::memory_resource* resource() const { return memory; }
-  /// Pageable memory is read when the call returns.
+  /// Pageable memory has been read when the call returns.
   void copy_from_host(void* to, const void* from, std::size_t bytes) const {
     check(cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, stream), "cudaMemcpyAsync");
   }
@@ -87,7 +87,7 @@ struct stream_memory {
   }
 };
 
-/// Device memory aligned as acceleration structures have to be, whatever the memory resource does.
+/// Device memory with the alignment of acceleration structures, for any memory resource.
 class aligned_memory {
  public:
   aligned_memory() = default;
@@ -103,13 +103,13 @@ class aligned_memory {
   wfpg::buffer<std::byte, stream_memory> block_;
 };
 
-/// A mesh's acceleration structure. A default one has no triangles: every ray misses.
+/// A mesh's acceleration structure. Without triangles (the default), every ray misses.
 struct acceleration_structure {
   OptixTraversableHandle handle = 0;
   aligned_memory memory;
 };
 
-/// As a build's input, which points to its parts.
+/// A build's input, which points to its members.
 class triangle_input {
  public:
   triangle_input(wfpg::array_view<const wfpg::vec3> positions, wfpg::array_view<const wfpg::uvec3> triangles)
@@ -205,7 +205,7 @@ owner<OptixProgramGroup> make_group(OptixDeviceContext context, const OptixProgr
   return owner<OptixProgramGroup>(group);
 }
 
-/// One group for each query, in their order, and after them those of misses and hits, which run nothing.
+/// One group for each query, in order, then those of misses and hits, which run nothing.
 std::vector<owner<OptixProgramGroup>> make_groups(OptixDeviceContext context, OptixModule module) {
   std::vector<owner<OptixProgramGroup>> groups;
   for (const char* name : {"__raygen__intersect", "__raygen__occluded", "__raygen__cast"}) {
@@ -237,7 +237,7 @@ owner<OptixPipeline> make_pipeline(OptixDeviceContext context,
   return owner<OptixPipeline>(pipeline);
 }
 
-/// A shader binding table's record without data.
+/// A record of the shader binding table, without data.
 struct alignas(OPTIX_SBT_RECORD_ALIGNMENT) sbt_record {
   std::array<std::byte, OPTIX_SBT_RECORD_HEADER_SIZE> header;
 };

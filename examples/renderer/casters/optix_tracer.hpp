@@ -1,5 +1,5 @@
-// OptiX's pipeline and the acceleration structure of one mesh, launched on CUDA streams. Needs no nvcc;
-// optix_caster.hpp gives it to the renderer and to the guider.
+// OptiX's pipeline and the acceleration structure of one mesh, launched on CUDA streams. Needs no nvcc.
+// optix_caster.hpp makes it a caster of the renderer and of the guider.
 #pragma once
 
 #include "casters/optix_parameters.hpp"
@@ -14,16 +14,16 @@
 
 namespace render {
 
-/// What a batch of rays asks; each has a program in optix_programs.cu.
+/// Queries for a batch of rays. Each has a program in optix_programs.cu.
 enum class optix_query { intersect, occluded, cast };
 
-/// Owns what OptiX makes for one mesh. Launches may run on several streams at once.
+/// Owns OptiX's objects for one mesh. Launches may run on several streams at once.
 class optix_tracer {
  public:
-  /// Builds on the current device, ordered on `stream`, and waits for it. `memory` hands out device memory
-  /// ordered on that stream and outlives this, as the stream does. Positions and triangles are device memory,
-  /// finite, with every corner below the number of positions; neither is read later. Throws
-  /// wfpg::out_of_memory, and std::runtime_error that says what OptiX needs where it is not there.
+  /// Builds on the current device, ordered on `stream`, and waits. `memory` allocates device memory ordered
+  /// on that stream. Both must outlive this. Positions and triangles are finite device memory, and every
+  /// corner is below the number of positions. Neither is read later. Throws wfpg::out_of_memory, and
+  /// std::runtime_error that names what OptiX needs.
   optix_tracer(cudaStream_t stream, wfpg::memory_resource* memory,
                wfpg::array_view<const wfpg::vec3> positions, wfpg::array_view<const wfpg::uvec3> triangles);
   /// Waits for the stream.
@@ -33,10 +33,10 @@ class optix_tracer {
 
   /// The mesh's acceleration structure, for optix_parameters::tree.
   unsigned long long tree() const;
-  /// Bytes of device memory that are kept.
+  /// Bytes of device memory that it keeps.
   std::size_t bytes() const;
 
-  /// The most rays of one launch (the programming guide's limit on a launch's size).
+  /// The most rays of one launch (the programming guide's limit).
   static constexpr std::size_t max_rays = std::size_t(1) << 30;
 
   /// Launches `count` rays, at least one, ordered on `stream`. `parameters` is device memory.

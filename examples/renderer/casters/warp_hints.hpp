@@ -1,12 +1,12 @@
-// What a GPU has an instruction for that compilers do not find by themselves; plain C++ elsewhere.
+// GPU instructions that compilers do not choose by themselves. Plain C++ elsewhere.
 #pragma once
 
 #include <wfpg/base/math.hpp>
 
 namespace render::detail {
 
-/// 1 + q / 2^15 of byte number `i` of a word: a float that is put together without a conversion. `one` is
-/// byte_float_base, best from where the compiler does not know it.
+/// 1 + q / 2^15 for byte number `i` of a word, a float that needs no conversion. `one` is byte_float_base,
+/// best from memory, so that the compiler does not know its value.
 inline constexpr std::uint32_t byte_float_base = 0x3f800000u;
 WFPG_HD inline float byte_float(std::uint32_t word, int i, std::uint32_t one) {
 #if defined(__CUDA_ARCH__)
@@ -16,8 +16,8 @@ WFPG_HD inline float byte_float(std::uint32_t word, int i, std::uint32_t one) {
 #endif
 }
 
-/// The largest of four floats, of which the last is not negative. As integers, whose order is theirs too but
-/// for negative ones.
+/// The largest of four floats, of which the last is not negative. Compares them as integers, which have the
+/// same order except for negative floats.
 WFPG_HD inline float largest_of(float a, float b, float c, float not_negative) {
 #if defined(__CUDA_ARCH__)
   return fmaxf(__int_as_float(__vimax3_s32(__float_as_int(a), __float_as_int(b), __float_as_int(c))),
@@ -27,7 +27,7 @@ WFPG_HD inline float largest_of(float a, float b, float c, float not_negative) {
 #endif
 }
 
-/// The smallest of four floats, or any negative one where there is one.
+/// The smallest of four floats, or any negative one if there is one.
 WFPG_HD inline float smallest_of(float a, float b, float c, float d) {
 #if defined(__CUDA_ARCH__)
   return __int_as_float(
@@ -37,7 +37,7 @@ WFPG_HD inline float smallest_of(float a, float b, float c, float d) {
 #endif
 }
 
-/// How many lanes of the warp are here.
+/// The number of active lanes of the warp.
 WFPG_HD inline int lanes_here() {
 #if defined(__CUDA_ARCH__)
   return __popc(__activemask());

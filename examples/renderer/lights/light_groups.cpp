@@ -1,6 +1,6 @@
-// Lights are pieces: an emitter's triangles that lie in one plane, or a light without extent. Groups of
-// pieces are split in two, those first whose pieces differ most, along the one of six coordinates that varies
-// most.
+// Groups of lights. A piece is an emitter's triangles in one plane, or a light without extent. Groups of
+// pieces are split in two, those with the most different pieces first. The split is along the coordinate of
+// six that varies most.
 #include "lights/light_groups.hpp"
 
 #include "lights/lights.hpp"
@@ -16,22 +16,22 @@
 namespace render {
 namespace {
 
-/// A light as it is counted in the table.
+/// A light, as the table counts it.
 struct single_light {
   std::uint32_t number;  ///< as in grouped_lights::lights
   vec3 position;
-  vec3 normal;  ///< zero: it shines in all directions
+  vec3 normal;  ///< zero: it emits in all directions
   double power;
 };
 
-/// Where it is in units of the scene's radius, and where it shines: opposite sides are as far apart as places
-/// at a fifth of the radius.
+/// Position in units of the scene's radius, and direction of emission. Opposite directions are as far apart
+/// as places at a fifth of the radius.
 using features = std::array<double, 6>;
 constexpr double weight_of_normals = 0.1;
 /// The standard deviation of a group that needs no split.
 constexpr double close_enough = 0.02;
 
-/// Something that stays in one group.
+/// Lights that stay in one group.
 struct piece {
   std::vector<std::uint32_t> members;
   double power = 0.0;
@@ -51,7 +51,7 @@ struct piece {
   }
 };
 
-/// Pieces that are not told apart.
+/// Pieces that form a group.
 struct cluster {
   std::vector<const piece*> pieces;
   double power = 0.0;
@@ -68,12 +68,12 @@ struct cluster {
         variance[k] += p->power * (p->mean[k] - mean[k]) * (p->mean[k] - mean[k]) / power;
   }
 
-  /// How much a split would help; 0 where none is needed.
+  /// How much a split would help. 0 if none is needed.
   double urgency() const {
     const double spread = std::accumulate(variance.begin(), variance.end(), 0.0);
     return spread > close_enough * close_enough ? std::sqrt(power) * spread : 0.0;
   }
-  /// Those up to the mean along the coordinate that varies most stay here, the others come back.
+  /// Keeps the pieces up to the mean along the coordinate that varies most, and returns the others.
   cluster split() {
     const auto axis =
         static_cast<std::size_t>(std::max_element(variance.begin(), variance.end()) - variance.begin());
@@ -124,9 +124,9 @@ std::vector<single_light> lights_of(const scene& host, float scene_radius) {
   return lights;
 }
 
-/// Triangles that share a corner, a material and, but for rounding, a normal, are one piece.
+/// Triangles are one piece if they share a corner, a material and, except for rounding, a normal.
 std::vector<piece> pieces_of(const scene& host, const std::vector<single_light>& lights, float scene_radius) {
-  std::vector<std::uint32_t> first(lights.size());  // of its piece, or one nearer to that
+  std::vector<std::uint32_t> first(lights.size());  // of its piece, or a triangle nearer to it
   std::iota(first.begin(), first.end(), 0u);
   const auto find = [&](std::uint32_t i) {
     while (first[i] != i) i = first[i] = first[first[i]];

@@ -1,5 +1,5 @@
-// A scene's lights in groups that a place is likely to prefer or to avoid as a whole: near each other, and of
-// one orientation.
+// Groups of a scene's lights. Lights in a group are near each other and have one orientation, so that a place
+// prefers or avoids all of them.
 #pragma once
 
 #include "scene/scene.hpp"
@@ -9,14 +9,14 @@
 
 namespace render {
 
-/// Lights that follow each other, and the share of all lights' power that is theirs.
+/// Consecutive lights, and their fraction of all lights' power.
 struct light_group {
   std::uint32_t first = 0;
   std::uint32_t count = 0;
   float share = 1.0f;
 };
 
-/// All lights of a scene. An environment map is the last, and alone where there are several groups.
+/// All lights of a scene. An environment map is the last, and in its own group if there are several.
 struct grouped_lights {
   static constexpr std::uint32_t beyond_triangles = 0x80000000u;
 
@@ -28,8 +28,8 @@ struct grouped_lights {
   float scene_radius = 0.0f;  ///< of a sphere around the scene
 };
 
-/// In at most `most` groups, in [1, 255], and one more for an environment map. Flat emitters are not divided,
-/// and lights that are close to each other for their scene stay together.
+/// Makes at most `most` groups, in [1, 255], and one more for an environment map. Flat emitters are not
+/// divided. Lights that are close relative to the scene stay together.
 grouped_lights group_lights(const scene& host, std::uint32_t most);
 
 }  // namespace render

@@ -1,5 +1,5 @@
-// The lights of a scene, picked in proportion to their power: emitting triangles, sampled uniformly by area,
-// and lights without extent. And an environment that is a map; BSDFs and guiding find a constant one.
+// The lights of a scene, chosen in proportion to their power. They are emitting triangles, sampled uniformly
+// by area, lights without extent, and an environment map. BSDFs and guiding find a constant environment.
 #pragma once
 
 #include "lights/light_groups.hpp"
@@ -11,7 +11,7 @@
 
 namespace render {
 
-/// A point of an emitter.
+/// A point on an emitter.
 struct emitter_point {
   vec3 position{0.0f};
   vec3 normal{0.0f};  ///< geometric, unit length, on the side that emits
@@ -20,17 +20,17 @@ struct emitter_point {
   float offset = 0.0f;  ///< as in surface_point
 };
 
-/// Light that a point may get from one direction.
+/// Light at a point from one direction.
 struct light_sample {
   vec3 direction{0.0f};  ///< toward the light, unit length
   float pdf = 0.0f;     ///< per steradian, or the probability of a light without extent; 0: there is no light
-  vec3 radiance{0.0f};  ///< of a light without extent: irradiance of what faces it
+  vec3 radiance{0.0f};  ///< of a light without extent: irradiance of a surface that faces it
   bool is_delta = false;    ///< it has no extent
-  bool is_distant = false;  ///< `end` says nothing
+  bool is_distant = false;  ///< `end` has no meaning
   vec3 end{0.0f};           ///< where a ray toward it ends
 };
 
-/// Density per solid angle of a direction, from the density by area of the point it leads to.
+/// Converts a density by area into one by solid angle.
 WFPG_HD inline float solid_angle_pdf(float area_pdf, float distance, float cosine) {
   return cosine > 0.0f ? area_pdf * distance * distance / cosine : 0.0f;
 }
@@ -45,7 +45,7 @@ struct light_view {
   float total_power = 0.0f;   ///< over pi; of an emitter, mean luminance times area
   float scene_radius = 0.0f;  ///< of a sphere around the scene
 
-  /// Over pi, of the light that may meet a scene of that radius.
+  /// Power over pi of light that may hit a scene of that radius.
   WFPG_HD static float power_of(const punctual_light& source, float radius) {
     const float luminance = wfpg::luminance(source.intensity);
     if (source.kind == punctual_kind::directional) return radius * radius * luminance;
@@ -56,10 +56,10 @@ struct light_view {
     return radius * radius * environment.total();
   }
 
-  /// Density by area of any point of an emitter with this mean luminance.
+  /// Density by area of any point on an emitter with this mean luminance.
   WFPG_HD float pdf(float luminance) const { return total_power > 0.0f ? luminance / total_power : 0.0f; }
 
-  /// A point of the emitter in a column of the table.
+  /// A point on the emitter in a column of the table.
   WFPG_HD emitter_point sample_emitter(const scene_view& scene, std::uint32_t light, vec2 u) const {
     const float root = std::sqrt(u.x);
     const triangle_hit hit{lights[light], root * (1.0f - u.y), root * u.y};
@@ -70,19 +70,19 @@ struct light_view {
             at.offset};
   }
 
-  /// Density per steradian with which sample() finds the environment along a direction.
+  /// Density of sample() for the environment along a direction, per steradian.
   WFPG_HD float environment_pdf(const environment_view& environment, vec3 direction) const {
     if (!(total_power > 0.0f)) return 0.0f;
     return environment.pdf(direction) * power_of(environment, scene_radius) / total_power;
   }
 
-  /// The groups of an emitting triangle and of the environment.
+  /// The group of an emitting triangle, and of the environment.
   WFPG_HD std::uint32_t group_of(std::uint32_t triangle) const {
     return triangle_groups.empty() ? 0u : triangle_groups[triangle];
   }
   WFPG_HD std::uint32_t sky_group() const { return static_cast<std::uint32_t>(groups.size() - 1); }
 
-  /// Light for a point, of the group that was chosen; draw(dimension) gives random numbers in [0,1)².
+  /// Samples light for a point from the chosen group. draw(dimension) returns random numbers in [0,1)².
   template <class Draw>
   WFPG_HD light_sample sample(const scene_view& scene, vec3 from, const wfpg::light_choice& choice,
                               const Draw& draw) const {
@@ -96,7 +96,7 @@ struct light_view {
   }
 
  private:
-  /// As if all lights were one group.
+  /// Samples light as if all lights were one group.
   template <class Draw>
   WFPG_HD light_sample sample_light(const scene_view& scene, vec3 from, std::uint32_t light,
                                     const Draw& draw) const {
@@ -156,11 +156,11 @@ struct light_view {
   }
 };
 
-/// The distribution over a scene's lights, in the memory of a policy.
+/// The distribution over a scene's lights, in a policy's memory.
 template <class Exec>
 class light_distribution {
  public:
-  /// Throws std::invalid_argument where the lights' sum is above largest_light_power.
+  /// Throws std::invalid_argument if the lights' sum is above largest_light_power.
   light_distribution(const Exec& exec, const scene& host, std::uint32_t most_groups = 1)
       : light_distribution(exec, host, group_lights(host, most_groups)) {}
 
@@ -176,7 +176,7 @@ class light_distribution {
     return v;
   }
 
-  /// The share of each group in the lights' power.
+  /// The fraction of each group in the lights' power.
   const std::vector<float>& shares() const { return shares_; }
 
  private:

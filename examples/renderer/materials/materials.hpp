@@ -1,5 +1,5 @@
-// The BSDF of the renderer: one tagged, trivially copyable type, so that a kernel needs no virtual call.
-// Directions as in <wfpg/host/bsdf.hpp>: world space, unit length, away from the surface.
+// The BSDF of the renderer: one tagged, trivially copyable type, so that kernels need no virtual calls.
+// Directions are as in <wfpg/host/bsdf.hpp>: world space, unit length, away from the surface.
 #pragma once
 
 #include "materials/metallic_roughness.hpp"
@@ -11,9 +11,9 @@
 
 namespace render {
 
-/// How one point scatters. Reflecting kinds do so on the side that both normals face; dielectrics' normals
-/// face outward. Directions that the two normals put on different sides carry nothing: no light leaks through
-/// a surface because its shading normal leans.
+/// How one point scatters. Reflecting kinds scatter on the side that both normals face. Dielectrics' normals
+/// face outward. A direction that the two normals put on different sides has the value 0. Shading normals
+/// therefore leak no light.
 struct bsdf {
   vec3 normal{0.0f, 0.0f, 1.0f};  ///< shading normal, unit length
   vec3 geometric_normal{0.0f, 0.0f, 1.0f};
@@ -21,7 +21,7 @@ struct bsdf {
   float alpha = 0.1f;
   float ior = 1.5f;
   material_kind kind = material_kind::lambert;
-  unorm8x3 transmitted_colour{};  ///< this and the next: of the two kinds with all lobes
+  unorm8x3 transmitted_colour{};  ///< this and the next: only for the two kinds with all lobes
   lobe_factors factors{};
 
   WFPG_HD bool is_delta() const { return is_smooth(kind); }
@@ -39,7 +39,7 @@ struct bsdf {
     }
   }
 
-  /// f |cos| per channel, per steradian; 0 for delta lobes.
+  /// f |cos| per channel, per steradian. 0 for delta lobes.
   WFPG_HD vec3 eval_rgb(vec3 outgoing, vec3 incident) const {
     if (has_all_lobes()) {
       const local_pair pair(*this, outgoing, incident);
@@ -61,7 +61,7 @@ struct bsdf {
     return reflects(outgoing, incident) ? wfpg::luminance(colour) * glm::dot(incident, normal) / pi : 0.0f;
   }
 
-  /// What facets reflect and refract, and how often sample() draws from it.
+  /// The light that facets reflect and refract, and the probability that sample() chooses them.
   WFPG_HD wfpg::glossy_part glossy(vec3 outgoing) const {
     if (kind == material_kind::lambert) return {};
     if (kind == material_kind::conductor) return {1.0f, alpha};
@@ -71,13 +71,13 @@ struct bsdf {
     return {};
   }
 
-  /// Density of sample(), per steradian; 0 for delta lobes.
+  /// Density of sample(), per steradian. 0 for delta lobes.
   WFPG_HD float pdf(vec3 outgoing, vec3 incident) const {
     const float coat = glossy(outgoing).fraction;
     return (coat > 0.0f ? coat * pdf_part(true, outgoing, incident) : 0.0f) +
            (coat < 1.0f ? (1.0f - coat) * pdf_part(false, outgoing, incident) : 0.0f);
   }
-  /// The same of one part.
+  /// Density of sample_part(), per steradian.
   WFPG_HD float pdf_part(bool coat, vec3 outgoing, vec3 incident) const {
     if (has_all_lobes()) {
       const local_pair pair(*this, outgoing, incident);
@@ -104,7 +104,7 @@ struct bsdf {
     if (drawn.pdf > 0.0f && coat > 0.0f) drawn.pdf = pdf(outgoing, drawn.direction);
     return drawn;
   }
-  /// The same from one part, with its density.
+  /// Samples one part, with that part's density.
   WFPG_HD wfpg::bsdf_sample sample_part(bool coat, vec3 outgoing, vec2 u) const {
     if (is_delta() || is_black()) return {};
     const frame local(normal);
@@ -129,13 +129,13 @@ struct bsdf {
     if (kind == material_kind::mirror) return colour;
     const float above = glm::dot(outgoing, normal);
     if (above * glm::dot(incident, normal) > 0.0f) return vec3(1.0f);
-    // Radiance is squeezed into a smaller solid angle where the index is larger.
+    // Refraction compresses radiance into a smaller solid angle where the index is larger.
     const float eta = is_thin() ? 1.0f : relative_ior(above);
     return colour / (eta * eta);
   }
 
-  /// What part of the light goes on, roughly and per sample of this BSDF: for Russian roulette.
-  /// Does not see how radiance changes with the index of refraction, which paths that leave again get back.
+  /// About the fraction of the light that continues, per sample of this BSDF, for Russian roulette. Ignores
+  /// how the index of refraction changes radiance, since paths that leave again undo this.
   WFPG_HD float reflectance(vec3 outgoing, vec3 incident) const {
     const float eta = ior_beyond(outgoing, incident);
     if (is_delta()) return eta * eta * wfpg::luminance(delta_weight_rgb(outgoing, incident));
@@ -144,7 +144,7 @@ struct bsdf {
     return eta * eta * eval(outgoing, incident) / density;
   }
 
-  /// The index of refraction where light of `incident` comes from, over that where it goes to.
+  /// The index of refraction on the incident side, over that on the other side.
   WFPG_HD float ior_beyond(vec3 outgoing, vec3 incident) const {
     const float above = glm::dot(outgoing, normal);
     const bool enters = !is_thin() && above * glm::dot(incident, normal) < 0.0f;
@@ -177,7 +177,8 @@ struct bsdf {
     return outgoing_cosine > 0.0f ? ior : 1.0f / ior;
   }
 
-  // How often a plastic's sample comes from its coat: as the two reflect, but neither is ever left out.
+  // The probability of a plastic's coat: its fraction of the reflectance, bounded so that neither part is
+  // left out.
   WFPG_HD float coat_probability(float cosine) const {
     const float base = wfpg::luminance(colour);
     if (!(base > 0.0f)) return 1.0f;
@@ -187,7 +188,7 @@ struct bsdf {
 
   WFPG_HD static float side_of(float cosine) { return cosine < 0.0f ? -1.0f : 1.0f; }
 
-  /// Two directions turned so that `outgoing` is above the surface, where light can go from one to the other.
+  /// Two directions in the surface's frame with `outgoing` above, if light can pass between them.
   struct local_pair {
     vec3 outgoing, incident;
     float side;
@@ -206,12 +207,12 @@ struct bsdf {
     }
   };
 
-  /// All lobes as the side of `outgoing` sees them.
+  /// All lobes as seen from the side of `outgoing`.
   WFPG_HD metallic_roughness lobes(float side) const {
-    lobe_factors shares = factors;
-    if (kind == material_kind::rough_dielectric) shares.specular = shares.transmission = unorm8(1.0f);
-    const bool solid = shares.transmits() && !is_thin();
-    return {colour, vec3(transmitted_colour), shares, alpha, solid ? relative_ior(side) : ior, is_thin()};
+    lobe_factors fractions = factors;
+    if (kind == material_kind::rough_dielectric) fractions.specular = fractions.transmission = unorm8(1.0f);
+    const bool solid = fractions.transmits() && !is_thin();
+    return {colour, vec3(transmitted_colour), fractions, alpha, solid ? relative_ior(side) : ior, is_thin()};
   }
 
   WFPG_HD wfpg::bsdf_sample sample_dielectric(vec3 outgoing, float u) const {

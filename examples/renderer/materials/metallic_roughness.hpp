@@ -1,6 +1,6 @@
-// The metallic-roughness model of glTF 2.0 (appendix B of its specification) with the lobes that
-// KHR_materials_ior, _specular, _transmission and _diffuse_transmission add: facets that reflect and refract
-// over a base that scatters to either side. Directions are in the frame of the surface, z along its normal.
+// The metallic-roughness model of glTF 2.0 (appendix B of its specification). It includes the lobes of
+// KHR_materials_ior, _specular, _transmission and _diffuse_transmission. Facets reflect and refract over a
+// base that scatters to either side. Directions are in the frame of the surface, z along its normal.
 #pragma once
 
 #include "materials/microfacet.hpp"
@@ -33,10 +33,10 @@ struct unorm8x3 {
   WFPG_HD explicit operator vec3() const { return {r, g, b}; }
 };
 
-/// How the lobes of a surface share its light.
+/// Fractions of the light for each lobe of a surface.
 struct lobe_factors {
-  unorm8 metallic;              ///< of metal over what is none
-  unorm8 specular;              ///< times Fresnel's reflectance of what is no metal
+  unorm8 metallic;              ///< fraction of metal
+  unorm8 specular;              ///< times Fresnel's reflectance of the part that is not metal
   unorm8 transmission;          ///< of facets that refract over a diffuse base
   unorm8 diffuse_transmission;  ///< of the diffuse base that scatters to the other side
 
@@ -45,15 +45,15 @@ struct lobe_factors {
   }
 };
 
-/// All lobes, seen from above: `outgoing.z` is positive in every function here. Radiance is what goes along
-/// them, as in <wfpg/testing>.
+/// All lobes, seen from above: `outgoing.z` is positive in every function here. Transports radiance, as in
+/// <wfpg/testing>.
 struct metallic_roughness {
-  vec3 colour;              ///< of metal, of the diffuse base, of what is refracted
-  vec3 transmitted_colour;  ///< of what the diffuse base scatters to the other side
+  vec3 colour;              ///< of metal, of the diffuse base, of refracted light
+  vec3 transmitted_colour;  ///< of light that the diffuse base scatters to the other side
   lobe_factors factors;
   float alpha;  ///< GGX roughness, (0, 1]
   float eta;    ///< index beyond the surface over that on the outgoing side
-  bool thin;    ///< a sheet, the same from both sides: light goes straight through it
+  bool thin;    ///< a sheet, equal from both sides; light goes straight through
 
   /// f |cos| per channel, per steradian.
   WFPG_HD vec3 eval(vec3 outgoing, vec3 incident) const {
@@ -64,8 +64,8 @@ struct metallic_roughness {
     return f.exists ? below + specular(f, outgoing) : below;
   }
 
-  /// How often facets are drawn, rather than the diffuse base: as the two reflect, but neither is ever left
-  /// out.
+  /// The probability of facets rather than the diffuse base. It is their fraction of the reflectance, bounded
+  /// so that neither is left out.
   WFPG_HD float specular_probability(float cosine) const {
     const float facets = reflection_weight(cosine) + refraction_weight(cosine);
     const float base = (1.0f - factors.transmission) * not_reflected(cosine) *
@@ -86,7 +86,7 @@ struct metallic_roughness {
                                      : distribution.pdf_through(outgoing, f.incident, f.h, eta));
   }
 
-  /// A direction of one part, zero where it fails.
+  /// Samples a direction of one part. Zero if it fails.
   WFPG_HD vec3 sample(bool facets, vec3 outgoing, vec2 u) const {
     const bool same_side = chosen(u.x, side_probability(facets, outgoing.z, true));
     if (!facets) return other_side_unless(same_side, cosine_hemisphere(u));
@@ -100,7 +100,7 @@ struct metallic_roughness {
   }
 
  private:
-  /// The facet that sends light from one direction to the other.
+  /// The facet that scatters light from one direction to the other.
   struct facet {
     vec3 incident{0.0f};  ///< of a thin sheet: mirrored to above it
     vec3 h{0.0f};
@@ -127,12 +127,12 @@ struct metallic_roughness {
     const float scale = factors.transmission * (1.0f - factors.metallic);
     if (thin)
       return colour * (scale * (1.0f - fresnel(cosine)) * distribution.eval(outgoing, f.incident, f.h));
-    // From both cosines, which near total reflection say more than one.
+    // Uses both cosines, since they are more precise than one near total reflection.
     const float reflected = factors.specular * fresnel_dielectric(cosine, -glm::dot(f.incident, f.h), eta);
     return colour * (scale * (1.0f - reflected) * distribution.eval_through(outgoing, f.incident, f.h, eta));
   }
 
-  // Total reflection stays total: what is not reflected there goes nowhere.
+  // Total reflection stays total: the rest of the light is absorbed.
   WFPG_HD float fresnel(float cosine) const {
     const float reflected = fresnel_dielectric(cosine, eta);
     return eta < 1.0f && reflected >= 1.0f ? 1.0f : factors.specular * reflected;
@@ -156,8 +156,7 @@ struct metallic_roughness {
     return factors.transmission * not_reflected(cosine) * wfpg::luminance(colour);
   }
 
-  // As the boundary would choose if it were smooth: two numbers do not suffice to ask the facet that was
-  // drawn.
+  // The boundary's probability if it were smooth. Two random numbers are too few to ask the sampled facet.
   WFPG_HD float side_probability(bool facets, float cosine, bool same_side) const {
     float same = 1.0f;
     if (!facets) {

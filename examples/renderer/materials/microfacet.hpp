@@ -1,5 +1,5 @@
 // Fresnel reflectances, and the GGX distribution of microfacets (Walter et al. 2007) with visible normals
-// (Heitz 2018). Directions are in the frame of the surface, z along its normal; `eta` is the index beyond the
+// (Heitz 2018). Directions are in the frame of the surface, z along its normal. `eta` is the index beyond the
 // surface over that on the outgoing side.
 #pragma once
 
@@ -7,15 +7,15 @@
 
 namespace render {
 
-/// Unpolarised reflectance of a smooth boundary; `eta` is the index beyond over the index on the incident
-/// side, both cosines are positive.
+/// Unpolarised reflectance of a smooth boundary. `eta` is the index beyond over that on the incident side.
+/// Both cosines are positive.
 WFPG_HD inline float fresnel_dielectric(float cosine, float transmitted, float eta) {
   const float parallel = (eta * cosine - transmitted) / (eta * cosine + transmitted);
   const float perpendicular = (cosine - eta * transmitted) / (cosine + eta * transmitted);
   return 0.5f * (parallel * parallel + perpendicular * perpendicular);
 }
 
-/// The same from the incident cosine, at least 0. 1 for total reflection.
+/// Unpolarised reflectance from the incident cosine, at least 0. 1 for total reflection.
 WFPG_HD inline float fresnel_dielectric(float cosine, float eta) {
   const float sine2 = glm::max(0.0f, 1.0f - cosine * cosine) / (eta * eta);
   return sine2 < 1.0f ? fresnel_dielectric(cosine, std::sqrt(1.0f - sine2), eta) : 1.0f;
@@ -33,13 +33,13 @@ WFPG_HD inline vec3 mirrored(vec3 w, vec3 about) {
   return 2.0f * glm::dot(w, about) * about - w;
 }
 
-/// `w` refracted at a boundary whose normal lies on its side; 0 where all is reflected.
+/// `w` refracted at a boundary whose normal is on its side. 0 for total reflection.
 WFPG_HD inline vec3 refracted(vec3 w, vec3 about, float eta) {
   const float cosine = glm::dot(w, about), square = 1.0f - (1.0f - cosine * cosine) / (eta * eta);
   return square > 0.0f ? (cosine / eta - std::sqrt(square)) * about - w / eta : vec3(0.0f);
 }
 
-/// True with a probability, from a number in [0,1), which is one again after it.
+/// True with the given probability. `u` is a random number in [0,1), and is uniform again afterwards.
 WFPG_HD inline bool chosen(float& u, float probability) {
   const bool is_chosen = u < probability;
   u = is_chosen ? u / probability : (u - probability) / (1.0f - probability);
@@ -51,28 +51,28 @@ WFPG_HD inline bool chosen(float& u, float probability) {
 struct ggx {
   float alpha = 1.0f;
 
-  /// Facets per solid angle of their normal `h` (above the surface), projected.
+  /// Density of facets by solid angle of their normal `h` (above the surface), projected.
   WFPG_HD float distribution(vec3 h) const {
-    // Not from h.z alone: 1 - h.z² loses what a smooth surface needs.
+    // Avoids h.z alone: 1 - h.z² loses the digits of smooth surfaces.
     const float a2 = alpha * alpha;
     const float t = (h.x * h.x + h.y * h.y) / a2 + h.z * h.z;
     return 1.0f / (pi * a2 * t * t);
   }
 
-  /// D G2 cos(incident) / (4 cos(incident) cos(outgoing)): the BRDF's value times the cosine, but Fresnel's
-  /// term. Both directions are above the surface. G2 is the height-correlated shadowing and masking.
+  /// D G2 cos(incident) / (4 cos(incident) cos(outgoing)): the BRDF times the cosine, without Fresnel's term.
+  /// Both directions are above the surface. G2 is the height-correlated shadowing and masking.
   WFPG_HD float eval(vec3 outgoing, vec3 incident, vec3 h) const {
     const float terms = outgoing.z * slope_term(incident.z) + incident.z * slope_term(outgoing.z);
     return distribution(h) * incident.z / (2.0f * terms);
   }
 
-  /// Density of the reflected direction when h is drawn by sample().
+  /// Density of the reflected direction if sample() samples h.
   WFPG_HD float pdf(vec3 outgoing, vec3 h) const {
     return distribution(h) / (2.0f * (outgoing.z + slope_term(outgoing.z)));
   }
 
-  /// Of light refracted by facets of normal `h`, `outgoing` above the surface and `incident` below: the
-  /// BTDF's value times |cos(incident)|, but Fresnel's term (Walter et al. 2007, Eq. 21, of radiance).
+  /// The BTDF times |cos(incident)| of light refracted by facets of normal `h`, without Fresnel's term.
+  /// `outgoing` is above the surface, `incident` below (Walter et al. 2007, Eq. 21, for radiance).
   WFPG_HD float eval_through(vec3 outgoing, vec3 incident, vec3 h, float eta) const {
     const float below = -incident.z, out = glm::dot(outgoing, h), in = glm::dot(incident, h);
     const float terms = outgoing.z * slope_term(below) + below * slope_term(outgoing.z);
@@ -80,18 +80,18 @@ struct ggx {
     return 2.0f * distribution(h) * below * out * std::abs(in) / (terms * q * q);
   }
 
-  /// Density of the refracted direction when h is drawn by sample().
+  /// Density of the refracted direction if sample() samples h.
   WFPG_HD float pdf_through(vec3 outgoing, vec3 incident, vec3 h, float eta) const {
     const float out = glm::dot(outgoing, h), in = glm::dot(incident, h);
     const float q = (out + eta * in) / eta;
     return 4.0f * pdf(outgoing, h) * out * std::abs(in) / (q * q);
   }
 
-  /// A facet's normal seen from `outgoing`, above the surface.
+  /// Samples a facet's normal that is visible from `outgoing`, above the surface.
   WFPG_HD vec3 sample(vec3 outgoing, vec2 u) const {
     const vec3 stretched = glm::normalize(vec3(alpha * outgoing.x, alpha * outgoing.y, outgoing.z));
     const frame view(stretched);
-    // The frame's first axis has to lie in the surface for the two half disks below to be what they are.
+    // The frame's first axis must be in the surface, so that the two half disks below are right.
     const float planar2 = stretched.x * stretched.x + stretched.y * stretched.y;
     const vec3 first = planar2 > 1e-12f ? vec3(-stretched.y, stretched.x, 0.0f) / std::sqrt(planar2) : view.x;
     const vec3 second = glm::cross(stretched, first);

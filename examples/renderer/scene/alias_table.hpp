@@ -1,5 +1,5 @@
-// Picking one of many in proportion to their weights in constant time: Walker's alias method, tables built as
-// in Vose 1991, "A Linear Algorithm for Generating Random Numbers with a Given Distribution".
+// Chooses one of many in proportion to their weights in constant time, by Walker's alias method. Tables are
+// built as in Vose 1991, "A Linear Algorithm for Generating Random Numbers with a Given Distribution".
 #pragma once
 
 #include <wfpg/base/types.hpp>
@@ -16,7 +16,7 @@ struct alias_column {
   std::uint32_t other = 0;
 };
 
-/// An element from u in [0,1)². Two numbers: of one, little would be left to choose inside one of many
+/// An element from u in [0,1)². One number would have too little precision left to choose inside one of many
 /// columns. Precondition: the table is not empty.
 WFPG_HD inline std::uint32_t pick(wfpg::array_view<const alias_column> table, wfpg::vec2 u) {
   const auto last = static_cast<std::uint32_t>(table.size() - 1);
@@ -25,26 +25,26 @@ WFPG_HD inline std::uint32_t pick(wfpg::array_view<const alias_column> table, wf
   return u.y < table[column].probability ? column : table[column].other;
 }
 
-/// The table for weights >= 0, of which not all are 0.
+/// The table for weights >= 0. At least one must be positive.
 inline std::vector<alias_column> make_alias_table(const std::vector<double>& weights) {
   double sum = 0.0;
   for (const double weight : weights) sum += weight;
   const auto count = static_cast<double>(weights.size());
-  std::vector<double> shares;  // of a column, 1 on average
+  std::vector<double> fractions;  // of a column, 1 on average
   std::vector<std::uint32_t> small, large;
   for (const double weight : weights) {
     auto& group = weight * count < sum ? small : large;
-    group.push_back(static_cast<std::uint32_t>(shares.size()));
-    shares.push_back(weight * count / sum);
+    group.push_back(static_cast<std::uint32_t>(fractions.size()));
+    fractions.push_back(weight * count / sum);
   }
-  // Each small column is filled up from a large one. What rounding leaves over at the end is full.
+  // Fills each small column from a large one. Columns that rounding leaves at the end count as full.
   std::vector<alias_column> table(weights.size());
   while (!small.empty() && !large.empty()) {
     const std::uint32_t from = large.back(), to = small.back();
     small.pop_back();
-    table[to] = {static_cast<float>(shares[to]), from};
-    shares[from] -= 1.0 - shares[to];
-    if (shares[from] < 1.0) {
+    table[to] = {static_cast<float>(fractions[to]), from};
+    fractions[from] -= 1.0 - fractions[to];
+    if (fractions[from] < 1.0) {
       large.pop_back();
       small.push_back(from);
     }

@@ -1,4 +1,4 @@
-// The built-in scenes: one function a scene.
+// The built-in scenes, one function each.
 #include "scene/builtin_scenes.hpp"
 
 #include "scene/scene_builder.hpp"
@@ -14,8 +14,8 @@ constexpr vec3 red{0.65f, 0.05f, 0.05f};
 constexpr vec3 green{0.12f, 0.45f, 0.15f};
 constexpr vec3 up{0.0f, 1.0f, 0.0f};
 
-/// A block of the published Cornell data: its top, corners in order, and its height; sides go down to the
-/// floor.
+/// A block of the published Cornell data: its top with corners in order, and its height. Its sides go down to
+/// the floor.
 void cornell_block(scene_builder& builder, const vec2 (&top)[4], float height, std::uint32_t material_index) {
   const vec2 centre = 0.25f * (top[0] + top[1] + top[2] + top[3]);
   const auto at = [](vec2 p, float y) { return 0.01f * vec3(p.x, y, p.y); };
@@ -43,7 +43,8 @@ scene cornell_box() {
          {-1.0f, 0.0f, 0.0f}, left);
   cornell_block(b, {{130, 65}, {82, 225}, {240, 272}, {290, 114}}, 165.0f, white);
   cornell_block(b, {{423, 247}, {265, 296}, {314, 456}, {472, 406}}, 330.0f, white);
-  // Half a unit below the published height, which is the ceiling's: two coplanar surfaces have no order.
+  // Half a unit below the published height, which is the ceiling's. Coplanar surfaces would hide each other
+  // at random.
   b.quad({at(343, 548.3f, 227), at(343, 548.3f, 332), at(213, 548.3f, 332), at(213, 548.3f, 227)}, -up,
          light);
   // Film 0.025 square, focal length 0.035.
@@ -70,8 +71,8 @@ scene cornell_enclosed() {
   return b.finish(8);
 }
 
-/// A box with a wall in its middle that goes to the floor, the ceiling and the back, and leaves a way in
-/// front.
+/// A box with a wall in its middle, which reaches the floor, the ceiling and the back. In front of it is a
+/// passage.
 scene cornell_wall() {
   scene_builder b("cornell-wall");
   const auto white = b.diffuse(vec3(0.75f)), left = b.diffuse(red), right = b.diffuse(green);
@@ -84,14 +85,14 @@ scene cornell_wall() {
   b.parallelogram({-0.04f, 0.0f, 0.1f}, {0.08f, 0.0f, 0.0f}, {0.0f, 2.0f, 0.0f}, {{0.0f, 0.0f, 1.0f}, white});
   b.box({{-0.55f, 0.6f, -0.35f}, {0.45f, 1.2f, 0.45f}, 0.3f}, white);
   b.box({{0.5f, 0.25f, -0.1f}, {0.5f, 0.5f, 0.5f}, -0.3f}, white);
-  // So far back that the wall's edge hides it from all of the left half.
+  // So far back that the wall's edge hides it from the whole left half.
   b.ceiling_lamp({0.55f, 1.99f, -0.7f}, {0.4f, 0.3f}, light);
   b.look({0.0f, 1.0f, 3.9f}, {0.0f, 1.0f, 0.0f}, 0.686f);
   return b.finish(8);
 }
 
-/// The separating wall of `ajar`, z in [-0.05, 0.05], with a doorway 1.0 wide and 2.2 high in its middle.
-/// Only the faces that can be seen are made.
+/// The separating wall of `ajar`, z in [-0.05, 0.05], with a doorway 1.0 wide and 2.2 high in its middle. Has
+/// only its visible faces.
 void wall_with_doorway(scene_builder& b, std::uint32_t material_index) {
   for (float sign : {-1.0f, 1.0f}) {
     const vec3 facing(0.0f, 0.0f, sign);
@@ -111,15 +112,15 @@ scene ajar() {
   const auto light = b.lamp(vec3(6000.0f));
   const auto floor = b.glossy(material_kind::plastic, {0.5f, 0.45f, 0.4f}, 0.25f);
   const auto brass = b.glossy(material_kind::conductor, {0.95f, 0.79f, 0.55f}, 0.2f);
-  // Two rooms of 4 x 3 x 4 and the thickness of the wall between them; z > 0 is the dark one.
+  // Two rooms of 4 x 3 x 4 plus the thickness of the wall between them. z > 0 is the dark room.
   b.room({{-2.0f, 0.0f, -4.05f}, {2.0f, 3.0f, 4.05f}}, {white, white, floor, white, white, white});
   wall_with_doorway(b, white);
-  // The hinge is at x = -0.5 and the door opens into the dark room, 0.24 m at its free edge.
+  // The hinge is at x = -0.5. The door opens into the dark room, 0.24 m at its free edge.
   const vec3 hinge(-0.5f, 1.1f, 0.0f);
   const float angle = -0.25f;
   b.box({hinge + turned({0.49f, 0.0f, 0.0f}, angle), {0.98f, 2.18f, 0.04f}, angle}, wood);
   b.box({{0.85f, 0.3f, 0.95f}, {0.6f, 0.6f, 0.6f}, 0.5f}, brass);
-  // On the side of the door's free edge: the door then hides the lamp from the dark room.
+  // On the side of the door's free edge, so that the door hides the lamp from the dark room.
   b.ceiling_lamp({1.7f, 2.9f, -3.75f}, {0.3f, 0.3f}, light);
   b.look({-0.4f, 1.6f, 3.85f}, {0.1f, 1.2f, 0.0f}, 0.9f);
   return b.finish(8);
@@ -145,7 +146,7 @@ scene glossy_room() {
              copper = b.glossy(material_kind::conductor, {0.9f, 0.6f, 0.45f}, 0.3f);
   const auto light = b.lamp(vec3(150.0f));
   b.room({{-2.0f, 0.0f, -2.0f}, {2.0f, 3.0f, 2.0f}}, {copper, steel, steel, white, steel, steel});
-  // A trough hides the lamp from below: all light comes by way of the ceiling.
+  // A trough hides the lamp from below, so all light comes from the ceiling.
   b.parallelogram({-1.5f, 2.2f, -1.9f}, {0.5f, 0.0f, 0.0f}, {0.0f, 0.0f, 3.0f}, {-up, white});
   b.parallelogram({-1.5f, 2.2f, -1.9f}, {0.0f, 0.25f, 0.0f}, {0.0f, 0.0f, 3.0f},
                   {{-1.0f, 0.0f, 0.0f}, white});
@@ -156,8 +157,8 @@ scene glossy_room() {
   return b.finish(8);
 }
 
-/// Four rooms in a row, z from 1.5 to -8.5, with three lamps each, and walls without thickness between them
-/// that leave a passage on alternate sides.
+/// Four rooms in a row, z from 1.5 to -8.5, with three lamps each. Walls without thickness between them leave
+/// a passage on alternate sides.
 scene many_lamps() {
   scene_builder b("many-lamps");
   const auto white = b.diffuse(vec3(0.7f)), left = b.diffuse(red), right = b.diffuse(green);
@@ -194,7 +195,7 @@ scene many_lamps() {
   return s;
 }
 
-/// A closed room of 4 x 3.2 x 4 whose walls hold the water; the camera is in it.
+/// A closed room of 4 x 3.2 x 4 whose walls hold the water. The camera is in the water.
 scene caustic_pool() {
   scene_builder b("caustic-pool");
   const auto white = b.diffuse(vec3(0.75f)), tiles = b.diffuse({0.35f, 0.55f, 0.6f}),
@@ -207,8 +208,8 @@ scene caustic_pool() {
   const auto water = b.add(smooth_water);
   b.room({{-2.0f, 0.0f, -2.0f}, {2.0f, 3.2f, 2.0f}}, {tiles, tiles, white, white, tiles, tiles});
   b.box({{0.7f, 0.3f, -0.9f}, {0.6f, 0.6f, 0.6f}, 0.4f}, stone);
-  // Waves of less than a metre, whose crests focus about as deep as the floor. The sheet goes on behind the
-  // walls, so that no path gets past its edge.
+  // Waves shorter than a metre, whose crests focus about as deep as the floor. The sheet extends behind the
+  // walls, so that no path passes its edge.
   const water_surface surface(1.2f, {{{7.3f, 2.9f}, 0.018f, 0.3f},
                                      {{-4.3f, 8.3f}, 0.013f, 1.7f},
                                      {{10.9f, -6.4f}, 0.007f, 4.1f},

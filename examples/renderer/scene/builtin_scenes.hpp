@@ -1,5 +1,5 @@
-// Scenes made by code: the ones that tests, demo and measurements use, so that none of them needs a file.
-// All are in metres except cornell-box, which has the published units divided by 100.
+// Scenes made by code, for tests, demo and measurements, so that none of them needs a file. All are in metres
+// except cornell-box, which has the published units divided by 100.
 #pragma once
 
 #include "scene/scene.hpp"
@@ -15,31 +15,31 @@ std::vector<std::string> builtin_scene_names();
 
 bool is_builtin_scene(const std::string& name);
 
-/// One of builtin_scene_names(); throws std::invalid_argument that lists them for any other name.
-/// - `cornell-box`: the published measurements; front open, camera outside.
-/// - `cornell-enclosed`: the lamp lies inside a solid block of glass, so that next-event estimation finds
-///   nothing; front open, camera outside.
-/// - `cornell-wall`: a wall in the middle of a Cornell box, from floor to ceiling and from the back to the
-///   middle of its depth. The lamp in the ceiling is right of it: behind the wall's edge all light in the
-///   left half is indirect, by way of the front. Front open, camera outside. After the first case of Jhang &
-///   Chang, "An Unbiased Hybrid Rendering Approach to Path Guiding", section 3.
-/// - `ajar`: a lit room behind a door that stands ajar, seen from the dark room. No ray goes from the lamp to
+/// One of builtin_scene_names(). Throws std::invalid_argument that lists them for any other name.
+/// - `cornell-box`: the published measurements. Front open, camera outside.
+/// - `cornell-enclosed`: the lamp is inside a solid block of glass, so next-event estimation finds nothing.
+///   Front open, camera outside.
+/// - `cornell-wall`: a Cornell box with a wall in the middle, from floor to ceiling and from the back to the
+///   middle of its depth. The lamp in the ceiling is right of it. Behind the wall's edge, all light in the
+///   left half is indirect and comes around the front. Front open, camera outside. After the first case of
+///   Jhang & Chang, "An Unbiased Hybrid Rendering Approach to Path Guiding", section 3.
+/// - `ajar`: a lit room behind a door that stands ajar, seen from the dark room. No ray from the lamp reaches
 ///   the dark room past the door's free edge. Closed.
 /// - `thin-wall`: a two-sided wall without thickness between a lit and a dark half. The lamp hangs below the
-///   wall's edge: all light in the dark half is indirect. Closed.
-/// - `glossy-room`: metal walls, and a lamp in a trough that shines at the ceiling alone. Closed.
+///   wall's edge, so all light in the dark half is indirect. Closed.
+/// - `glossy-room`: metal walls, and a lamp in a trough that lights only the ceiling. Closed.
 /// - `caustic-pool`: a room filled with water to a third of its height, seen from in the water. The lamp
-///   hangs above: its light gets to the floor through the waves alone, where next-event estimation finds
-///   none. Waves focus it to caustics. The water is a sheet of 8,192 triangles; air is above, water below.
+///   hangs above. Its light reaches the floor only through the waves, where next-event estimation finds none.
+///   Waves focus it to caustics. The water is a sheet of 8,192 triangles, with air above and water below.
 ///   Closed. After their second case.
-/// - `many-lamps`: four rooms in a row, each with three lamps of very different power, a bulb and a spot. Of
-///   the lamps in other rooms little is seen. Closed.
+/// - `many-lamps`: four rooms in a row, each with three lamps of very different power, a bulb and a spot.
+///   Lamps of other rooms are hardly visible. Closed.
 /// - `furnace`: a closed box of albedo 0.5 that emits radiance 1 everywhere; see furnace_radiance().
 scene make_builtin_scene(const std::string& name);
 
-/// The exact radiance of every pixel of `furnace` where a path has `max_depth` segments and emission counts
-/// at each of its vertices 1..max_depth: the sum of 0.5^k for k in [0, max_depth), 2 - 2^(1 - max_depth). It
-/// tends to 2. `max_depth` >= 0; no segments, no light.
+/// The exact radiance of every pixel of `furnace`, if a path has `max_depth` segments and emission counts at
+/// its vertices 1..max_depth. It is the sum of 0.5^k for k in [0, max_depth), 2 - 2^(1 - max_depth), and
+/// tends to 2. `max_depth` >= 0; 0 gives no light.
 double furnace_radiance(int max_depth);
 
 }  // namespace render

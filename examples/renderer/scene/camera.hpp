@@ -6,7 +6,7 @@
 
 namespace render {
 
-/// Turns points of the picture into rays.
+/// Maps points on the picture to rays.
 class pinhole {
  public:
   pinhole(const camera& view, int width, int height)
@@ -20,7 +20,7 @@ class pinhole {
     right_ = right * (half_height * static_cast<float>(width) / static_cast<float>(height));
   }
 
-  /// Through a pixel (row by row from the top) at `offset` in [0, 1)² of it.
+  /// The ray through a pixel (row by row from the top) at `offset` in [0, 1)² of it.
   WFPG_HD wfpg::ray through(std::uint32_t pixel, vec2 offset) const {
     const float x = (static_cast<float>(pixel % width_) + offset.x) / static_cast<float>(width_);
     const float y = (static_cast<float>(pixel / width_) + offset.y) / static_cast<float>(height_);

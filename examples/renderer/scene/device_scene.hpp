@@ -1,5 +1,5 @@
-// The scene as kernels read it: a trivially copyable view, the owner of its arrays on a policy, and the
-// surface that a ray hits.
+// The scene for kernels: a trivially copyable view, the owner of its arrays on a policy, and the surface at a
+// ray's hit.
 #pragma once
 
 #include "materials/materials.hpp"
@@ -31,38 +31,38 @@ struct texture_span {
   texture_wrap wrap_u, wrap_v;
 };
 
-/// A point of the scene's geometry, before it is known from where it is seen.
+/// A point on the scene's geometry, independent of the viewer.
 struct surface_point {
   vec3 position{0.0f};
   vec3 geometric_normal{0.0f};  ///< unit length, counter-clockwise side
   vec3 normal{0.0f};            ///< shading normal, unit length, on the same side
   vec2 uv{0.0f};
-  float offset = 0.0f;  ///< how far off the surface a ray has to begin, scene units
+  float offset = 0.0f;  ///< how far off the surface a ray must begin, scene units
   std::uint32_t material = 0;
 };
 
-/// What a path needs of a hit: how the surface scatters, how it emits, where rays may begin.
+/// The surface of a hit as paths need it: scattering, emission, and where rays may begin.
 struct hit_surface {
   wfpg::surface<bsdf> surface;
   vec3 emission{0.0f};             ///< toward the viewer, W/(m² sr)
-  float emitted_luminance = 0.0f;  ///< what it is on average, by which lights are chosen
+  float emitted_luminance = 0.0f;  ///< its mean over the texture; lights are chosen by it
   vec3 absorption{0.0f};           ///< along the ray that ends here, 1 / scene unit
   float offset = 0.0f;             ///< as in surface_point
 };
 
-/// A point from which a ray toward `direction` does not hit the surface it leaves.
+/// A point from which a ray toward `direction` does not hit the surface that it leaves.
 WFPG_HD inline vec3 leave_surface(vec3 position, vec3 geometric_normal, vec3 direction, float offset) {
   return position + (glm::dot(geometric_normal, direction) < 0.0f ? -offset : offset) * geometric_normal;
 }
 
-/// See scene.hpp for what the arrays hold.
+/// scene.hpp describes the arrays.
 struct scene_view {
   wfpg::array_view<const vec3> positions, normals;
   wfpg::array_view<const vec2> uvs;
   wfpg::array_view<const uvec3> triangles;
   wfpg::array_view<const std::uint32_t> triangle_materials;
   wfpg::array_view<const material> materials;
-  wfpg::array_view<const float> emitted_luminances;  ///< a material; means over its texture
+  wfpg::array_view<const float> emitted_luminances;  ///< by material; means over its texture
   wfpg::array_view<const texture_span> textures;
   wfpg::array_view<const vec4> texels;
   environment_view environment;
@@ -78,7 +78,7 @@ struct scene_view {
     surface_point point;
     point.material = triangle_materials[hit.triangle];
     point.position = w * a + hit.u * b + hit.v * c;
-    // Rounding errs relative to the corners' coordinates, not to the point's own.
+    // Rounding errors are relative to the corners' coordinates, not to the point's own.
     const vec3 largest = glm::max(glm::abs(a), glm::max(glm::abs(b), glm::abs(c)));
     point.offset = 1e-5f * glm::max(largest.x, glm::max(largest.y, largest.z));
     point.geometric_normal = glm::normalize(glm::cross(b - a, c - a));
@@ -93,14 +93,14 @@ struct scene_view {
     return point;
   }
 
-  /// Texture coordinates; 0 where there are none.
+  /// Texture coordinates, or 0 if there are none.
   WFPG_HD vec2 uv_at(triangle_hit hit) const {
     if (uvs.empty()) return vec2(0.0f);
     const uvec3 corners = triangles[hit.triangle];
     return (1.0f - hit.u - hit.v) * uvs[corners.x] + hit.u * uvs[corners.y] + hit.v * uvs[corners.z];
   }
 
-  /// What a texture shows at `uv`, v down. Precondition: there is one.
+  /// The texture's value at `uv`, v down. Precondition: there is one.
   WFPG_HD vec4 texel(const texture_reference& reference, vec2 uv) const {
     const texture_span span = textures[static_cast<std::uint32_t>(reference.index)];
     const vec2 place = reference.transformed(uv);
@@ -113,12 +113,12 @@ struct scene_view {
     return (1.0f - fy) * along(row.first) + fy * along(row.second);
   }
 
-  /// What the front of a material emits, W/(m² sr).
+  /// Radiance of a material's front, W/(m² sr).
   WFPG_HD vec3 emitted(const material& m, vec2 uv) const {
     return m.emission_texture.index >= 0 ? m.emission * vec3(texel(m.emission_texture, uv)) : m.emission;
   }
 
-  /// True where the material of a triangle has a hole at the hit.
+  /// Whether the material of a triangle has a hole at the hit.
   WFPG_HD bool is_cut_out(triangle_hit hit) const {
     const material& m = material_of(hit.triangle);
     if (!(m.alpha_cutoff > 0.0f)) return false;
@@ -132,7 +132,7 @@ struct scene_view {
     const material& scatters = materials[at.material];
     const bool front = glm::dot(at.geometric_normal, outgoing) >= 0.0f;
     const float side = front ? 1.0f : -1.0f;
-    // Where an interpolated normal faces away from the viewer it is bent until it just does not.
+    // An interpolated normal that faces away from the viewer is bent until it just does not.
     vec3 facing = side * at.normal;
     const float seen = glm::dot(facing, outgoing);
     if (seen < least_cosine) facing = glm::normalize(facing + (least_cosine - seen) * outgoing);
@@ -148,7 +148,7 @@ struct scene_view {
     bsdf& f = result.surface.bsdf;
     f.kind = scatters.kind;
     set_lobes(scatters, at.uv, f);
-    // A dielectric has to know inside from outside; the others reflect on either side.
+    // A dielectric has an inside and an outside. The other kinds reflect on both sides.
     const float outward = f.transmits() ? side : 1.0f;
     f.normal = outward * facing;
     f.geometric_normal = outward * side * at.geometric_normal;
@@ -201,11 +201,11 @@ inline std::vector<float> emitted_luminances(const scene& host) {
   return luminances;
 }
 
-/// The arrays of a scene in the memory of a policy.
+/// The arrays of a scene in a policy's memory.
 template <class Exec>
 class device_scene {
  public:
-  /// Throws std::invalid_argument where an index of the scene points nowhere, or a light is not usable.
+  /// Throws std::invalid_argument if an index of the scene is out of range, or a light is not usable.
   device_scene(const Exec& exec, const scene& host)
       : positions_(exec, host.positions),
         normals_(exec, host.normals),
@@ -258,7 +258,7 @@ class device_scene {
         wfpg::require(is_usable_light(vec3(channel)), name.c_str(), channel, "in [0, 1e+15]");
     };
     const auto check_each = [&](const auto& elements, const std::string& name, const auto& light_of) {
-      for (std::size_t i = 0; i < elements.size(); ++i)  // without a string for each
+      for (std::size_t i = 0; i < elements.size(); ++i)  // without making a string for each
         if (!is_usable_light(light_of(elements[i]))) check(light_of(elements[i]), name + std::to_string(i));
     };
     check(host.environment, "scene.environment");

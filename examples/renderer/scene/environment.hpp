@@ -10,13 +10,13 @@
 
 namespace render {
 
-/// A map of all directions (equirectangular): the middle of the picture is -z, its right +x, its upper edge
+/// A map of all directions (equirectangular). The centre of the picture is -z, its right +x, its upper edge
 /// +y. Trivially copyable.
 class environment_view {
  public:
   environment_view() = default;
   explicit environment_view(vec3 constant) : constant_(constant) {}
-  /// The views are of a map's texels and of the alias table of their texel_powers(), whose sum is `total`.
+  /// The views are of a map's texels, and of the alias table of their texel_powers(), whose sum is `total`.
   environment_view(const environment_map& map, wfpg::array_view<const vec3> texels,
                    wfpg::array_view<const alias_column> table, float total)
       : texels_(texels),
@@ -26,10 +26,10 @@ class environment_view {
         height_(static_cast<std::uint32_t>(map.height)) {}
 
   WFPG_HD bool is_map() const { return !texels_.empty(); }
-  /// Luminance over all directions, W/m²; of maps alone.
+  /// Luminance over all directions, W/m². Only for maps.
   WFPG_HD float total() const { return total_; }
 
-  /// W/(m² sr) along a direction away from the scene; bilinear.
+  /// W/(m² sr) along a direction away from the scene. Bilinear.
   WFPG_HD vec3 radiance(vec3 direction) const {
     if (!is_map()) return constant_;
     const vec2 place = place_of(direction);
@@ -42,7 +42,7 @@ class environment_view {
     return glm::mix(along(row.first), along(row.second), row.second_weight);
   }
 
-  /// Density of sample(), per steradian; 0 of a constant one, which is not sampled.
+  /// Density of sample(), per steradian. 0 for a constant environment, which is not sampled.
   WFPG_HD float pdf(vec3 direction) const {
     if (!(total_ > 0.0f)) return 0.0f;
     const vec2 place = place_of(direction);
@@ -53,7 +53,7 @@ class environment_view {
     return wfpg::luminance(texels_[texel]) / total_;
   }
 
-  /// A direction: `choice` picks a texel, `u` a point of it, uniform by solid angle.
+  /// Samples a direction: `choice` chooses a texel, `u` a point in it, uniform by solid angle.
   WFPG_HD vec3 sample(vec2 choice, vec2 u) const {
     const std::uint32_t texel = pick(table_, choice);
     const float angle =
@@ -68,7 +68,7 @@ class environment_view {
   WFPG_HD static vec2 place_of(vec3 d) {
     return {0.5f + std::atan2(d.x, -d.z) / (2.0f * pi), std::acos(glm::clamp(d.y, -1.0f, 1.0f)) / pi};
   }
-  /// Of the upper edge of a row.
+  /// The cosine at the upper edge of a row.
   WFPG_HD float cosine_above(std::uint32_t row) const {
     return std::cos(pi * static_cast<float>(row) / static_cast<float>(height_));
   }

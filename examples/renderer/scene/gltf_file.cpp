@@ -1,5 +1,5 @@
-// Files, GLB framing and accessors. tinygltf parses the JSON; what it leaves unchecked is checked here,
-// before (framing, nesting, types of fields) or after (accessors, buffer views).
+// Files, GLB framing and accessors. tinygltf parses the JSON. Checks that it lacks are made here, before
+// (framing, nesting, types of fields) or after (accessors, buffer views).
 #include "scene/gltf_file.hpp"
 
 #include "scene/gltf_json.hpp"
@@ -17,7 +17,7 @@ namespace {
 
 using bytes = std::vector<unsigned char>;
 
-/// tinygltf turns extras into values by recursion, so that nesting costs stack.
+/// tinygltf converts extras recursively, so nesting costs stack.
 constexpr int max_nesting = 200;
 
 constexpr std::size_t glb_header_size = 12;
@@ -48,8 +48,8 @@ bool is_glb(const bytes& file) {
   return file.size() >= 4 && std::memcmp(file.data(), "glTF", 4) == 0;
 }
 
-/// The JSON chunk of a binary file. Every chunk has to lie inside the file with its header: tinygltf's own
-/// check leaves out the second chunk's.
+/// The JSON chunk of a binary file. Every chunk must be inside the file with its header. tinygltf's own check
+/// omits the second chunk's header.
 byte_range glb_json(const bytes& file) {
   if (file.size() < glb_header_size + glb_chunk_header_size) fail("is cut off in the GLB header");
   const std::size_t length = word_at(file, 8);
@@ -82,8 +82,8 @@ void require_shallow(const byte_range& json) {
   }
 }
 
-/// Stands in for tinygltf's decoder, which reads past buffer views that leave their buffer. Bytes from a
-/// buffer view are not touched; those from a URI live only during this call and are kept.
+/// Replaces tinygltf's decoder, which reads past buffer views that exceed their buffer. Bytes from a buffer
+/// view are not read. Bytes from a URI live only during this call, so they are copied.
 bool keep_encoded(tinygltf::Image* target, const int, std::string*, std::string*, int, int,
                   const unsigned char* encoded, int size, void*) {
   if (target->bufferView < 0 && size > 0) target->image.assign(encoded, encoded + size);
@@ -104,7 +104,7 @@ void add_lines(std::vector<std::string>& warnings, const std::string& text) {
   }
 }
 
-/// A message of tinygltf's on one line.
+/// A message of tinygltf on one line.
 std::string one_line(std::string text) {
   while (!text.empty() && text.back() == '\n') text.pop_back();
   std::replace(text.begin(), text.end(), '\n', ';');
@@ -137,7 +137,7 @@ std::size_t component_size(int component) {
   }
 }
 
-/// Finds an accessor's elements. `type` is glTF's, of `components` components, each of which may be any of
+/// Finds an accessor's elements. `type` is glTF's, with `components` components, whose type must be one of
 /// `allowed`.
 elements locate(const tinygltf::Model& model, int index, int type, std::initializer_list<int> allowed) {
   const tinygltf::Accessor& accessor = accessor_at(model, index);
@@ -166,7 +166,7 @@ T value_at(const unsigned char* place) {
   return value;
 }
 
-/// A component as a float, integers as fractions of their range.
+/// A component as a float. Integers are fractions of their range.
 float fraction_at(const unsigned char* place, int component) {
   if (component == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE) return float(*place) / 255.0f;
   if (component == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT)

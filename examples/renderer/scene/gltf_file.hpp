@@ -1,5 +1,5 @@
-// Reading a glTF file without trusting it: the model as tinygltf parses it, and accessors with every bound
-// checked. Everything here throws std::runtime_error with the reason; load_gltf puts the path in front.
+// Reads a glTF file without trusting it: the model as tinygltf parses it, and accessors with all bounds
+// checked. All functions throw std::runtime_error with the reason. load_gltf puts the path in front.
 #pragma once
 
 #include "scene/scene.hpp"
@@ -16,11 +16,11 @@ namespace render::gltf {
 /// Adds a line to `warnings` unless it is there already.
 void warn_once(std::vector<std::string>& warnings, const std::string& line);
 
-/// Whether files that need an extension are read as they are meant.
+/// Whether the loader supports an extension that a file requires.
 bool is_supported_extension(const std::string& name);
 
-/// The model of a .gltf or .glb file (told apart by their first bytes), glTF version 2 only. Images are not
-/// decoded: tinygltf::Image::image holds the encoded bytes of an image from a URI, nothing for one from a
+/// The model of a .gltf or .glb file (identified by their first bytes), only glTF version 2. Images are not
+/// decoded. tinygltf::Image::image holds the encoded bytes of an image from a URI, and nothing for one from a
 /// buffer view.
 tinygltf::Model read_model(const std::string& path, std::vector<std::string>& warnings);
 
@@ -30,26 +30,26 @@ struct byte_range {
   std::size_t size = 0;
 };
 
-/// The bytes of a buffer view; throws where it leaves its buffer.
+/// The bytes of a buffer view. Throws if it exceeds its buffer.
 byte_range view_bytes(const tinygltf::Model& model, int buffer_view);
 
-/// Whether the accessor exists and is sparse, which nothing here reads.
+/// Whether the accessor exists and is sparse, which is not supported.
 bool is_sparse(const tinygltf::Model& model, int accessor);
 
-/// A VEC3 accessor of floats.
+/// Reads a VEC3 accessor of floats.
 std::vector<vec3> read_vec3(const tinygltf::Model& model, int accessor);
 
-/// A VEC2 accessor of floats, or of 8- or 16-bit unsigned integers as fractions of their range.
+/// Reads a VEC2 accessor of floats, or of 8- or 16-bit unsigned integers as fractions of their range.
 std::vector<vec2> read_vec2(const tinygltf::Model& model, int accessor);
 
-/// A SCALAR accessor of 8-, 16- or 32-bit unsigned integers.
+/// Reads a SCALAR accessor of 8-, 16- or 32-bit unsigned integers.
 std::vector<std::uint32_t> read_indices(const tinygltf::Model& model, int accessor);
 
-/// The refusal of a light brighter than `largest_radiance` or not finite: "WHAT of X, at most 1e+15 is
-/// supported". `what` names the light and what is too large.
+/// The error for a light that is brighter than `largest_radiance` or not finite: "WHAT of X, at most 1e+15 is
+/// supported". `what` names the light and its quantity.
 std::runtime_error too_bright(const std::string& what, double found);
 
-/// A number of an object's member, or `otherwise` where it is missing or no finite number.
+/// A number in an object's member, or `otherwise` if it is missing or not a finite number.
 double number_of(const tinygltf::Value& object, const char* member, double otherwise);
 
 }  // namespace render::gltf

@@ -1,4 +1,4 @@
-// A table of fields and their types; materials are walked by their fields' names.
+// A table of fields and their types. Materials are walked by their fields' names.
 #include "scene/gltf_json.hpp"
 
 #include <nlohmann/json.hpp>
@@ -76,7 +76,7 @@ std::string element_name(const std::string& list, std::size_t index) {
   return list + "[" + std::to_string(index) + "]";
 }
 
-/// `visit(place, element)` for each object of a list, if it is there.
+/// Calls `visit(place, element)` for each object of a list, if the list exists.
 template <class Visit>
 void for_each_object(const std::string& list, const json& owner, const std::string& name,
                      const Visit& visit) {
@@ -105,7 +105,7 @@ void check_mesh(const std::string& place, const json& mesh) {
                   });
 }
 
-/// Of materials and of their textures and extensions, whose fields have one type by name.
+/// Checks materials, their textures and extensions, in which a name has one type.
 void check_material(const std::string& place, const json& part) {
   static const fields expected = {{"index", kind::index},
                                   {"texCoord", kind::index},
@@ -148,7 +148,7 @@ void check_light(const std::string& place, const json& light) {
                  {{"innerConeAngle", kind::number}, {"outerConeAngle", kind::number}});
 }
 
-/// The KHR_lights_punctual of a file or a node, where it has one.
+/// The KHR_lights_punctual of a file or a node, if it has one.
 const json* lights_of(const std::string& place, const json& owner) {
   const json* const extensions = member(owner, "extensions");
   if (!extensions) return nullptr;
@@ -168,7 +168,7 @@ void check_camera(const std::string& place, const json& camera) {
                   {"zfar", kind::number}});
 }
 
-/// Symbolic links are followed: who put them there may.
+/// Symbolic links are followed, since the folder's owner made them.
 void check_uri(const std::string& place, const json& owner, const std::string& folder) {
   const json* const uri = member(owner, "uri");
   if (!uri) return;

@@ -1,4 +1,4 @@
-// The node hierarchy, geometry and camera of a glTF scene; files and materials have their own sources.
+// The node hierarchy, geometry and camera of a glTF scene. Files and materials have their own sources.
 #include "scene/gltf_loader.hpp"
 
 #include "scene/gltf_file.hpp"
@@ -34,7 +34,7 @@ vec3 unit_or(vec3 v, vec3 otherwise) {
   return length > 0.0f && std::isfinite(length) ? v / length : otherwise;
 }
 
-/// A node's own transform; translation, rotation and scale count where there is no matrix.
+/// A node's own transform. Without a matrix, it comes from translation, rotation and scale.
 glm::dmat4 local_transform(const tinygltf::Node& node) {
   const auto has = [](const std::vector<double>& values, std::size_t count, const char* name) {
     if (!values.empty() && values.size() != count)
@@ -64,7 +64,7 @@ struct surface_patch {
   std::vector<std::uint32_t> indices;
 };
 
-/// Normals across each triangle need its own three vertices.
+/// Gives each triangle its own three vertices, for flat normals.
 void split_vertices(surface_patch& patch) {
   surface_patch split;
   for (std::uint32_t index : patch.indices) {
@@ -75,7 +75,7 @@ void split_vertices(surface_patch& patch) {
   patch = std::move(split);
 }
 
-/// Replaces normals that have no direction by the mean of the adjacent triangles'.
+/// Replaces zero normals by the mean of the adjacent triangles'.
 void repair_normals(surface_patch& patch) {
   std::vector<vec3> sums(patch.positions.size(), vec3(0.0f));
   for (std::size_t t = 0; t + 2 < patch.indices.size(); t += 3) {
@@ -92,8 +92,8 @@ void repair_normals(surface_patch& patch) {
 void transform(surface_patch& patch, const glm::dmat4& to_world) {
   const glm::dmat3 linear(to_world);
   const double determinant = glm::determinant(linear);
-  // Cofactors turn normals as the inverse's transpose does, up to a positive factor once the determinant's
-  // sign is taken out, and exist where the inverse does not.
+  // Cofactors transform normals as the inverse's transpose does, up to a positive factor after the
+  // determinant's sign is removed. They exist even if the inverse does not.
   const double sign = determinant < 0.0 ? -1.0 : 1.0;
   const glm::dmat3 for_normals(sign * glm::cross(linear[1], linear[2]),
                                sign * glm::cross(linear[2], linear[0]),
@@ -142,7 +142,7 @@ class scene_reader {
     return &model_.scenes[std::size_t(index)];
   }
 
-  /// Where to begin: the scene's nodes, or without a scene every node that is nobody's child.
+  /// The scene's nodes, or without a scene all nodes that are not children.
   std::vector<int> roots() const {
     if (const tinygltf::Scene* chosen = chosen_scene()) return chosen->nodes;
     std::vector<bool> is_child(model_.nodes.size(), false);
@@ -155,7 +155,7 @@ class scene_reader {
     return result;
   }
 
-  /// Depth first with a stack of its own: a file decides how deep the hierarchy is.
+  /// Depth first with an explicit stack, since a file decides how deep the hierarchy is.
   void read_nodes() {
     std::vector<placed_node> stack;
     const auto push = [&](const std::vector<int>& nodes, const glm::dmat4& parent) {
@@ -332,7 +332,7 @@ class scene_reader {
     return intensity;
   }
 
-  /// Looks along -z at the whole bounding box.
+  /// Makes a camera that looks along -z at the whole bounding box.
   void frame_everything() {
     glm::dvec3 lower(std::numeric_limits<double>::max()), upper(-lower);
     for (const vec3& p : target_.positions) {

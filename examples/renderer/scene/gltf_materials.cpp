@@ -1,4 +1,4 @@
-// The mapping of materials, and image decoding through stb_image.
+// Converts materials, and decodes images through stb_image.
 #include "scene/gltf_materials.hpp"
 
 #include "app/image_io.hpp"
@@ -20,18 +20,18 @@
 namespace render::gltf {
 namespace {
 
-/// The smoothest facets that are still sampled as rough ones.
+/// The smoothest facets that are sampled as rough ones.
 constexpr float min_alpha = 0.01f;
 
-/// Below this, rough facets refract nothing that could be told from what goes straight on.
+/// Below this, light refracted by rough facets is hardly different from straight light.
 constexpr float least_rough_ior = 1.01f;
-/// Reflects all but half a percent: as good as infinite.
+/// Reflects all but half a percent, almost as an infinite index.
 constexpr float largest_ior = 1000.0f;
 
-/// Of an alpha mask; above 1 nothing is left.
+/// The largest cutoff of an alpha mask. Above 1 nothing is left.
 constexpr double largest_cutoff = 2.0;
 
-/// Decoded images beyond this are refused: 64 Mi texels take 1 GiB.
+/// Larger decoded images are refused: 64 Mi texels take 1 GiB.
 constexpr int max_side = 1 << 15;
 constexpr std::int64_t max_texels = std::int64_t(1) << 26;
 
@@ -42,10 +42,10 @@ struct free_pixels {
 template <class T>
 using pixel_pointer = std::unique_ptr<T, free_pixels>;
 
-/// What an image's numbers are; alpha is linear in both.
+/// The encoding of an image's numbers. Alpha is linear in both.
 enum class encoding { srgb, linear };
 
-/// Decoded RGBA of 8 or 16 bits as linear numbers; grey is repeated.
+/// Converts decoded RGBA of 8 or 16 bits to linear numbers. Grey is repeated.
 template <class T>
 texture linear_texture(const T* pixels, int width, int height, encoding encoded) {
   constexpr int levels = std::numeric_limits<T>::max();
@@ -94,7 +94,8 @@ double extension_number(const tinygltf::Material& source, const char* extension,
   return found == source.extensions.end() ? otherwise : number_of(found->second, member, otherwise);
 }
 
-/// The numbers of an extension's member, which has to have as many as `numbers`, or `numbers` without it.
+/// The numbers of an extension's member, which must have as many as `numbers`. Returns `numbers` if it is
+/// missing.
 template <std::size_t N>
 std::array<double, N> extension_numbers(const tinygltf::Value& extension, const char* member,
                                         std::array<double, N> numbers) {
@@ -109,7 +110,7 @@ std::array<double, N> extension_numbers(const tinygltf::Value& extension, const 
   return numbers;
 }
 
-/// A colour of one of a material's extensions, channels in [0, 1]; white where it is missing.
+/// A colour of one of a material's extensions, channels in [0, 1]. White if it is missing.
 vec3 extension_colour(const tinygltf::Material& source, const char* extension, const char* member) {
   const auto found = source.extensions.find(extension);
   if (found == source.extensions.end()) return vec3(1.0f);
@@ -118,7 +119,7 @@ vec3 extension_colour(const tinygltf::Material& source, const char* extension, c
           float(limited(rgb[2], 0.0, 1.0))};
 }
 
-/// The cheapest kind that scatters as the material's lobes do together.
+/// The cheapest kind that scatters as all lobes of the material together.
 material_kind kind_of(const material& m, bool thin) {
   const bool smooth = m.alpha == 0.0f;
   const bool varies = m.metallic_roughness_texture.index >= 0 && m.metallic > 0.0f;
@@ -150,7 +151,7 @@ texture_wrap wrap_of(int gltf_mode) {
   }
 }
 
-/// KHR_texture_transform: scaled, then turned counter-clockwise (v runs down), then moved.
+/// KHR_texture_transform: scales, then rotates counter-clockwise (v runs down), then translates.
 void set_transform(const tinygltf::Value& extension, texture_reference& target) {
   const auto scale = extension_numbers<2>(extension, "scale", {1.0, 1.0});
   const auto offset = extension_numbers<2>(extension, "offset", {0.0, 0.0});
@@ -177,7 +178,7 @@ class material_reader {
  private:
   void warn(const std::string& line) { warn_once(target_.warnings, line); }
 
-  /// Of a material, for messages: its place in the file, and its name where it has one.
+  /// A material in messages: its place in the file, and its name if it has one.
   std::string name_of(const tinygltf::Material& source) const {
     const std::string place = "material " + std::to_string(&source - model_.materials.data());
     return source.name.empty() ? place : place + " ('" + source.name + "')";
@@ -211,7 +212,7 @@ class material_reader {
     const char* diffuse = "KHR_materials_diffuse_transmission";
     result.diffuse_transmission = share(diffuse, "diffuseTransmissionFactor", 0.0);
     result.transmitted_color = extension_colour(source, diffuse, "diffuseTransmissionColorFactor");
-    // KHR_materials_ior: 0 stands for an infinite index.
+    // KHR_materials_ior: 0 means an infinite index.
     const double ior = extension_number(source, "KHR_materials_ior", "ior", 1.5);
     result.ior = ior == 0.0 ? largest_ior : float(limited(ior, 1.0, largest_ior));
   }
@@ -229,7 +230,7 @@ class material_reader {
     if (!thin && result.transmission > 0.0f && result.metallic < 1.0f) result.absorption = absorption(source);
   }
 
-  // KHR_materials_volume: what is left after the attenuation distance is the attenuation colour.
+  // KHR_materials_volume: the attenuation colour is what is left after the attenuation distance.
   static vec3 absorption(const tinygltf::Material& source) {
     constexpr float least_left = 1e-6f;
     const double distance = extension_number(source, "KHR_materials_volume", "attenuationDistance", 0.0);
@@ -264,7 +265,7 @@ class material_reader {
     }
   }
 
-  /// None of the extensions' own textures is read.
+  /// The extensions' own textures are not read.
   void warn_of_textures(const tinygltf::Value& extension) {
     if (!extension.IsObject()) return;
     const std::string suffix = "Texture";
@@ -278,7 +279,7 @@ class material_reader {
       warn("the extension " + name + " is not supported");
   }
 
-  /// TextureInfo is a type of tinygltf's for each place that refers to a texture.
+  /// tinygltf has a TextureInfo type for each place that refers to a texture.
   template <class TextureInfo>
   texture_reference texture_of(const TextureInfo& info, encoding is) {
     texture_reference result;
@@ -299,7 +300,7 @@ class material_reader {
     return result;
   }
 
-  /// The index into scene::textures, -1 for none. Textures that show one image alike share it.
+  /// The index into scene::textures, -1 for none. Textures that show one image equally share it.
   std::int32_t index_of(int gltf_texture, encoding is) {
     if (std::size_t(gltf_texture) >= model_.textures.size())
       throw std::runtime_error("texture " + std::to_string(gltf_texture) + " does not exist");

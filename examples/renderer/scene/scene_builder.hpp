@@ -1,5 +1,5 @@
-// A builder of scenes of quads, boxes and water. Every quad is given the side it faces, because
-// emitters emit to that side only.
+// Builds scenes of quads, boxes and water. Every quad gets the side that it faces, because emitters emit only
+// on that side.
 #pragma once
 
 #include "scene/scene.hpp"
@@ -13,13 +13,13 @@
 
 namespace render {
 
-/// Where a surface faces and what it is made of.
+/// Where a surface faces, and its material.
 struct side {
   vec3 facing;
   std::uint32_t material;
 };
 
-/// A box on the floor or anywhere else, turned about the vertical axis through its centre.
+/// A box, rotated about the vertical axis through its centre.
 struct box_shape {
   vec3 centre;
   vec3 size;
@@ -32,7 +32,7 @@ struct room_shape {
   vec3 upper;
 };
 
-/// The materials of a room's six sides, indices into scene::materials; `open` leaves a side out.
+/// The materials of a room's six sides, indices into scene::materials. `open` leaves a side out.
 struct room_materials {
   static constexpr std::uint32_t open = 0xffffffffu;
   std::uint32_t left, right;     ///< x = lower, x = upper
@@ -46,11 +46,11 @@ inline vec3 turned(vec3 v, float angle) {
   return {c * v.x + s * v.z, v.y, c * v.z - s * v.x};
 }
 
-/// The surface of water in waves: `level` and the sum of its waves.
+/// The surface of water: `level` plus the sum of its waves.
 class water_surface {
  public:
   struct wave {
-    vec2 wave_vector;  ///< radians a unit along x and z
+    vec2 wave_vector;  ///< radians per unit along x and z
     float amplitude;
     float phase;  ///< radians
   };
@@ -74,7 +74,7 @@ class water_surface {
   std::vector<wave> waves_;
 };
 
-/// Makes a scene piece by piece; finish() gives it away.
+/// Makes a scene piece by piece. finish() returns it.
 class scene_builder {
  public:
   explicit scene_builder(std::string name) { scene_.name = std::move(name); }
@@ -106,8 +106,8 @@ class scene_builder {
     return add(m);
   }
 
-  /// The planar quad p0 p1 p2 p3, corners in order around it, counter-clockwise seen from where `facing`
-  /// points to.
+  /// The planar quad p0 p1 p2 p3 with corners in order around it, counter-clockwise seen from the direction
+  /// `facing`.
   void quad(const vec3 (&p)[4], vec3 facing, std::uint32_t material_index) {
     const bool flip = glm::dot(glm::cross(p[1] - p[0], p[2] - p[0]), facing) < 0.0f;
     const auto first = static_cast<std::uint32_t>(scene_.positions.size());
@@ -122,7 +122,7 @@ class scene_builder {
     quad({corner, corner + u, corner + u + v, corner + v}, s.facing, s.material);
   }
 
-  /// A closed box whose six sides face outwards; faces that meet share their corners to the last bit.
+  /// A closed box whose six sides face outwards. Adjacent faces share their corners bit for bit.
   void box(const box_shape& shape, std::uint32_t material_index) {
     const auto at = [&](vec3 signs) { return shape.centre + turned(0.5f * shape.size * signs, shape.turn); };
     for (int axis = 0; axis < 3; ++axis)
@@ -159,8 +159,7 @@ class scene_builder {
     parallelogram(centre - 0.5f * (u + v), u, v, {vec3(0.0f, -1.0f, 0.0f), material_index});
   }
 
-  /// What lies over the square |x|, |z| <= half_side, of cells x cells squares, with smooth normals; faces
-  /// up.
+  /// Water over the square |x|, |z| <= half_side, of cells x cells squares, with smooth normals. It faces up.
   void water(const water_surface& surface, float half_side, int cells, std::uint32_t material_index) {
     const auto first = static_cast<std::uint32_t>(scene_.positions.size());
     const auto row = static_cast<std::uint32_t>(cells) + 1;
@@ -199,8 +198,8 @@ class scene_builder {
     scene_.triangle_materials.push_back(material_index);
   }
 
-  // Where some vertices have a normal all have: the others that of their face, which no other shares them
-  // with.
+  // Gives all vertices a normal if some have one. The others get that of their face, which they belong to
+  // alone.
   void add_flat_normals() {
     if (scene_.normals.empty()) return;
     scene_.normals.resize(scene_.positions.size(), vec3(0.0f));

@@ -1,4 +1,4 @@
-// Every number of a scene into one hash, member by member, since structures have padding.
+// Hashes every number of a scene, member by member, since structures have padding.
 #include "scene/scene_checksum.hpp"
 
 #include <wfpg/state/section_file.hpp>
@@ -39,7 +39,7 @@ class scene_hash {
     for (const T& value : values) add(value);
   }
 
-  // Bindings name every member: one that is new does not compile until it is added.
+  // Bindings name every member, so a new member does not compile until it is added.
   void add(const texture_reference& t) {
     const auto& [index, u_axis, v_axis, offset] = t;
     add_all(index, u_axis, v_axis, offset);

@@ -1,4 +1,4 @@
-// Tells scenes apart, for what was saved of one and must not be used with another.
+// Identifies scenes, so that saved data of one is not used with another.
 #pragma once
 
 #include "scene/scene.hpp"
@@ -7,10 +7,11 @@
 
 namespace render {
 
-/// Of all that decides what a scene looks like; its name and intended picture do not. O(bytes of the scene).
+/// Hash of all that affects the picture, without the name and the intended picture size. O(bytes of the
+/// scene).
 std::uint64_t checksum_of(const scene& scene);
 
-/// Of all that decides the light in a scene: of everything but the camera. O(bytes of the scene).
+/// Hash of all that affects the light, which is all but the camera. O(bytes of the scene).
 std::uint64_t checksum_without_camera(const scene& scene);
 
 }  // namespace render

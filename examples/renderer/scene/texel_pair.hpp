@@ -15,12 +15,13 @@ struct texel_pair {
   float second_weight;
 
   WFPG_HD texel_pair(float coordinate, std::uint32_t size, texture_wrap wrap) {
-    // Only near the origin is there precision for a texel; two copies show a mirrored one.
+    // Wraps first, since only small coordinates are precise enough. A mirrored texture has a period of two
+    // copies.
     const float period = wrap == texture_wrap::mirrored_repeat ? 2.0f : 1.0f;
     const float near = wrap == texture_wrap::clamp_to_edge
                            ? glm::clamp(coordinate, 0.0f, 1.0f)
                            : coordinate - period * std::floor(coordinate / period);
-    // A coordinate that is not finite, or too large to have a fraction, is the edge's.
+    // A coordinate that is not finite, or too large for a fraction, becomes the edge's.
     const float inside = near >= 0.0f ? glm::min(near, period) : 0.0f;
     const float x = inside * static_cast<float>(size) - 0.5f, floor = std::floor(x);
     second_weight = x - floor;

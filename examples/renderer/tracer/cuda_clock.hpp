@@ -11,7 +11,7 @@
 
 namespace render {
 
-/// Times stages by events between them: nothing waits for a stage to end.
+/// Times stages by events between them. Does not wait for a stage to end.
 template <>
 class policy_clock<wfpg::exec::cuda> {
  public:
@@ -25,7 +25,7 @@ class policy_clock<wfpg::exec::cuda> {
     }
   }
 
-  /// Calls f; the device's time from what f asks it first to what f asks it last is added to `stage` later.
+  /// Calls f. Later adds the device's time from the first to the last work of f to `stage`.
   template <class F>
   void measure(const char* stage, const F& f) {
     if (used_ == intervals_.size()) intervals_.push_back(make_interval());
@@ -66,7 +66,7 @@ class policy_clock<wfpg::exec::cuda> {
   }
 
   cudaStream_t stream_;
-  std::vector<interval> intervals_;  // made once, used for every sample
+  std::vector<interval> intervals_;  // allocated once, used for every sample
   std::size_t used_ = 0;             // since the last resolve()
   stage_clock sums_;
 };

@@ -1,5 +1,5 @@
-// Open PGL (Herholz and Dittebrandt, 2022) behind the guider's interface, so that it and wfpg share one loop,
-// one treatment of BSDFs, one kind of mixture, and differ in what they guide by. On TBB, as Open PGL is.
+// Open PGL (Herholz and Dittebrandt, 2022) behind the guider's interface. It and wfpg share one loop, one
+// treatment of BSDFs and one kind of mixture, and differ only in the guide. It runs on TBB, as Open PGL does.
 #pragma once
 
 #include "tracer/openpgl_paths.hpp"
@@ -12,21 +12,20 @@
 
 namespace render {
 
-/// What a field of Open PGL draws from at one point, as wfpg::basic_guide_mixture wants it. An empty one
-/// guides nothing.
+/// Open PGL's distribution at one point, with the interface that wfpg::basic_guide_mixture needs. An empty
+/// one guides nothing.
 class openpgl_distribution {
  public:
   openpgl_distribution() = default;
   explicit openpgl_distribution(const openpgl::cpp::SurfaceSamplingDistribution& at) : at_(&at) {}
 
   bool empty() const { return at_ == nullptr; }
-  /// As wfpg's fields, which know as little of a BSDF's lobes: both are asked as often.
+  /// That of wfpg's fields. Both know equally little of a BSDF's lobes, so both get equal fractions.
   static constexpr float resolved_alpha() { return wfpg::directional_field::resolved_alpha(); }
 
   vec3 sample(vec2 u, float& density) const {
     const vec3 direction = glm::normalize(from_pgl(at_->Sample({u.x, u.y})));
-    // Not SamplePDF(): what that says differs where rounding moves a direction to the next cell of a
-    // quadtree.
+    // Not SamplePDF(): its density differs where rounding moves a direction to the next cell of a quadtree.
     density = pdf(direction);
     return direction;
   }
@@ -38,22 +37,22 @@ class openpgl_distribution {
 
 using openpgl_mixture = wfpg::basic_guide_mixture<openpgl_distribution>;
 
-/// A field of Open PGL that can be asked from any thread.
+/// A field of Open PGL that any thread may query.
 class openpgl_field_view {
  public:
   using distributions = ::tbb::enumerable_thread_specific<openpgl::cpp::SurfaceSamplingDistribution>;
 
-  /// `workspace`: a distribution a thread.
+  /// `workspace` has a distribution for each thread.
   openpgl_field_view(const openpgl::cpp::Field& field, distributions& workspace)
       : field_(&field), workspace_(&workspace) {}
 
-  /// The distribution at a surface, valid until this thread's next call. Has the cosine in it where the field
-  /// can do that and light comes from above the surface alone. Empty on delta BSDFs, and where nothing is
-  /// learnt yet.
+  /// The distribution at a surface, valid until this thread's next call. Includes the cosine if the field
+  /// supports it and light comes only from above the surface. Empty for delta BSDFs, and before the field has
+  /// learnt.
   openpgl_distribution at(const wfpg::surface<bsdf>& s) const {
     if (s.bsdf.is_delta()) return {};
     openpgl::cpp::SurfaceSamplingDistribution& here = workspace_->local();
-    float u = 0.0f;  // chooses among neighbours, where a field is asked for them
+    float u = 0.0f;  // chooses among neighbours in a look-up of several
     if (!here.Init(field_, to_pgl(s.position), u)) return {};
     if (here.SupportsApplyCosineProduct() && !s.bsdf.transmits()) here.ApplyCosineProduct(to_pgl(s.normal));
     return openpgl_distribution(here);
@@ -64,12 +63,12 @@ class openpgl_field_view {
   distributions* workspace_;
 };
 
-/// Draws a direction for each ray, gives the density of its query from the same distribution, and records
-/// what was drawn.
+/// Samples a direction for each ray, returns the density of its query from the same distribution, and records
+/// the direction.
 template <class Surfaces, class Random, class Queries>
 struct sample_openpgl {
   openpgl_field_view field;
-  float fraction;  // 0: the field is not asked
+  float fraction;  // 0: the field is not used
   std::uint32_t depth;
   Surfaces surfaces;
   Random random;
@@ -95,18 +94,19 @@ struct sample_openpgl {
   }
 };
 
-/// What an openpgl_guider is made of.
+/// Options of an openpgl_guider.
 struct openpgl_options {
   PGL_DIRECTIONAL_DISTRIBUTION_TYPE directional = PGL_DIRECTIONAL_DISTRIBUTION_PARALLAX_AWARE_VMM;
-  std::size_t samples_per_leaf = 32000;       ///< a leaf that has had more is split
-  float guide_fraction = 0.5f;                ///< of directions that are drawn from the field, in [0, 1]
-  std::uint32_t guided_depths = 0xffffffffu;  ///< depths whose directions are, from 0 on
+  std::size_t samples_per_leaf = 32000;       ///< larger leaves are split
+  float guide_fraction = 0.5f;                ///< of directions that the field samples, in [0, 1]
+  std::uint32_t guided_depths = 0xffffffffu;  ///< depths that the field guides, from 0 on
   std::size_t paths = 0;                      ///< of a sample
   std::size_t max_depth = 1;                  ///< vertices of a path
   pgl_box3f bounds{};                         ///< holds all vertices
 };
 
-/// A guider that trains a field of Open PGL on each sample, for the next ones: the first is not guided.
+/// A guider that trains a field of Open PGL on each sample, for the next samples. The first one is not
+/// guided.
 class openpgl_guider {
  public:
   openpgl_guider(const wfpg::exec::tbb& exec, const openpgl_options& options)
@@ -147,7 +147,7 @@ class openpgl_guider {
   const openpgl::cpp::Field& field() const { return field_; }
   openpgl_field_view view() { return {field_, distributions_}; }
   const openpgl_paths& paths() const { return paths_; }
-  /// By stage: "samples" makes them of paths, "train" fits the field to them, "query" draws directions.
+  /// By stage: "samples" makes them from paths, "train" fits the field, "query" samples directions.
   const named_seconds& seconds() const { return clock_.seconds(); }
 
  private:
@@ -156,13 +156,13 @@ class openpgl_guider {
     explicit field_config(const openpgl_options& options) {
       // Deterministic: one seed, one picture.
       config.Init(PGL_SPATIAL_STRUCTURE_KDTREE, options.directional, true, options.samples_per_leaf);
-      // The default, a random one of the four regions nearest, hides borders between regions and costs more
-      // noise than that is worth: the nearest may lie on another wall.
+      // The default chooses one of the four nearest regions at random. This hides borders between regions,
+      // but adds more noise than it saves: the nearest region may be on another wall.
       config.SetUseKnnLookup(false);
     }
   };
 
-  // Of those that Open PGL is built with by default.
+  // The widest of Open PGL's default devices.
   static PGL_DEVICE_TYPE widest_device() {
 #if defined(__x86_64__) && defined(__GNUC__)
     return __builtin_cpu_supports("avx2") ? PGL_DEVICE_TYPE_CPU_8 : PGL_DEVICE_TYPE_CPU_4;

@@ -1,13 +1,13 @@
-// The paths of a sample as Open PGL's segments, and the radiance samples that its field learns from.
+// The paths of a sample as Open PGL's segments, and the radiance samples that train its field.
 //
-// Open PGL's own PathSegmentStorage turns segments into samples, since it knows what its fields can learn:
-// it follows distances through mirrors and glass, for parallax, leaves delta lobes out, and bounds the
-// weights that would spoil a fit.
+// Open PGL's own PathSegmentStorage turns segments into samples, since it knows what its fields can learn. It
+// follows distances through mirrors and glass, for parallax. It leaves delta lobes out, and bounds weights
+// that would spoil a fit.
 //
-// What is learnt at a vertex is what a direction drawn there brings to the picture: light that is hit next,
-// with its MIS weight where next-event estimation finds it too, next-event estimation at the vertices after,
-// and all that follows. Next-event estimation at the vertex itself is no part of it: no drawn direction does
-// its work.
+// A vertex learns the light that a direction sampled there brings to the picture. This is light that is hit
+// next, with its MIS weight if next-event estimation finds it too. It is also next-event estimation at later
+// vertices, and all that follows. Next-event estimation at the vertex itself does not count, since no sampled
+// direction replaces it.
 //
 // Memory: 136 bytes a vertex, paths × depths of them, and 16 a path.
 #pragma once
@@ -34,7 +34,7 @@ inline vec3 from_pgl(pgl_vec3f v) {
   return {v.x, v.y, v.z};
 }
 
-/// What kernels see of openpgl_paths: a recorder as path_kernels.hpp wants it. Calls for one path come from
+/// The kernels' view of openpgl_paths: a recorder as path_kernels.hpp needs it. Calls for one path come from
 /// one thread at a time, in order of depth.
 class openpgl_recorder {
  public:
@@ -42,7 +42,7 @@ class openpgl_recorder {
 
   void vertex(std::uint32_t path, std::uint32_t depth, vec3 position, vec3 outgoing, vec3 throughput) const {
     if (depth > 0) {
-      // Beside the BSDF: roulette, and absorption on the way.
+      // Factors besides the BSDF: roulette, and absorption along the segment.
       segment& before = at(path, depth - 1);
       before.transmittanceWeight = to_pgl(divided(throughput, scattered(path, before)));
     }
@@ -55,7 +55,8 @@ class openpgl_recorder {
                                            to_pgl(divided(contribution, throughputs_[path])));
   }
 
-  /// With its MIS weight. Of a vertex, or of the environment: then `depth` has no vertex.
+  /// Records emission with its MIS weight, of a vertex or of the environment. For the environment `depth` has
+  /// no vertex.
   void emission(std::uint32_t path, std::uint32_t depth, vec3 contribution) const {
     if (depth < lengths_[path]) {
       openpgl::cpp::AddDirectContribution(&at(path, depth),
@@ -69,14 +70,14 @@ class openpgl_recorder {
     }
   }
 
-  // What it wants of these, drawn() and emission() tell.
+  // drawn() and emission() record the data of these.
   void scatter(std::uint32_t, std::uint32_t, const wfpg::sampled_direction&) const {}
   void escape(std::uint32_t, std::uint32_t, vec3) const {}
 
-  /// How the path goes on from vertex `depth`, a point of surface s.
+  /// Records the direction from vertex `depth`, a point on surface s.
   void drawn(std::uint32_t path, std::uint32_t depth, const wfpg::surface<bsdf>& s,
              const wfpg::sampled_direction& next) const {
-    if (!(next.pdf > 0.0f)) return;  // it does not
+    if (!(next.pdf > 0.0f)) return;  // the path ends here
     const bool delta = next.technique == wfpg::sampling_technique::delta;
     const wfpg::glossy_part glossy = s.bsdf.glossy(s.outgoing);
     segment& here = at(path, depth);
@@ -93,7 +94,7 @@ class openpgl_recorder {
  private:
   friend class openpgl_paths;
 
-  static constexpr float far = 1e6f;  // where the environment is: Open PGL's own largest distance
+  static constexpr float far = 1e6f;  // distance of the environment, Open PGL's largest
 
   segment& at(std::uint32_t path, std::uint32_t depth) const { return segments_[path * max_depth_ + depth]; }
 
@@ -110,19 +111,19 @@ class openpgl_recorder {
     return throughputs_[path] * from_pgl(last.scatteringWeight);
   }
 
-  // Nothing comes from where nothing can go.
+  // Zero where the throughput is zero.
   static vec3 divided(vec3 a, vec3 b) {
     const auto channel = [](float x, float y) { return y > 0.0f ? x / y : 0.0f; };
     return {channel(a.x, b.x), channel(a.y, b.y), channel(a.z, b.z)};
   }
 
   std::size_t max_depth_ = 0;
-  segment* segments_ = nullptr;  // a path's together
+  segment* segments_ = nullptr;  // contiguous per path
   std::uint32_t* lengths_ = nullptr;
   vec3* throughputs_ = nullptr;  // at the path's last vertex, before its BSDF
 };
 
-/// Owns the segments of `paths` paths of at most `max_depth` vertices, and the samples made of them.
+/// Owns the segments of `paths` paths of at most `max_depth` vertices, and the samples made from them.
 class openpgl_paths {
  public:
   openpgl_paths(std::size_t paths, std::size_t max_depth)
@@ -140,16 +141,16 @@ class openpgl_paths {
     return segments_.size() * sizeof(segments_[0]) + lengths_.size() * sizeof(lengths_[0]) +
            throughputs_.size() * sizeof(throughputs_[0]);
   }
-  /// Of the samples that make_samples() has made at most.
+  /// Bytes of the largest number of samples so far.
   std::size_t sample_bytes() const { return most_samples_ * sizeof(openpgl::cpp::SampleData); }
 
-  /// Forgets paths and samples.
+  /// Drops paths and samples.
   void clear() {
     std::fill(lengths_.begin(), lengths_.end(), 0u);
     samples_.Clear();
   }
 
-  /// The samples of all paths, in any order.
+  /// Makes the samples of all paths, in any order.
   void make_samples(const wfpg::exec::tbb& exec) {
     exec.for_each(lengths_.size(), [this](std::size_t path) { make_samples(path); });
     most_samples_ = std::max(most_samples_, samples_.GetSizeSurface());
@@ -163,7 +164,7 @@ class openpgl_paths {
     storage.Clear();
     for (std::size_t i = 0; i < lengths_[path]; ++i)
       storage.AddSegment(segments_[path * recorder_.max_depth_ + i]);
-    // Direct light is in the segments with its MIS weight, and with roulette.
+    // Direct light is in the segments, with its MIS weight and roulette.
     storage.PrepareSamples(true, true, true);
     std::size_t count = 0;
     const openpgl::cpp::SampleData* const made = storage.GetSamples(count);

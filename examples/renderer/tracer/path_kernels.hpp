@@ -1,5 +1,5 @@
-// The kernels of a wave: functors of an index, that read and write what path_state.hpp describes.
-// A Recorder is what wfpg::path_guider::recorder() gives, or one that does nothing.
+// The kernels of a wave: functors of an index on the data of path_state.hpp. A Recorder is what
+// wfpg::path_guider::recorder() returns, or one that does nothing.
 #pragma once
 
 #include "scene/camera.hpp"
@@ -10,11 +10,11 @@
 
 namespace render {
 
-/// Which vertex of which sample a wave is at; depth counts vertices from 0, the camera's first hit.
+/// The sample and depth of a wave. Depth counts vertices from 0, the camera's first hit.
 struct wave_position {
   random_stream random;
   std::uint32_t depth = 0;
-  std::uint32_t max_depth = 1;  ///< vertices of a path, at most
+  std::uint32_t max_depth = 1;  ///< most vertices of a path
 
   WFPG_HD bool is_last() const { return depth + 1 >= max_depth; }
   WFPG_HD std::uint32_t first_dimension() const { return depth * dimension::per_vertex; }
@@ -23,18 +23,18 @@ struct wave_position {
   }
 };
 
-/// The lights as paths meet them: by chance, and by next-event estimation where that is on.
+/// The lights as paths find them: by hits, and by next-event estimation if it is on.
 struct path_lights {
   scene_view scene;
   light_view lights;
   bool next_event = true;
   wfpg::light_guide_view guide = {};  ///< empty: lights are chosen by power
 
-  /// The group of lights that a vertex asks.
+  /// Chooses the group of lights for a vertex.
   WFPG_HD wfpg::light_choice choose(const path_vertex& vertex, float u) const {
     return guide.empty() ? wfpg::light_choice{} : guide.choose(row(vertex), u);
   }
-  /// How much more likely than by power a vertex chooses a group.
+  /// The probability of a group at a vertex, over its probability by power.
   WFPG_HD float preference(const path_vertex& vertex, std::uint32_t group) const {
     return guide.empty() ? 1.0f : guide.probability(row(vertex), group) / lights.groups[group].share;
   }
@@ -45,7 +45,7 @@ struct path_lights {
   }
 };
 
-/// Starts a path through each pixel. A Camera is a pinhole, or what has its through().
+/// Starts a path through each pixel. A Camera is a pinhole, or another type with through().
 template <class Camera>
 struct start_paths {
   Camera camera;
@@ -60,7 +60,7 @@ struct start_paths {
   }
 };
 
-/// What kernels ask an inline caster.
+/// Queries of kernels to an inline caster.
 template <class Caster>
 struct inline_answers {
   Caster caster;
@@ -70,14 +70,14 @@ struct inline_answers {
   WFPG_HD void asks_nothing(std::size_t) const {}
 };
 
-/// The same of a batch caster, which the kernel before has left its rays.
+/// Hits of a batch caster, whose rays an earlier kernel wrote.
 struct batch_hits {
   wfpg::array_view<const triangle_hit> hits;
 
   WFPG_HD triangle_hit hit(std::size_t i, const wfpg::ray&) const { return hits[i]; }
 };
 
-/// Leaves a batch caster the rays of which drop_hidden will have the answers.
+/// Writes rays for a batch caster. drop_hidden reads their answers.
 struct batch_questions {
   wfpg::array_view<wfpg::ray> rays;
 
@@ -87,7 +87,7 @@ struct batch_questions {
   }
   WFPG_HD void asks_nothing(std::size_t i) const { rays[i] = no_ray(); }
 
-  /// One that no batch caster traces.
+  /// A ray that batch casters do not trace.
   WFPG_HD static wfpg::ray no_ray() {
     wfpg::ray ray;
     ray.t_max = 0.0f;
@@ -95,7 +95,7 @@ struct batch_questions {
   }
 };
 
-/// Leaves a batch caster the rays of the paths.
+/// Writes the paths' rays for a batch caster.
 struct write_rays {
   path_queue queue;
   tiled_view<path_state> paths;
@@ -109,15 +109,14 @@ struct write_rays {
   }
 };
 
-/// Finds the next vertex of each path that may still go on, gathers what it emits, and names the queue that
-/// the path goes to.
+/// Finds the next vertex of each path that may continue, adds its emission, and returns the path's queue.
 template <class Answers, class Recorder>
 struct trace_paths {
   wave_position at;
   path_lights world;
   Answers answers;
   Recorder recorder;
-  path_queue queue;  ///< of the vertex before
+  path_queue queue;  ///< of the previous vertex
   tiled_view<path_state> paths;
   tiled_view<path_vertex> vertices;
   wfpg::array_view<std::uint32_t> keys;  ///< the material's kind, or excluded
@@ -157,8 +156,8 @@ struct trace_paths {
     paths.update(id, [](path_state& path) { path.active = 0; });
   }
 
-  // What a solid leaves of the light along the path's last segment, which is inside where it ends at its
-  // back.
+  // The fraction of light that a solid leaves along the path's last segment. It is inside if it ends at a
+  // back side.
   WFPG_HD vec3 absorb(std::uint32_t id, const path_state& path, const hit_surface& found) const {
     if (found.absorption == vec3(0.0f)) return vec3(1.0f);
     const vec3 left = glm::exp(-found.absorption * glm::length(found.surface.position - path.origin));
@@ -186,7 +185,7 @@ struct trace_paths {
     return wfpg::power_heuristic(path.pdf, pdf * world.preference(vertices[id], world.lights.sky_group()));
   }
 
-  // Against next-event estimation at the vertex before, which could have found the same point.
+  // MIS weight against next-event estimation at the previous vertex, which could have found this point.
   WFPG_HD float emission_weight(std::uint32_t id, const path_state& path, const triangle_hit& hit,
                                 const hit_surface& found) const {
     if (!world.next_event || !(path.pdf > 0.0f) || found.emission == vec3(0.0f)) return 1.0f;
@@ -199,8 +198,8 @@ struct trace_paths {
   }
 };
 
-/// Next-event estimation up to its weight: draws a point of a light for each slot and looks whether it is
-/// seen.
+/// Next-event estimation without its weight: samples a point on a light for each slot and tests whether it is
+/// visible.
 template <class Answers>
 struct query_lights {
   wave_position at;
@@ -245,11 +244,11 @@ struct query_lights {
     return answers.is_hidden(slot, ray);
   }
 
-  // Beside this every density is as good as 0: nothing else finds a light without extent.
+  // Every density is negligible beside this one, since hits never find a light without extent.
   static constexpr float unrivalled_pdf = 1e30f;
 };
 
-/// Forgets the light samples that a batch caster found hidden.
+/// Drops the light samples that a batch caster found hidden.
 struct drop_hidden {
   wfpg::array_view<const std::uint32_t> hidden;
   tiled_view<light_query> queries;
@@ -259,7 +258,7 @@ struct drop_hidden {
   }
 };
 
-/// Adds each slot's light sample with its MIS weight, and sends the path along the direction drawn for it.
+/// Adds each slot's light sample with its MIS weight, and continues the path along its sampled direction.
 template <class Recorder>
 struct shade_paths {
   wave_position at;
@@ -272,7 +271,7 @@ struct shade_paths {
   tiled_view<path_state> paths;
   wfpg::array_view<vec3> radiance;
   wfpg::light_guide_view lights;
-  std::uint32_t roulette_depth;  ///< paths go on from vertices before it
+  std::uint32_t roulette_depth;  ///< roulette begins at this vertex
 
   WFPG_HD void operator()(std::size_t slot) const {
     if (!queue.holds(slot)) return;
@@ -287,7 +286,8 @@ struct shade_paths {
   }
 
  private:
-  // Bounces are spared while a tenth of the light is left: ending those added more noise than it saved time.
+  // Roulette spares paths with more than a tenth of the light. Ending those added more noise than it saved
+  // time.
   static constexpr float spared_reflectance = 0.1f;
 
   WFPG_HD void add_light(std::size_t slot, std::uint32_t id) const {
@@ -300,7 +300,7 @@ struct shade_paths {
     recorder.radiance(id, at.depth, contribution);
   }
 
-  // False where the path ends.
+  // False if the path ends.
   WFPG_HD bool scatter(const path_vertex& vertex, const wfpg::sampled_direction& drawn,
                        path_state& path) const {
     if (drawn.technique == wfpg::sampling_technique::none || !(drawn.pdf > 0.0f)) return false;
@@ -317,8 +317,8 @@ struct shade_paths {
     return true;
   }
 
-  // By the throughput that the path would have if its directions were all drawn from BSDFs. Its real one is
-  // low where guiding is sure of a direction, and those are the paths worth keeping.
+  // Uses the throughput that the path would have if BSDFs had sampled all its directions. The real one is low
+  // where guiding is certain of a direction, and those paths matter most.
   WFPG_HD bool survive_roulette(path_state& path, float u) const {
     if (at.depth < roulette_depth) return true;
     const float probability = glm::min(1.0f, path.reflectance / spared_reflectance);

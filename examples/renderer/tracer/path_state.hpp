@@ -1,4 +1,4 @@
-// What a wave of paths keeps between its kernels: the paths, their hits, the queue of those still going on.
+// Data of a wave of paths between its kernels: the paths, their hits, and the queue of active ones.
 #pragma once
 
 #include "lights/lights.hpp"
@@ -15,8 +15,8 @@ struct path_state {
   vec3 origin{0.0f};  ///< of the next segment
   float pdf = 0.0f;   ///< of the direction, per steradian; 0 from the camera and delta lobes
   vec3 direction{0.0f, 0.0f, 1.0f};
-  float reflectance = 1.0f;  ///< what roulette goes by: see survive_roulette
-  vec3 throughput{1.0f};     ///< of the path so far, roulette included
+  float reflectance = 1.0f;  ///< for roulette, see survive_roulette
+  vec3 throughput{1.0f};     ///< of the path so far, with roulette
   std::uint32_t active = 1;  ///< 0: it has ended
 
   path_state() = default;
@@ -31,8 +31,8 @@ struct path_state {
   }
 };
 
-/// A path's last hit: its surface without what is in there twice. Nothing is initialised: vertices are made
-/// of a hit or copied over.
+/// A path's last hit: its surface without redundant members. Nothing is initialised, since vertices are made
+/// from a hit or copied.
 struct path_vertex {
   vec3 position;
   float offset;  ///< as in surface_point
@@ -79,19 +79,20 @@ struct path_vertex {
 
 static_assert(sizeof(path_vertex) == 80, "every kernel of a wave reads it");
 
-/// A sample of next-event estimation that waits for its weight.
+/// A sample of next-event estimation without its weight.
 struct light_query {
-  vec3 direction{0.0f};  ///< toward the light, unit length; zero where there is nothing to add
-  float pdf = 0.0f;      ///< of the direction by light sampling, per steradian; huge where nothing rivals it
-  vec3 value{0.0f};      ///< BSDF, cosine and radiance over that pdf
+  vec3 direction{0.0f};  ///< toward the light, unit length; zero: nothing to add
+  float pdf =
+      0.0f;  ///< of the direction by light sampling, per steradian; huge if no other technique finds it
+  vec3 value{0.0f};                              ///< BSDF, cosine and radiance over that pdf
   std::uint32_t choice = wfpg::no_light_choice;  ///< of its group
 
   light_query() = default;
-  /// Nothing to add came of a choice.
+  /// A choice that found no light.
   WFPG_HD explicit light_query(std::uint32_t of) : choice(of) {}
 };
 
-/// The paths that go on, in the order of their materials: slot -> path.
+/// The active paths in the order of their materials: slot -> path.
 struct path_queue {
   wfpg::partition_view by_material;
   bool all = false;  ///< every path in its own slot

@@ -1,4 +1,4 @@
-// What irradiance records want to know of a scene: its emitters, and how light goes on at smooth surfaces.
+// The scene as irradiance records need it: its emitters, and how light continues at smooth surfaces.
 #pragma once
 
 #include "scene/device_scene.hpp"
@@ -10,7 +10,7 @@
 
 namespace render {
 
-/// The triangles that emit, as bright as they are on average.
+/// The triangles that emit, with their mean radiance.
 inline std::vector<wfpg::emitting_triangle> emitters_of(const scene& host) {
   const std::vector<float> luminances = emitted_luminances(host);
   std::vector<wfpg::emitting_triangle> result;
@@ -23,13 +23,13 @@ inline std::vector<wfpg::emitting_triangle> emitters_of(const scene& host) {
   return result;
 }
 
-/// Whether there are surfaces behind which next-event estimation does not find lights.
+/// Whether there are surfaces through which next-event estimation finds no lights.
 inline bool has_smooth_surfaces(const scene& host) {
   return std::any_of(host.materials.begin(), host.materials.end(),
                      [](const material& m) { return is_smooth(m.kind); });
 }
 
-/// Light goes on at materials that are smooth. A Caster finds triangles inside kernels.
+/// Continues light at smooth materials. A Caster finds triangles inside kernels.
 template <class Caster>
 struct smooth_surfaces {
   Caster caster;

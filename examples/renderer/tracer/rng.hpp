@@ -1,5 +1,5 @@
-// Counter-based random numbers: a pure function of what they are for, so that a picture does not depend on
-// the order in which threads ask.
+// Counter-based random numbers: a pure function of their use. A picture therefore does not depend on the
+// order of threads.
 #pragma once
 
 #include <wfpg/base/types.hpp>
@@ -8,12 +8,12 @@
 
 namespace render {
 
-/// Where the numbers of one path in one sample come from.
+/// The source of random numbers of one path in one sample.
 struct random_stream {
   std::uint64_t seed = 0;
   std::uint32_t sample = 0;
 
-  /// Two independent numbers in [0, 1) for a path and a use of them (`dimension`).
+  /// Two independent numbers in [0, 1) for a path and a use (`dimension`).
   WFPG_HD wfpg::vec2 operator()(std::uint32_t path, std::uint32_t dimension) const {
     const std::uint64_t counter = (static_cast<std::uint64_t>(path) << 32) | dimension;
     const std::uint64_t bits = mix(mix(mix(seed + 0x632be59bd9b4e019ull) ^ sample) + counter);
@@ -31,7 +31,7 @@ struct random_stream {
   WFPG_HD static float unit(std::uint32_t bits24) { return static_cast<float>(bits24) * 0x1p-24f; }
 };
 
-/// Uses of random numbers at one vertex; the next vertex's begin `per_vertex` further on.
+/// Uses of random numbers at one vertex. Those of the next vertex begin `per_vertex` later.
 namespace dimension {
 inline constexpr std::uint32_t direction = 0;  ///< this one and the next: the guider's
 inline constexpr std::uint32_t light_point = 2;

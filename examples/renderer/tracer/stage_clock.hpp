@@ -10,10 +10,10 @@ namespace render {
 
 using named_seconds = std::vector<std::pair<std::string, double>>;
 
-/// Sums the seconds of named stages, in the order in which the names first come.
+/// Sums the seconds of named stages, in the order of their first use.
 class stage_clock {
  public:
-  /// Calls f and adds its time to `stage`. Work that f leaves running is not counted.
+  /// Calls f and adds its time to `stage`. Work that f leaves running does not count.
   template <class F>
   void measure(const char* stage, const F& f) {
     const auto start = std::chrono::steady_clock::now();
@@ -36,14 +36,14 @@ class stage_clock {
   named_seconds seconds_;
 };
 
-/// The stages of work on a policy, whose calls return when the work is done. A policy whose calls return
-/// before has a specialisation of its own.
+/// Times stages of work on a policy whose calls return when the work is done. Asynchronous policies have a
+/// specialisation.
 template <class Exec>
 class policy_clock : public stage_clock {
  public:
   explicit policy_clock(const Exec&) {}
 
-  /// Adds what measure() could not know yet; the work has been waited for.
+  /// Adds times that measure() could not know yet. All work must be finished.
   void resolve() {}
 };
 

@@ -1,6 +1,6 @@
 // Arrays of structures for kernels that read or write all of one. On a GPU they are laid out in tiles of a
-// warp's elements, whose pieces of 16 bytes lie side by side, first the tile's first pieces, then its second
-// ones, so that what a warp moves is contiguous. Elsewhere they are ordinary arrays.
+// warp's elements. A tile has pieces of 16 bytes: first the elements' first pieces, then their second ones. A
+// warp's accesses are therefore contiguous. Elsewhere they are ordinary arrays.
 #pragma once
 
 #include <wfpg/exec/buffer.hpp>
@@ -11,8 +11,8 @@
 
 namespace render {
 
-/// What kernels see of a tiled_array. Trivially copyable. Elements are written before they are read, and all
-/// in the same memory.
+/// The kernels' view of a tiled_array. Trivially copyable. Elements must be written before they are read,
+/// both in the same memory.
 template <class T>
 class tiled_view {
  public:
@@ -48,12 +48,12 @@ class tiled_view {
   const T& operator[](std::size_t i) const {
     return data_[i];
   }
-  /// Makes element i of arguments of its constructor.
+  /// Constructs element i from arguments.
   template <class... Arguments>
   void emplace(std::size_t i, const Arguments&... arguments) const {
     new (data_ + i) T(arguments...);
   }
-  /// f(T&) of element i.
+  /// Calls f(T&) with element i.
   template <class F>
   void update(std::size_t i, const F& f) const {
     f(data_[i]);
@@ -75,7 +75,7 @@ class tiled_view {
   std::size_t size_ = 0;
 };
 
-/// Owns `size` uninitialised elements in the memory of a policy.
+/// Owns `size` uninitialised elements in a policy's memory.
 template <class T, class Exec>
 class tiled_array {
  public:

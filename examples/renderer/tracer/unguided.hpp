@@ -1,5 +1,5 @@
-// Plain path tracing behind the guider's interface, so that both methods share one loop and differ only in
-// where directions come from.
+// Plain path tracing behind the guider's interface. All methods share one loop and differ only in their
+// directions.
 #pragma once
 
 #include <wfpg/guide/path_recorder.hpp>
@@ -10,8 +10,7 @@
 
 namespace render {
 
-/// A guider that does not guide: each ray's direction is its BSDF's, by the pass that a guider's unguided
-/// waves have.
+/// A guider that does not guide. Each ray samples its BSDF, in the same pass as a guider's unguided waves.
 template <class Exec>
 class unguided {
  public:

@@ -1,4 +1,4 @@
-// The path tracer: one sample of every pixel is one wave that goes from vertex to vertex as a whole.
+// The path tracer. One sample of all pixels is one wave that goes from vertex to vertex as a whole.
 #pragma once
 
 #include "app/render_state.hpp"
@@ -19,22 +19,22 @@ namespace render {
 struct tracer_settings {
   int width = 512;              ///< pixels, positive
   int height = 512;             ///< pixels, positive
-  std::uint32_t max_depth = 8;  ///< vertices of a path and segments from the camera, at least 1
+  std::uint32_t max_depth = 8;  ///< segments of a path from the camera, at least 1
   std::uint64_t seed = 0;
   std::uint32_t roulette_depth = 3;  ///< Russian roulette begins at this vertex; the camera's first hit is 0
 };
 
 /// Renders samples of a scene with directions from a guider.
 ///
-/// A Caster is one of the guider's that also finds triangles. Inline, it is called inside the kernels:
+/// A Caster is a caster of the guider that also finds triangles. Kernels call an inline caster's functions:
 ///   triangle_hit intersect(const wfpg::ray&) const;  bool occluded(const wfpg::ray&) const;
-/// in batches, between them, and rays with t_max <= t_min are misses:
+/// A batch caster is called between kernels. Rays with t_max <= t_min are misses:
 ///   void intersect(const Exec&, wfpg::array_view<const wfpg::ray>, wfpg::array_view<triangle_hit>) const;
 ///   void occluded(const Exec&, wfpg::array_view<const wfpg::ray>, wfpg::array_view<std::uint32_t>) const;
 ///
-/// Emission at vertices 1 to max_depth counts; next-event estimation, where it is on, is done at vertices 1
-/// to max_depth - 1, so that both estimate the same sum. Work is ordered by path, never by arrival: one seed
-/// gives one picture on any number of threads.
+/// Emission counts at vertices 1 to max_depth. Next-event estimation, if it is on, is done at vertices 1 to
+/// max_depth - 1, so that both estimate the same sum. Work is ordered by path, never by arrival. One seed
+/// therefore gives one picture on any number of threads.
 template <class Exec, class Caster>
 class path_tracer {
  public:
@@ -61,8 +61,8 @@ class path_tracer {
         hidden_(exec, is_inline || !world.next_event ? 0 : count_),
         clock_(exec) {}
 
-  /// Sample number `sample` (from 0) of each pixel; `weight` >= 0 is its share of the picture. Waits for it.
-  /// A Camera is a pinhole, or another that gives rays:
+  /// Renders sample number `sample` (from 0) of each pixel with `weight` >= 0 in the picture, and waits.
+  /// A Camera is a pinhole, or another type that makes rays:
   ///   wfpg::ray through(std::uint32_t pixel, vec2 offset) const;  offset in [0, 1)² of the pixel
   template <class Guider, class Camera>
   void render_sample(Guider& guider, const Camera& camera, std::uint32_t sample, float weight) {
@@ -85,11 +85,11 @@ class path_tracer {
       exec_.for_each(count_, add_to_film{radiance_.view(), film_.view(), static_cast<double>(weight)});
     });
     weight_ += static_cast<double>(weight);
-    wfpg::read_element(exec_, radiance_.data());  // waits: who looks at the time sees all of the sample
+    wfpg::read_element(exec_, radiance_.data());  // waits, so that a look at the time sees the whole sample
     clock_.resolve();
   }
 
-  /// Weighted mean of the samples, row by row; black where their weights sum to 0.
+  /// Weighted mean of the samples, row by row. Black if their weights sum to 0.
   std::vector<vec3> picture() const {
     std::vector<vec3> pixels;
     pixels.reserve(count_);
@@ -98,13 +98,13 @@ class path_tracer {
     return pixels;
   }
 
-  /// Rays traced to extend paths, shadow rays not among them.
+  /// Number of rays that extended paths, without shadow rays.
   std::uint64_t segments() const { return sum_of(segments_, segments_before_); }
 
-  /// Those of them that ended at a surface that emits toward them, or in an environment that does.
+  /// Number of segments that ended at a surface or environment that emits toward them.
   std::uint64_t light_hits() const { return sum_of(light_hits_, light_hits_before_); }
 
-  /// The samples so far, and to go on from them. Precondition: of a picture of this size.
+  /// The samples so far, and a way to continue from them. Precondition: the picture has this size.
   film_state film() const { return {weight_, segments(), light_hits(), film_.to_host(exec_)}; }
   void restore(const film_state& film) {
     weight_ = film.weight;
@@ -115,7 +115,7 @@ class path_tracer {
 
   const named_seconds& seconds() const { return clock_.seconds(); }
 
-  /// What casts the paths' rays.
+  /// The caster of the paths' rays.
   const Caster& caster() const { return caster_; }
 
  private:
@@ -216,7 +216,7 @@ class path_tracer {
   wfpg::buffer<triangle_hit, Exec> hits_;
   wfpg::buffer<std::uint32_t, Exec> hidden_;
   double weight_ = 0.0;
-  std::uint64_t segments_before_ = 0, light_hits_before_ = 0;  // of samples that were taken elsewhere
+  std::uint64_t segments_before_ = 0, light_hits_before_ = 0;  // of earlier samples in a film
   policy_clock<Exec> clock_;
 };
 

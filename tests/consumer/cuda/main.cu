@@ -1,4 +1,4 @@
-// Builds an empty scene's guider on the CUDA policy of the installed package; says so where there is no GPU.
+// Builds an empty scene's guider on the CUDA policy of the installed package. Says so if there is no GPU.
 #include <wfpg/exec/cuda.hpp>
 #include <wfpg/wfpg.hpp>
 
