@@ -78,7 +78,7 @@ double reflected(const Bsdf& bsdf, vec3 outgoing) {
     const double z = 2.0 * (i / columns + 0.5) / rows - 1.0;
     const double turn = 2.0 * double(wfpg::pi) * (i % columns + 0.5) / columns, r = std::sqrt(1.0 - z * z);
     const vec3 d(r * std::cos(turn), r * std::sin(turn), z);
-    sum += double(sky(d)) * double(bsdf.eval(outgoing, d));
+    if (bsdf.transmits() || glm::dot(d, up) > 0.0f) sum += double(sky(d)) * double(bsdf.eval(outgoing, d));
   }
   return sum * 4.0 * double(wfpg::pi) / (rows * columns);
 }

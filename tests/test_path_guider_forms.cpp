@@ -1,5 +1,6 @@
 // The two forms of a guider: one samples a wave, the other lets a host's kernel sample. Both give the same
 // directions.
+#include "support/evaluate.hpp"
 #include "support/guiding.hpp"
 #include "support/kinds_of_guiding.hpp"
 #include "support/policies.hpp"
@@ -8,6 +9,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 using namespace wfpg_test;
@@ -65,6 +68,81 @@ WFPG_TEST_CASE("path guider: both forms sample the same directions, bit for bit"
         box->guider.begin_sample();
       }
     }
+  }
+}
+
+/// Tells the recorder of all surfaces that a host would tell of: those in use that are not delta.
+struct record_wave {
+  wfpg::path_recorder_view recorder;
+  stored_surfaces surfaces;
+  std::uint32_t depth;
+  WFPG_HD void operator()(std::size_t i) const {
+    const test_surface s = surfaces(static_cast<std::uint32_t>(i));
+    if (s.active && !s.bsdf.is_delta())
+      recorder.vertex(i, depth, s.position, s.outgoing, s.normal, s.bsdf.transmits(), 1.0f);
+  }
+};
+
+template <class Exec>
+std::vector<sampled_direction> sample_recorded(guided_box<Exec>& box,
+                                               const wfpg::buffer<test_surface, Exec>& surfaces,
+                                               std::uint32_t depth) {
+  const stored_surfaces stored{const_view<test_surface>(surfaces)};
+  box.exec.for_each(surfaces.size(), record_wave{box.guider.recorder(), stored, depth});
+  const wfpg::guide_view view = box.guider.prepare(depth, box_caster{});
+  const wfpg::buffer<sampled_direction, Exec> directions(box.exec, surfaces.size());
+  box.exec.for_each(surfaces.size(), sample_view{view, stored, hashed_numbers{}, directions.view()});
+  return directions.to_host(box.exec);
+}
+
+WFPG_TEST_CASE("path guider: a wave that the recorder knows samples as a wave of surfaces", "[path_guider]") {
+  for (guider_options options : kinds_of_guiding()) {
+    options.binning.rays_per_bin = 8;
+    options.max_paths = 700;
+    options.records_waves = true;
+    guided_box<Exec> whole(options), recorded(options);
+    for (guided_box<Exec>* box : {&whole, &recorded}) box->learn();
+    const auto surfaces = mixed_surfaces(700, 4);
+    const wfpg::buffer<test_surface, Exec> stored(whole.exec, surfaces);
+    const auto record = [&](guided_box<Exec>& box, std::uint32_t depth) {
+      box.exec.for_each(
+          surfaces.size(),
+          record_wave{box.guider.recorder(), stored_surfaces{const_view<test_surface>(stored)}, depth});
+    };
+    const auto guides_none = [&](const wfpg::guide_view& view) {
+      return count_where(recorded.exec, surfaces.size(), [=] WFPG_HD(std::size_t i) {
+               return view.guides(static_cast<std::uint32_t>(i));
+             }) == 0;
+    };
+    for (int sample = 0; sample < 3; ++sample) {
+      for (std::uint32_t depth : {0u, 1u, 1u, 7u}) {  // two passes have a wave of depth 1
+        INFO(describe(options) << ", sample " << sample << ", depth " << depth);
+        record(whole, depth);  // both learn from the same paths
+        const auto expected = whole.sample(surfaces, box_caster{}, 1, depth);
+        CHECK(count_guided(expected) > 150);
+        CHECK(same_draws(sample_recorded(recorded, stored, depth), expected));
+      }
+      // What was prepared is forgotten, and a sample begins without vertices.
+      whole.sample({}, box_caster{}, 1, 1);
+      CHECK(guides_none(recorded.guider.prepare(1, box_caster{})));
+      for (guided_box<Exec>* box : {&whole, &recorded}) {
+        record(*box, 2);
+        box->guider.end_sample();
+        box->guider.begin_sample();
+      }
+      whole.sample({}, box_caster{}, 1, 2);
+      CHECK(guides_none(recorded.guider.prepare(2, box_caster{})));
+    }
+  }
+}
+
+WFPG_TEST_CASE("path guider: a wave is refused where the recorder keeps none", "[path_guider]") {
+  guided_box<Exec> box(box_options(guiding_mode::oriented, field_lifetime::kept));
+  try {
+    box.guider.prepare(0, box_caster{});
+    FAIL("prepare(depth, caster) returned");
+  } catch (const std::invalid_argument& error) {
+    CHECK(std::string(error.what()).find("records_waves") != std::string::npos);
   }
 }
 

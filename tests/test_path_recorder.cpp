@@ -5,6 +5,7 @@
 #include "support/policies.hpp"
 
 #include <wfpg/guide/path_recorder.hpp>
+#include <wfpg/guide/recorded_path.hpp>
 #include <wfpg/guides/octree/deposit_paths.hpp>
 
 #include <algorithm>
@@ -36,7 +37,7 @@ struct recording {
 
   recording(std::size_t paths, std::uint32_t max_depth, bool include_emission,
             std::uint32_t fraction_shift = 0)
-      : scene(row(), 1000), recorder(scene.exec, paths, max_depth, include_emission, fraction_shift) {}
+      : scene(row(), 1000), recorder(scene.exec, {paths, max_depth, include_emission, fraction_shift}) {}
 
   static wfpg::voxel_fragments<Exec> row() {
     std::vector<voxel_normal> list;
@@ -82,7 +83,7 @@ struct learning : recording<Exec> {
         spheres(this->scene.exec, std::vector<wfpg::resident_field>(fields)),
         queue(this->scene.exec, 100, fields * cells) {
     this->recorder =
-        wfpg::path_recorder<Exec>(this->scene.exec, 1, max_depth, include_emission, 0, /*fields_learn=*/true);
+        wfpg::path_recorder<Exec>(this->scene.exec, {1, max_depth, include_emission, 0, /*directions=*/true});
   }
   void scatter(std::uint32_t depth, std::uint32_t field, vec3 direction) const {
     const wfpg::path_recorder_view paths = this->view();
@@ -205,16 +206,15 @@ WFPG_TEST_CASE("calls out of range are dropped and counted", "[path_recorder]") 
   r.vertex(~std::size_t(0), 0, place(4), up, vec3(1.0f));
   r.vertex(0, 2, place(4), up, vec3(1.0f));  // too deep
   r.vertex(0, 0xffffffffu, place(4), up, vec3(1.0f));
-  r.vertex(1, 1, place(4), up, vec3(1.0f));  // out of order
   r.vertex(0, 1, place(4), up, vec3(1.0f));  // recorded already
-  CHECK(r.dropped() == 6);
+  CHECK(r.dropped() == 5);
   r.radiance(2, 0, vec3(100.0f));
   r.radiance(0, 2, vec3(100.0f));
   r.radiance(1, 0, vec3(100.0f));  // a vertex that was not recorded
-  r.emission(0, 3, vec3(100.0f));
   r.emission(5, 0, vec3(100.0f));
-  r.emission(1, 1, vec3(100.0f));
-  CHECK(r.dropped() == 12);
+  CHECK(r.dropped() == 9);
+  r.emission(1, 1, vec3(100.0f));  // a path without vertices has nothing to learn from
+  CHECK(r.dropped() == 9);
   r.radiance(0, 1, vec3(2.0f));
   r.finish();
   CHECK(r.leaving(0) == 2.0f);
@@ -306,7 +306,7 @@ WFPG_TEST_CASE("a fraction of the paths is deposited, and the rest counts as not
     CHECK(r.dropped() == 0);
     r.vertex(paths, 0, place(0), up, vec3(1.0f));  // no such path
     CHECK(r.dropped() == 1);
-    r.recorder = wfpg::path_recorder<Exec>(r.scene.exec, paths, 2, true, 2);
+    r.recorder = wfpg::path_recorder<Exec>(r.scene.exec, {paths, 2, true, 2});
   }
 }
 
@@ -390,7 +390,7 @@ WFPG_TEST_CASE("fields learn what leaves the next vertex, and nothing beyond the
   r.radiance(0, 1, vec3(8.0f));
   r.finish();
   CHECK(r.learnt(3) == values{4.0, 1});
-  CHECK(r.learnt(5) == values{0.0, 0});  // no vertex tells what arrives from there
+  CHECK(r.learnt(5) == values{0.0, 1});  // no more is heard of the path: it found nothing
   CHECK(r.learnt(0) == values{0.0, 0});  // vertex 0 had no field
   CHECK(r.leaving(1) == Approx(18.0f));
   CHECK(r.dropped() == 0);
@@ -509,6 +509,68 @@ WFPG_TEST_CASE("fields learn no emission if it is left out", "[path_recorder]") 
   CHECK(r.learnt(1) == values{10.0, 1});  // from the environment, scattered by vertex 1
   CHECK(r.learnt(2) == values{0.0, 1});
   CHECK(r.leaving(0) == Approx(12.0f));
+}
+
+WFPG_TEST_CASE("a direction teaches nothing where its end is not known", "[path_recorder]") {
+  learning<Exec> r;
+  write_vertices(r, 0, {vec3(1.0f)});
+  r.scatter(0, 2, -up);
+  r.emission(0, 1, vec3(3.0f));  // an emitter without a vertex
+  r.finish();
+  CHECK(r.learnt(2) == values{0.0, 0});
+  CHECK(r.leaving(0) == Approx(3.0f));
+  write_vertices(r, 0, {vec3(1.0f)});
+  r.scatter(0, 2, -up);
+  const wfpg::path_recorder_view paths = r.view();
+  r.scene.exec.for_each(1, [=] WFPG_HD(std::size_t) { paths.ended(0); });  // by roulette
+  r.finish();
+  CHECK(r.learnt(2) == values{0.0, 0});
+  learning<Exec> full(true, 1);
+  write_vertices(full, 0, {vec3(1.0f)});
+  full.scatter(0, 2, up);  // the next vertex would not fit
+  full.finish();
+  CHECK(full.learnt(2) == values{0.0, 0});
+  write_vertices(full, 0, {vec3(1.0f)});  // the path ends without a direction
+  full.finish();
+  CHECK(full.learnt(2) == values{0.0, 0});
+}
+
+WFPG_TEST_CASE("depths that are left out teach nothing and lose nothing else", "[path_recorder]") {
+  learning<Exec> r(true, 6);
+  r.vertex(0, 0, place(0), up, vec3(1.0f));
+  r.scatter(0, 1, up);
+  r.emission(0, 2, vec3(2.0f));  // light of the medium, at its second vertex
+  r.vertex(0, 3, place(3), up, vec3(0.5f));
+  r.radiance(0, 3, vec3(1.0f));
+  r.scatter(3, 2, up);
+  r.vertex(0, 4, place(4), up, vec3(0.25f));
+  r.radiance(0, 4, vec3(0.5f));
+  r.scatter(4, 3, up);
+  const wfpg::path_recorder_view paths = r.view();
+  const auto gaps = evaluate(r.scene.exec, 5, [=] WFPG_HD(std::size_t depth) {
+    return wfpg::recorded_path(paths, 0).is_gap(static_cast<std::uint32_t>(depth));
+  });
+  CHECK(std::vector<bool>(gaps.begin(), gaps.end()) == std::vector<bool>{false, true, true, false, false});
+  r.finish();
+  CHECK(r.leaving(0) == Approx(3.5f));
+  CHECK(r.leaving(3) == Approx(1.5f / 0.5f));
+  CHECK(r.leaving(4) == Approx(0.5f / 0.25f));
+  CHECK(r.leaving(1) < 0.0f);
+  CHECK(r.learnt(1) == values{0.0, 0});  // the medium lies between
+  CHECK(r.learnt(2) == values{2.0, 1});
+  CHECK(r.learnt(3) == values{0.0, 1});
+  CHECK(r.dropped() == 0);
+  CHECK(r.recorder.gaps(r.scene.exec) == 1);
+  CHECK(r.scene.cache.dropped(r.scene.exec).total() == 0);
+
+  r.vertex(0, 2, place(2), up, vec3(0.5f));  // the branch of a split path
+  r.radiance(0, 2, vec3(1.0f));
+  r.vertex(0, 2, place(5), up, vec3(0.5f));  // recorded already
+  r.finish();
+  CHECK(r.leaving(2) == Approx(2.0f));
+  CHECK(r.leaving(5) < 0.0f);
+  CHECK(r.dropped() == 1);
+  CHECK(r.recorder.gaps(r.scene.exec) == 2);
 }
 
 WFPG_TEST_CASE("directions out of order are dropped and counted", "[path_recorder]") {

@@ -40,11 +40,6 @@ struct hit_surfaces {
   wfpg::surface<render::bsdf> operator()(std::uint32_t pixel) const { return hits[pixel].surface; }
 };
 
-/// For waves that sample nothing.
-struct no_random {
-  vec2 operator()(std::uint32_t, std::uint32_t) const { return vec2(0.0f); }
-};
-
 /// A camera at a point on a surface that looks along the directions of cells. If the surface only reflects,
 /// directions below it hit its near side, as a field's cones do.
 struct cell_camera {
@@ -111,8 +106,8 @@ struct learnt_scene::state {
     std::visit(
         [&](auto& g) {
           g.begin_sample();
-          fields =
-              g.prepare(wfpg::wave{0, pixels, hit_surfaces{hits.data()}, no_random{}}, accelerated.caster());
+          fields = g.prepare(wfpg::wave{0, pixels, hit_surfaces{hits.data()}, wfpg::no_random{}},
+                             accelerated.caster());
           find_bins(g);
         },
         guider);

@@ -104,6 +104,16 @@ class path_guider {
   template <class Surfaces, class Random, class Caster>
   view_type prepare(const wave<Surfaces, Random>& w, const Caster& caster);
 
+  /// Prepares the wave of the vertices that the recorder heard of at `depth`: those that were told with
+  /// normal and transmits. The host gives no surfaces, and the view takes the index of a path for that of a
+  /// ray. These vertices are then forgotten, so that a later pass of the sample may have a wave of the same
+  /// depth. Throws std::invalid_argument where sampling_options::records_waves is not set, and as the other
+  /// prepare(). A guide that evaluates BSDFs to prepare, such as the SARSA grid's, does not compile.
+  ///
+  /// Cost: that of the other prepare(), and 8 bytes a path: the wave is read, and then forgotten.
+  template <class Caster>
+  view_type prepare(std::uint32_t depth, const Caster& caster);
+
   /// Ends the sample: the guide learns from the recorded paths, if this sample is recorded, and updates
   /// itself. What it learns changes directions from the next sample on, or later: a guide may wait for the
   /// end of a step of several samples.
@@ -162,8 +172,9 @@ class path_guider {
         exec_(exec.with_resource(working_memory_.get())),
         guide_(exec, exec_, std::forward<Scene>(scene), options_),
         needs_(guide_.recording()),
-        recorder_(exec_, Guide::records_paths ? options_.max_paths : 0, options_.max_depth,
-                  options_.include_emission, needs_.fraction_shift, needs_.directions) {
+        recorder_(exec_, {Guide::records_paths ? options_.max_paths : 0, options_.max_depth,
+                          options_.include_emission, needs_.fraction_shift, needs_.directions,
+                          Guide::records_paths && options_.records_waves}) {
     require(needs_.sample_stride >= 1, "sample_stride", needs_.sample_stride, "at least 1");
   }
 
@@ -312,6 +323,22 @@ typename path_guider<Exec, Guide>::view_type path_guider<Exec, Guide>::prepare(
   return guide_.prepare(now(w.depth), w, caster);
 }
 
+// A wave of as many rays as there are paths, so that a ray's index is its path's. Rays may be inactive: that
+// costs 4 bytes each. A vertex is used once, since a stale one would make fields that no ray samples.
+template <class Exec, class Guide>
+template <class Caster>
+typename path_guider<Exec, Guide>::view_type path_guider<Exec, Guide>::prepare(std::uint32_t depth,
+                                                                               const Caster& caster) {
+  static_assert(Guide::records_paths, "Guide: prepare(depth, caster) needs a guide that reads paths");
+  require(options_.records_waves, "records_waves", options_.records_waves,
+          "true, for prepare(depth, caster) to know the wave");
+  wave_recorder<Exec>& vertices = recorder_.wave();
+  const auto view = prepare(
+      wave<recorded_surfaces, no_random>{depth, vertices.paths(), vertices.surfaces(depth), {}}, caster);
+  vertices.forget(exec_, depth);
+  return view;
+}
+
 // Fills in the facade's own counts. The guide adds those of its fields and its cache in report().
 template <class Exec, class Guide>
 guider_statistics path_guider<Exec, Guide>::statistics() const {
@@ -320,6 +347,7 @@ guider_statistics path_guider<Exec, Guide>::statistics() const {
   // Counted from unguided_samples on: the guide is empty in all samples or in none.
   result.guided_samples = guided() ? samples_ - options_.unguided_samples : 0;
   result.dropped_vertices = recorder_.dropped(exec_);
+  result.path_gaps = recorder_.gaps(exec_);
   result.seconds = clock_.report();
   guide_.report(exec_, result);
   return result;

@@ -46,6 +46,17 @@ __global__ void use_recorder(wfpg::path_recorder_view recorder) {
   recorder.emission(threadIdx.x, 1, wfpg::vec3(1.0f));
   recorder.scatter(threadIdx.x, 0, {wfpg::vec3(0, 0, 1), 1.0f, wfpg::sampling_technique::guide, 0});
   recorder.escape(threadIdx.x, 1, wfpg::vec3(1.0f));
+  recorder.vertex(threadIdx.x, 3, wfpg::vec3(0.0f), wfpg::vec3(0, 0, 1), wfpg::vec3(0, 0, 1), false, 1.0f);
+  recorder.scatter(threadIdx.x, 3, wfpg::vec3(0, 0, 1), wfpg::no_field);
+  recorder.total(threadIdx.x, 3, 1.0f);
+}
+
+__global__ void use_mixture(wfpg::guide_view view, float* out) {
+  const auto mixture = view.mixture(threadIdx.x, wfpg::glossy_part::unknown(2.0f));
+  float u = 0.25f;
+  const wfpg::vec3 direction = mixture.choose(u) ? mixture.sample(wfpg::vec2(u)) : wfpg::vec3(0, 0, 1);
+  const float pdf = mixture.pdf(direction, 0.25f) + mixture.delta_pdf(0.5f);
+  out[threadIdx.x] = wfpg::roulette_scale(0.25f, pdf);
 }
 
 __global__ void use_learnt(wfpg::learnt_radiance_view learnt) {
@@ -109,9 +120,11 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   use_learnt<<<1, 1>>>({});
   use_bins<<<1, 32>>>(wfpg::bins_view{}, out);
   use_guide<<<1, 32>>>(wfpg::guide_view{}, directions, out);
+  use_mixture<<<1, 32>>>(wfpg::guide_view{}, out);
   use_caster<<<1, 1>>>(wfpg::svo_ray_caster(tree), wfpg::ray{}, nullptr);
   use_cones<<<1, 1>>>(wfpg::svo_cone_caster(cache, wfpg::voxel_opacity_view()), wfpg::ray{}, nullptr);
 
+  launch(d::forget_vertex{});
   launch(d::count_items{});
   launch(d::mark_first_items{});
   launch(d::find_runs{});

@@ -1,13 +1,14 @@
 // The host that docs/hosts.md talks about, and its kernel as it stands there.
 #include <wfpg/base/types.hpp>
-#include <wfpg/guide/path_recorder.hpp>
-#include <wfpg/guides/octree/guide_view.hpp>
+#include <wfpg/exec/tbb.hpp>
+#include <wfpg/path_guider.hpp>
 #include <wfpg/sampling/roulette.hpp>
 
 #include <glm/vec4.hpp>
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 namespace my {
 
@@ -34,9 +35,46 @@ struct layered {
   bsdf_direction sample(wfpg::vec3 wo, float u, wfpg::vec2 u2) const;
 };
 
+struct scene {};
+struct path {};
+struct hit {
+  wfpg::vec3 position, normal;
+  bool transmits;
+};
+struct ray {
+  wfpg::vec3 direction;
+};
+void start_camera_paths(std::vector<path>&, std::uint32_t sample);
+void trace(const scene&, std::vector<path>&, std::uint32_t depth, const wfpg::path_recorder_view&);
+void shade(const scene&, std::vector<path>&, std::uint32_t depth, const wfpg::guide_view&,
+           const wfpg::path_recorder_view&);
+
 }  // namespace my
 
-#include "hosts-1.inc"
+#include "hosts-3.inc"
 
 template bool scatter(const wfpg::guide_view&, const wfpg::path_recorder_view&, std::uint32_t,
                       const my::layered&, my::vertex&, float, wfpg::vec2);
+
+void tell_of_hit(const wfpg::path_recorder_view& recorder, std::size_t path, std::uint32_t depth,
+                 const my::hit& hit, const my::ray& ray, float throughput) {
+#include "hosts-2.inc"
+}
+
+template <class Caster>
+void take_sample(wfpg::path_guider<wfpg::exec::tbb>& guider, const my::scene& scene,
+                 std::vector<my::path>& paths, const Caster& caster, std::uint32_t sample,
+                 std::uint32_t max_depth) {
+#include "hosts-1.inc"
+}
+
+namespace my {
+
+struct caster {
+  wfpg::ray_hit operator()(const wfpg::ray&) const;
+};
+
+}  // namespace my
+
+template void take_sample(wfpg::path_guider<wfpg::exec::tbb>&, const my::scene&, std::vector<my::path>&,
+                          const my::caster&, std::uint32_t, std::uint32_t);

@@ -47,6 +47,7 @@ std::vector<option_default> defaults() {
           {all, "unguided_samples", text_of(every.unguided_samples)},
           {all, "guide_fraction", every.guide_fraction ? "" : "unset"},
           {all, "guided_depths", every.guided_depths == 0xffffffffu ? "all" : ""},
+          {all, "records_waves", text_of(every.records_waves)},
           {both, "octree_resolution", text_of(octree.octree_resolution)},
           {both, "mode", octree.mode == wfpg::guiding_mode::oriented ? "`oriented`" : ""},
           {both, "binning.min_level", text_of(octree.binning.min_level)},

@@ -29,7 +29,7 @@ struct state_access {
     guide_sections::take_build(bytes, guider.guide_);
     const auto dropped = bytes.get<std::uint32_t>();
     guide_sections::take_depths(guider.exec_, bytes, guider.guide_);
-    guider.exec_.copy_from_host(guider.recorder_.dropped_.data(), &dropped, sizeof dropped);
+    guider.exec_.copy_from_host(guider.recorder_.counters_.data(), &dropped, sizeof dropped);
   }
 
   template <class Exec, class Guide>

@@ -19,6 +19,7 @@
 #include <wfpg/exec/support/atomic.hpp>
 #include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/guide/recorded_runs.hpp>
+#include <wfpg/guide/recorded_wave.hpp>
 #include <wfpg/sampling/sampled_direction.hpp>
 
 #include <thrust/fill.h>
@@ -30,7 +31,7 @@ namespace detail {
 /// Position of a vertex. 16 bytes, so that a thread writes it with one store.
 struct alignas(16) recorded_place {
   vec3 position;           ///< world space
-  std::uint32_t outgoing;  ///< pack_direction() of the direction toward the previous vertex
+  std::uint32_t outgoing;  ///< pack_direction() of the direction toward the previous vertex; 0: a gap
 };
 
 /// Light of a vertex, linear RGB. 24 bytes.
@@ -54,6 +55,13 @@ struct alignas(8) recorded_direction {
 /// - The vertex is not recorded, or comes out of order.
 /// - The direction is zero or not finite.
 ///
+/// **Gaps.** Depths may be left out, at the beginning of a path too. Media, subsurface scattering and split
+/// paths need it. The direction that led to a gap teaches nothing. All else is learnt as without it. Gaps are
+/// counted.
+///
+/// **Passes.** A sample may have several passes of the host, if no path index is used twice before
+/// end_sample(). A sample that the host throws away is begun again without end_sample(): nothing is learnt.
+///
 /// Calls for paths that this sample does not record are ignored. They do not count as dropped. O(1) a call.
 ///
 /// Throughput and radiance are linear RGB, or a number: the guide only uses luminance. A spectral host gives
@@ -72,12 +80,22 @@ class path_recorder_view {
                       vec3 throughput) const {
     std::uint32_t place;
     if (!find(path, place)) return;
-    if (depth >= max_depth_ || depth != lengths_[place] || !is_direction(outgoing)) return drop();
-    const std::size_t slot = depth * recorded_ + place;
-    places_[slot] = {position, pack_direction(outgoing)};
-    light_[slot] = {throughput, vec3(0.0f)};
-    if (learns()) directions_[slot] = {no_field, 0};
-    lengths_[place] = depth + 1;
+    const std::uint32_t flags = lengths_[place], length = flags & length_mask;
+    const bool in_order = (flags & escaped) == 0 && depth >= length && depth < max_depth_;
+    if (!in_order || !is_direction(outgoing)) return drop();
+    for (std::uint32_t gap = length; gap < depth; ++gap) write_vertex(place, gap, {}, {});
+    if (depth > length) atomic_add(counters_ + counter_gaps, 1);
+    write_vertex(place, depth, {position, pack_marked(outgoing)}, {throughput, vec3(0.0f)});
+    lengths_[place] = (depth + 1) | (depth > length ? gaps : flags & gaps);
+  }
+  /// Records a vertex for path_guider::prepare(depth, caster) as well: all that a host says of a hit.
+  /// `normal`: shading normal on either side, unit length. `transmits`: light can come from below it. Leave
+  /// it out for surfaces whose BSDF is delta in all lobes: they are not guided.
+  template <class Throughput>
+  WFPG_HD void vertex(std::size_t path, std::uint32_t depth, vec3 position, vec3 outgoing, vec3 normal,
+                      bool transmits, Throughput throughput) const {
+    wave_.record(path, depth, position, glm::dot(normal, outgoing) >= 0.0f ? normal : -normal, transmits);
+    vertex(path, depth, position, outgoing, throughput);
   }
 
   /// Records a vertex whose throughput is a number.
@@ -90,16 +108,27 @@ class path_recorder_view {
   /// Records the unit direction in which the path leaves vertex `depth`, which must be its last so far. The
   /// guide learns from it what the direction finds. `field`: number of the field in the mixture that drew it,
   /// or no_field, as for delta lobes. Ignored where directions are not recorded.
+  ///
+  /// A path that is not heard of again has found nothing in this direction, so that a host without an
+  /// environment needs no escape(). Where roulette ends the path after this call, say so with ended().
   WFPG_HD void scatter(std::size_t path, std::uint32_t depth, vec3 direction, std::uint32_t field) const {
     std::uint32_t place;
     if (!learns() || !find(path, place)) return;
-    if (depth >= max_depth_ || depth + 1 != lengths_[place] || !is_direction(direction)) return drop();
-    directions_[depth * recorded_ + place] = {field, pack_direction(direction)};
+    if (depth >= max_depth_ || depth + 1 != length_of_surfaces(place) || !is_direction(direction))
+      return drop();
+    directions_[depth * recorded_ + place] = {field, pack_marked(direction)};
   }
   /// Records a direction that the guider sampled, with its field.
   /// Ignored for technique `none`: the path ends there.
   WFPG_HD void scatter(std::size_t path, std::uint32_t depth, const sampled_direction& drawn) const {
     if (drawn.technique != sampling_technique::none) scatter(path, depth, drawn.direction, drawn.field);
+  }
+
+  /// Records that the host ended the path, as by Russian roulette, after scatter() of its last vertex. What
+  /// comes from that direction is then unknown, not dark. Ignored where directions are not recorded.
+  WFPG_HD void ended(std::size_t path) const {
+    std::uint32_t place;
+    if (learns() && find(path, place)) lengths_[place] |= open_end;
   }
 
   /// Records that the path left the scene: the environment becomes its vertex `depth`, the last one. Call it
@@ -109,10 +138,10 @@ class path_recorder_view {
   WFPG_HD void escape(std::size_t path, std::uint32_t depth, vec3 throughput) const {
     std::uint32_t place;
     if (!learns() || depth == 0 || !find(path, place)) return;
-    if (depth != lengths_[place]) return drop();
+    if (depth != length_of_surfaces(place)) return drop();
     if (depth >= max_depth_) return;
     light_[depth * recorded_ + place] = {throughput, vec3(0.0f)};
-    lengths_[place] = (depth + 1) | escaped;
+    lengths_[place] = (depth + 1) | escaped | (lengths_[place] & gaps);
   }
 
   /// Records that the path left the scene, with a throughput that is a number.
@@ -141,8 +170,8 @@ class path_recorder_view {
     std::uint32_t place;
     if (!find(path, place)) return;
     vec3 known(0.0f);
-    for (std::uint32_t i = 0; i < (lengths_[place] & ~escaped); ++i)
-      known += light_[i * recorded_ + place].contribution;
+    const std::uint32_t length = lengths_[place] & length_mask;
+    for (std::uint32_t i = 0; i < length; ++i) known += light_[i * recorded_ + place].contribution;
     add(place, depth, glm::max(sum - known, vec3(0.0f)));
   }
   /// Adds the growth of a path's radiance that is a number.
@@ -154,15 +183,16 @@ class path_recorder_view {
   /// the path left the scene after vertex `depth` - 1. `contribution` is the radiance as it arrives at the
   /// path's origin, linear RGB. It counts as scattered by the vertices before. It counts as leaving the
   /// emitter itself too, if sampling_options::include_emission is set and the emitter is a recorded vertex.
+  /// Light of a medium may be told so, at any depth beyond the last vertex.
   WFPG_HD void emission(std::size_t path, std::uint32_t depth, vec3 contribution) const {
     std::uint32_t place;
     if (!find(path, place)) return;
-    const std::uint32_t length = lengths_[place] & ~escaped;
-    if (depth > length) return drop();
-    if (include_emission_ && depth < length)
-      add(place, depth, contribution);
-    else if (depth > 0)
-      add(place, depth - 1, contribution);
+    const std::uint32_t length = lengths_[place] & length_mask;
+    if (include_emission_ && depth < length) return add(place, depth, contribution);
+    // What is found without a vertex is no vertex' own: fields cannot learn how much arrived.
+    if (depth >= length) lengths_[place] |= open_end;
+    const std::uint32_t before = min(depth, length);
+    if (before > 0) add(place, before - 1, contribution);
   }
   /// Adds an emitter's radiance that is a number.
   /// A number and the same number in all channels record alike.
@@ -175,16 +205,22 @@ class path_recorder_view {
   friend class path_recorder;
   friend class recorded_path;
 
-  // Flag in a path's length: its last vertex is the environment.
-  static constexpr std::uint32_t escaped = 0x80000000u;
+  // Flags in a path's length. Its last vertex is the environment; some of its vertices are gaps; what its
+  // last direction finds is not known, since the host ended it there or found light that no vertex has.
+  static constexpr std::uint32_t escaped = 0x80000000u, gaps = 0x40000000u, open_end = 0x20000000u;
+  static constexpr std::uint32_t length_mask = open_end - 1u;
+  // Indices of counters_.
+  enum : std::uint32_t { counter_dropped, counter_gaps, counters };
 
   /// Whether directions are recorded.
   WFPG_HD bool learns() const { return directions_ != nullptr; }
   /// Whether pack_direction() can store it.
   WFPG_HD static bool is_direction(vec3 direction) { return is_finite(direction) && direction != vec3(0.0f); }
+  /// Packs a direction so that it is never 0, which marks that there is none.
+  WFPG_HD static std::uint32_t pack_marked(vec3 direction) { return max(pack_direction(direction), 1u); }
   /// Counts a dropped call; a default view has no counter.
   WFPG_HD void drop() const {
-    if (dropped_) atomic_add(dropped_, 1);
+    if (counters_) atomic_add(counters_ + counter_dropped, 1);
   }
   /// Index of a path among the recorded ones. False where it is not recorded; counts a drop where it is not
   /// in [0, paths()).
@@ -193,10 +229,22 @@ class path_recorder_view {
     drop();
     return false;
   }
+  /// Number of a path's vertices, or one that no depth follows where the path has left the scene.
+  WFPG_HD std::uint32_t length_of_surfaces(std::uint32_t place) const {
+    return lengths_[place] & escaped ? ~0u : lengths_[place] & length_mask;
+  }
+  /// Writes one vertex, without a direction yet.
+  WFPG_HD void write_vertex(std::uint32_t place, std::uint32_t depth, const detail::recorded_place& at,
+                            const detail::recorded_light& light) const {
+    const std::size_t slot = depth * recorded_ + place;
+    places_[slot] = at;
+    light_[slot] = light;
+    if (learns()) directions_[slot] = {no_field, 0};
+  }
   /// Adds to a recorded surface or environment. `place` is what find() wrote. Needs no atomic, since a path's
   /// calls come from one thread.
   WFPG_HD void add(std::uint32_t place, std::uint32_t depth, vec3 contribution) const {
-    if (depth >= (lengths_[place] & ~escaped)) return drop();
+    if (depth >= (lengths_[place] & length_mask)) return drop();
     light_[depth * recorded_ + place].contribution += contribution;
   }
 
@@ -205,13 +253,14 @@ class path_recorder_view {
   detail::recorded_runs runs_;
   std::uint32_t max_depth_ = 0;
   bool include_emission_ = true;
-  // A length for each recorded path: its number of vertices, with the flag `escaped`.
+  // A length for each recorded path: its number of vertices, with the flags above.
   std::uint32_t* lengths_ = nullptr;
   // Vertices, at depth * recorded_ + place: neighbouring threads write neighbouring elements.
   detail::recorded_place* places_ = nullptr;
   detail::recorded_light* light_ = nullptr;
   detail::recorded_direction* directions_ = nullptr;  // null where directions are not recorded
-  std::uint32_t* dropped_ = nullptr;
+  std::uint32_t* counters_ = nullptr;
+  wave_recorder_view wave_;
 };
 
 /// Stands in for path_recorder_view where a guide reads no paths.
@@ -225,10 +274,15 @@ struct no_path_recorder {
   /// Does nothing; see path_recorder_view::vertex().
   template <class Throughput>
   WFPG_HD void vertex(std::size_t, std::uint32_t, vec3, vec3, Throughput) const {}
+  /// Does nothing; see path_recorder_view::vertex().
+  template <class Throughput>
+  WFPG_HD void vertex(std::size_t, std::uint32_t, vec3, vec3, vec3, bool, Throughput) const {}
   /// Does nothing; see path_recorder_view::scatter().
   WFPG_HD void scatter(std::size_t, std::uint32_t, const sampled_direction&) const {}
   /// Does nothing; see path_recorder_view::scatter().
   WFPG_HD void scatter(std::size_t, std::uint32_t, vec3, std::uint32_t) const {}
+  /// Does nothing; see path_recorder_view::ended().
+  WFPG_HD void ended(std::size_t) const {}
   /// Does nothing; see path_recorder_view::escape().
   template <class Light>
   WFPG_HD void escape(std::size_t, std::uint32_t, Light) const {}
@@ -246,35 +300,45 @@ struct no_path_recorder {
   WFPG_HD operator path_recorder_view() const { return {}; }
 };
 
+/// What a path_recorder records.
+struct path_recorder_options {
+  std::size_t paths = 0;        ///< most paths of a sample, below 2^32 - 1
+  std::uint32_t max_depth = 8;  ///< most vertices of a path, at least 1
+  /// Emitters' own radiance counts as leaving them, so that guiding looks for emitters. Unset it where
+  /// next-event estimation finds them.
+  bool include_emission = true;
+  std::uint32_t fraction_shift = 0;  ///< one path in 2^fraction_shift is recorded
+  bool directions = false;           ///< scatter() and escape() are recorded, for guides that learn from them
+  bool waves = false;                ///< the last vertex of every path is recorded too, recorded or not
+};
+
 /// Owns the memory of recorded paths. Movable, not copyable; the policy's memory must outlive it.
 template <class Exec>
 class path_recorder {
  public:
   /// A recorder of no paths. It may be assigned to.
   path_recorder() = default;
-  /// A recorder for samples of `paths` paths with at most `max_depth` vertices each. It records one path in
-  /// 2^`fraction_shift`, and directions too where `fields_learn` is set. `include_emission` counts emitters'
-  /// own radiance as leaving them, so that guiding looks for emitters. Unset it where next-event estimation
-  /// finds them. Precondition: `paths` is below 2^32 - 1. Throws out_of_memory.
-  path_recorder(const Exec& exec, std::size_t paths, std::uint32_t max_depth, bool include_emission,
-                std::uint32_t fraction_shift = 0, bool fields_learn = false)
-      : lengths_(exec, detail::recorded_runs{fraction_shift}.size(paths)),
-        places_(exec, lengths_.size() * max_depth),
-        light_(exec, lengths_.size() * max_depth),
-        directions_(exec, fields_learn ? lengths_.size() * max_depth : 0),
-        dropped_(exec, 1) {
-    // Everything is recorded until the first begin_sample().
-    view_.paths_ = paths;
+  /// A recorder without paths yet. Until the first begin_sample() it records all of `options`' paths. Throws
+  /// out_of_memory.
+  path_recorder(const Exec& exec, const path_recorder_options& options)
+      : lengths_(exec, detail::recorded_runs{options.fraction_shift}.size(options.paths)),
+        places_(exec, lengths_.size() * options.max_depth),
+        light_(exec, lengths_.size() * options.max_depth),
+        directions_(exec, options.directions ? lengths_.size() * options.max_depth : 0),
+        counters_(exec, path_recorder_view::counters),
+        wave_(exec, options.waves ? options.paths : 0) {
+    view_.paths_ = options.paths;
     view_.recorded_ = lengths_.size();
-    view_.runs_.shift = fraction_shift;
-    view_.max_depth_ = max_depth;
-    view_.include_emission_ = include_emission;
+    view_.runs_.shift = options.fraction_shift;
+    view_.max_depth_ = options.max_depth;
+    view_.include_emission_ = options.include_emission;
     view_.lengths_ = lengths_.data();
     view_.places_ = places_.data();
     view_.light_ = light_.data();
     view_.directions_ = directions_.data();
-    view_.dropped_ = dropped_.data();
-    ::thrust::fill_n(exec.thrust(), dropped_.data(), 1, 0u);
+    view_.counters_ = counters_.data();
+    view_.wave_ = wave_.view();
+    ::thrust::fill_n(exec.thrust(), counters_.data(), counters_.size(), 0u);
     clear(exec);
   }
 
@@ -282,7 +346,8 @@ class path_recorder {
   path_recorder_view view() const { return view_; }
   /// Bytes allocated, in the policy's memory.
   std::size_t bytes() const {
-    return lengths_.bytes() + places_.bytes() + light_.bytes() + directions_.bytes() + dropped_.bytes();
+    return lengths_.bytes() + places_.bytes() + light_.bytes() + directions_.bytes() + counters_.bytes() +
+           wave_.bytes();
   }
 
   /// Whether scatter() and escape() are recorded.
@@ -297,6 +362,7 @@ class path_recorder {
     view_.runs_.seed = seed;
     view_.recorded_ = records ? lengths_.size() : 0;
     clear(exec);
+    wave_.clear(exec);
   }
   /// Clears the recorded paths: each has no vertices then. Writes 4 bytes a path.
   void clear(const Exec& exec) {
@@ -305,7 +371,17 @@ class path_recorder {
 
   /// Number of dropped calls since construction, modulo 2^32; path_recorder_view lists the cases. Waits for
   /// the work before it.
-  std::uint32_t dropped(const Exec& exec) const { return read_element(exec, dropped_.data()); }
+  std::uint32_t dropped(const Exec& exec) const {
+    return read_element(exec, counters_.data() + path_recorder_view::counter_dropped);
+  }
+  /// Number of recorded vertices that came after a gap, since construction, modulo 2^32. Waits for the work
+  /// before it.
+  std::uint32_t gaps(const Exec& exec) const {
+    return read_element(exec, counters_.data() + path_recorder_view::counter_gaps);
+  }
+
+  /// The last vertices of all paths; of no paths where the options leave waves out.
+  wave_recorder<Exec>& wave() { return wave_; }
 
  private:
   friend struct detail::state_access;
@@ -315,7 +391,8 @@ class path_recorder {
   buffer<detail::recorded_place, Exec> places_;
   buffer<detail::recorded_light, Exec> light_;
   buffer<detail::recorded_direction, Exec> directions_;
-  buffer<std::uint32_t, Exec> dropped_;
+  buffer<std::uint32_t, Exec> counters_;
+  wave_recorder<Exec> wave_;
   path_recorder_view view_;
 };
 

@@ -21,15 +21,35 @@ class recorded_path {
   WFPG_HD recorded_path(const path_recorder_view& paths, std::size_t place)
       : paths_(paths),
         place_(place),
-        surfaces_(paths.lengths_[place] & ~path_recorder_view::escaped),
-        vertices_(surfaces_) {
-    if (paths.lengths_[place] & path_recorder_view::escaped) --surfaces_;
+        surfaces_(paths.lengths_[place] & path_recorder_view::length_mask),
+        vertices_(surfaces_),
+        flags_(paths.lengths_[place] & ~path_recorder_view::length_mask) {
+    if (flags_ & path_recorder_view::escaped) --surfaces_;
   }
 
   /// Number of vertices, including the environment; 0 for a path that recorded none.
   WFPG_HD std::uint32_t vertices() const { return vertices_; }
-  /// Number of vertices that are surfaces: depths [0, surfaces()).
+  /// Number of vertices that are surfaces or gaps: depths [0, surfaces()).
   WFPG_HD std::uint32_t surfaces() const { return surfaces_; }
+  /// Whether a depth below surfaces() was left out. Nothing else is known of such a vertex.
+  WFPG_HD bool is_gap(std::uint32_t depth) const {
+    return (flags_ & path_recorder_view::gaps) != 0 && paths_.places_[slot(depth)].outgoing == 0;
+  }
+  /// Number of surfaces that are not gaps. O(1) for a path without gaps.
+  WFPG_HD std::uint32_t known_surfaces() const {
+    if ((flags_ & path_recorder_view::gaps) == 0) return surfaces_;
+    std::uint32_t n = 0;
+    for (std::uint32_t depth = 0; depth < surfaces_; ++depth) n += is_gap(depth) ? 0u : 1u;
+    return n;
+  }
+  /// Whether the path went on from its last surface and found nothing.
+  /// It has a direction from there, and the recorder heard of no vertex and of no light beyond.
+  /// False where the recorder had no room for a next vertex.
+  /// Precondition: the recorder records directions, and surfaces() is positive.
+  WFPG_HD bool found_nothing() const {
+    return flags_ == (flags_ & path_recorder_view::gaps) && vertices_ < paths_.max_depth_ &&
+           paths_.directions_[slot(surfaces_ - 1)].direction != 0;
+  }
 
   /// Position of a surface, world space. It is what the renderer recorded, so it may be not finite.
   WFPG_HD vec3 position(std::uint32_t depth) const { return paths_.places_[slot(depth)].position; }
@@ -62,12 +82,15 @@ class recorded_path {
 
  private:
   /// Index of a vertex in the recorder's arrays.
+  /// Neighbouring paths are neighbours in memory.
   WFPG_HD std::size_t slot(std::uint32_t depth) const { return depth * paths_.recorded_ + place_; }
 
+  // What is read, and which path of it.
   path_recorder_view paths_;
   std::size_t place_;
-  // These differ by one where the last vertex is the environment.
+  // These differ by one where the last vertex is the environment, which is no surface.
   std::uint32_t surfaces_, vertices_;
+  std::uint32_t flags_;  // of path_recorder_view, in the path's length
 };
 
 /// Returns the luminance that left a vertex: `arriving` divided by `throughput`, both linear RGB (Eq. 5).

@@ -33,6 +33,9 @@ struct sampling_options {
   /// Most vertices of a path that the recorder holds, in [1, 1024]. Statistics count as many depths, and
   /// deeper ones with the last.
   std::uint32_t max_depth = 8;
+  /// The recorder keeps the last vertex of each path, for path_guider::prepare(depth, caster). 28 bytes a
+  /// path of max_paths.
+  bool records_waves = false;
   /// Most rays of a wave, less than 2^32 - 1. Larger waves throw std::invalid_argument. Unset: max_paths.
   std::optional<std::size_t> max_rays;
 };

@@ -53,8 +53,9 @@ struct guider_statistics {
   kept_field_statistics kept;            ///< all 0 where fields are transient
   dropped_deposits deposits;             ///< deposits that the exitance cache dropped, by reason
   std::uint32_t dropped_vertices = 0;    ///< recorder calls that were dropped; see path_recorder_view
-  build_report build;                    ///< triangles that were left out of the octree, by reason
-  std::vector<stage_time> seconds;       ///< times by stage, as stage_clock::report() orders them
+  std::uint32_t path_gaps = 0;  ///< recorded vertices after depths that were left out; a guide file has none
+  build_report build;           ///< triangles that were left out of the octree, by reason
+  std::vector<stage_time> seconds;  ///< times by stage, as stage_clock::report() orders them
 };
 
 /// Bytes of one part of a guider.

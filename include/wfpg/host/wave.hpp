@@ -29,6 +29,12 @@ struct wave {
 template <class Surfaces, class Random>
 wave(std::uint32_t, std::size_t, Surfaces, Random) -> wave<Surfaces, Random>;
 
+/// Stands for a wave's random numbers where nothing is drawn, as in path_guider::prepare().
+struct no_random {
+  /// Returns zeros.
+  WFPG_HD vec2 operator()(std::uint32_t, std::uint32_t) const { return vec2(0.0f); }
+};
+
 /// Directions whose densities the renderer needs from the fields of a wave.
 /// Next-event estimation chose them, and weighs them against the mixture by multiple importance sampling.
 ///   Query  vec3 operator()(std::uint32_t ray) const;   unit length, or zero for none

@@ -3,6 +3,8 @@
 //
 // Source: Yalciner and Akyuz (2024), Eq. 5. Learning fields are wfpg's own.
 //
+// Depths that the host left out are skipped. A direction whose path found nothing teaches a radiance of 0.
+//
 // Cost: O(paths * depth), one thread a path. Memory: none beside the queues of the cache and of the fields.
 #pragma once
 
@@ -27,21 +29,30 @@ struct deposit_path {
     const recorded_path path(paths, place);
     const std::uint32_t vertices = path.vertices(), surfaces = path.surfaces();
     if (surfaces == 0) return;
-    const std::uint32_t first = cache.reserve(surfaces);
-    // Fields learn along the directions between vertices, of which there is one fewer.
-    const std::uint32_t found = learnt.empty() || vertices < 2 ? 0 : vertices - 1;
+    const std::uint32_t known = path.known_surfaces(), first = cache.reserve(known);
+    // Fields learn along the directions between vertices, of which there is one fewer, and that a last
+    // direction found nothing.
+    const bool ends_dark = !learnt.empty() && path.found_nothing();
+    const std::uint32_t found = learnt.empty() ? 0 : vertices - 1 + (ends_dark ? 1u : 0u);
     const std::uint32_t first_found = found > 0 ? learnt.reserve(found) : 0;
+    if (ends_dark)
+      learnt.write(first_found + vertices - 1, path.field(vertices - 1), path.direction(vertices - 1), 0.0f);
+    // From the last vertex back, light is summed and entries are filled.
     vec3 arriving(0.0f);
+    std::uint32_t entry = first + known;
     // From the last vertex back: `arriving` sums the contributions at this vertex and after.
     for (std::uint32_t depth = vertices; depth-- > 0;) {
       arriving += path.contribution(depth);
       const float leaving = leaving_luminance(arriving, path.throughput(depth));
-      if (depth < surfaces) cache.write(first + depth, path.position(depth), path.outgoing(depth), leaving);
+      const bool gap = depth < surfaces && path.is_gap(depth);
+      if (depth < surfaces && !gap) cache.write(--entry, path.position(depth), path.outgoing(depth), leaving);
+      // Radiance that leaves a gap is not known, so the direction toward it teaches nothing.
       if (found > 0 && depth > 0)
-        learnt.write(first_found + depth - 1, path.field(depth - 1), path.direction(depth - 1), leaving);
+        learnt.write(first_found + depth - 1, gap ? no_field : path.field(depth - 1),
+                     path.direction(depth - 1), leaving);
     }
     // Counting is atomic, and would order the look-ups of the writes above.
-    for (std::uint32_t depth = 0; depth < surfaces; ++depth) cache.count(first + depth);
+    for (std::uint32_t i = 0; i < known; ++i) cache.count(first + i);
     for (std::uint32_t i = 0; i < found; ++i) learnt.count(first_found + i);
   }
 };
@@ -49,8 +60,8 @@ struct deposit_path {
 /// Deposits every recorded path, then clears the recorder. Fields learn where `learnt` is not empty and the
 /// recorder has directions. Whatever exceeds the queues' capacity is dropped.
 ///
-/// The cache and the fields change when they are updated. On a GPU the call returns before its kernel has
-/// run.
+/// Depths that the host left out have no entry. The cache and the fields change when they are updated. On a
+/// GPU the call returns before its kernel has run.
 template <class Exec>
 void deposit_paths(const Exec& exec, path_recorder<Exec>& recorder, const exitance_cache_view& cache,
                    const learnt_radiance_view& learnt = {}) {

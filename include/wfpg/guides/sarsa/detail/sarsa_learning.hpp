@@ -74,9 +74,15 @@ struct learn_path {
   }
 
  private:
+  /// Whether a vertex was left out: nothing is known of the light along the directions around it.
+  WFPG_HD static bool is_gap(const recorded_path& path, std::uint32_t vertex) {
+    return vertex < path.surfaces() && path.is_gap(vertex);
+  }
+
   WFPG_HD void write(std::uint32_t entry, const recorded_path& path, std::uint32_t next,
                      vec3 arriving) const {
     if (!queue.fits(entry)) return;
+    if (is_gap(path, next - 1) || is_gap(path, next) || is_gap(path, next + 1)) return queue.drop(entry);
     const float value =
         update == sarsa_update::monte_carlo
             ? leaving_luminance(arriving, path.throughput(next))
