@@ -315,6 +315,51 @@ TEST_CASE("mixture: a lobe's density at the mirrored direction tells its roughne
   CHECK(wfpg::guided_fraction(0.8f, glossy_part::none(), resolved) == 0.8f);
 }
 
+namespace {
+
+/// A walk that gathers 1 at each vertex and goes on with a weight of 0.8: it brings 5 in the mean. Roulette
+/// hears random numbers of what is to come.
+struct walk {
+  bool keeps_weight = false;  ///< planted: survivors are not weighted
+
+  WFPG_HD float operator()(std::size_t i) const {
+    const hashed_numbers random{13};
+    float throughput = 1.0f, sum = 0.0f;
+    for (std::uint32_t depth = 0; depth < 200; ++depth) {
+      sum += throughput;
+      throughput *= 0.8f;
+      const vec2 u = random(static_cast<std::uint32_t>(i), depth);
+      const float survival = wfpg::guided_survival(throughput, 4.0f * (0.2f + u.y), 5.0f);
+      if (!(u.x < survival)) break;
+      if (!keeps_weight) throughput /= survival;
+    }
+    return sum;
+  }
+};
+
+WFPG_TEST_CASE("roulette: guided roulette has no bias, whatever the guide expects", "[mixture]") {
+  const Exec exec;
+  check_unbiased(evaluate(exec, many, walk{}), 5.0);
+  check_biased(evaluate(exec, many, walk{true}), 5.0);
+}
+
+}  // namespace
+
+TEST_CASE("roulette: paths survive by what they are expected to bring to their pixel", "[mixture]") {
+  CHECK(wfpg::guided_survival(1.0f, 2.0f, 2.0f) == 1.0f);  // as bright as the pixel
+  CHECK(wfpg::guided_survival(0.1f, 2.0f, 2.0f) == Approx(0.3f));
+  CHECK(wfpg::guided_survival(0.1f, 20.0f, 2.0f) == 1.0f);  // dim so far, and light ahead
+  CHECK(wfpg::guided_survival(1.0f, 0.0f, 2.0f) == Approx(0.1f));
+  CHECK(wfpg::guided_survival(0.1f, 2.0f, 2.0f, {1.0f, 0.05f}) == Approx(0.1f));
+  const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+  for (const float bad : {nan, inf, -1.0f}) {
+    CHECK(wfpg::guided_survival(bad, 1.0f, 1.0f) == 1.0f);
+    CHECK(wfpg::guided_survival(1.0f, bad, 1.0f) == 1.0f);
+    CHECK(wfpg::guided_survival(1.0f, 1.0f, bad) == 1.0f);
+  }
+  CHECK(wfpg::guided_survival(1.0f, 1.0f, 0.0f) == 1.0f);
+}
+
 TEST_CASE("roulette: the scale undoes the guide's density, and bad densities change nothing", "[mixture]") {
   // A path of three bounces: the throughput with a guide times the scales is that without.
   float guided = 1.0f, unguided = 1.0f, scale = 1.0f;
