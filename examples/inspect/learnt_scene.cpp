@@ -82,7 +82,9 @@ struct learnt_scene::state {
         guider(begin(scene)) {}
 
   guider_type begin(const render::scene& scene) {
-    const wfpg::triangle_mesh_view mesh{geometry.view().positions, geometry.view().triangles};
+    const auto mesh = [&] {
+      return wfpg::triangle_mesh_view{geometry.view().positions, geometry.view().triangles};
+    };
     if (options.lifetime == render::fields::kept)
       return render::begin_guider(exec, scene, mesh, render::kept_options_of(options, lights.shares()),
                                   options, "");

@@ -56,8 +56,10 @@
 #include <wfpg/host/wave.hpp>
 #include <wfpg/octree/bottom_up.hpp>
 #include <wfpg/octree/exitance_cache.hpp>
+#include <wfpg/octree/fragments_from_caster.hpp>
 #include <wfpg/octree/sparse_voxel_octree.hpp>
 #include <wfpg/octree/statistics.hpp>
+#include <wfpg/octree/surface_collector.hpp>
 #include <wfpg/octree/svo_cone_caster.hpp>
 #include <wfpg/octree/svo_ray_caster.hpp>
 #include <wfpg/octree/triangle_voxel.hpp>

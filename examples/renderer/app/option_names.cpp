@@ -36,6 +36,13 @@ const std::map<std::string, cones>& cones_names() {
   return names;
 }
 
+const std::map<std::string, octree_source>& octree_names() {
+  static const std::map<std::string, octree_source> names = {{"triangles", octree_source::triangles},
+                                                             {"caster", octree_source::caster},
+                                                             {"samples", octree_source::samples}};
+  return names;
+}
+
 const std::map<std::string, wfpg::sarsa_update>& sarsa_update_names() {
   using update = wfpg::sarsa_update;
   static const std::map<std::string, update> names = {

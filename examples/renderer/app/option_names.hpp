@@ -8,11 +8,12 @@
 
 namespace render {
 
-/// The choices of --method, --device, --combine, --cones, --sarsa-update and --sarsa-sampler.
+/// The choices of --method, --device, --combine, --cones, --octree, --sarsa-update and --sarsa-sampler.
 const std::map<std::string, sampling_method>& method_names();
 const std::map<std::string, device>& device_names();
 const std::map<std::string, wfpg::sample_combination>& combination_names();
 const std::map<std::string, cones>& cones_names();
+const std::map<std::string, octree_source>& octree_names();
 const std::map<std::string, wfpg::sarsa_update>& sarsa_update_names();
 const std::map<std::string, wfpg::sarsa_sampler>& sarsa_sampler_names();
 

@@ -23,6 +23,9 @@ enum class guiding { oriented, plain };
 enum class fields { kept, transient };
 /// How fields' cones find light: by the scene's ray caster, or through the octree alone, by rays or as cones.
 enum class cones { scene, march, trace };
+/// What the octree is built from: the scene's triangles, rays that the scene's caster casts, or the hits of
+/// the first sample, which is then not guided.
+enum class octree_source { triangles, caster, samples };
 enum class checkpoint_times {
   none,
   powers_of_two,
@@ -39,6 +42,7 @@ struct render_options {
   guiding mode = guiding::oriented;
   fields lifetime = fields::kept;
   cones through = cones::scene;
+  octree_source octree = octree_source::triangles;
   device where = device::cpu;
   int spp = 64;          ///< samples a pixel, positive; not used where `seconds` is
   double seconds = 0.0;  ///< time for samples, building not counted; the last may use more; 0: spp decides

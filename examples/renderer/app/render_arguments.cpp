@@ -126,7 +126,7 @@ const std::vector<requirement>& requirements() {
   static const std::vector<requirement> all = {
       {{"--guiding", "--fields", "--octree-resolution", "--field-resolution", "--slot-resolution", "--recast",
         "--learn", "--light-groups", "--field-budget", "--rays-per-bin", "--min-bin-level",
-        "--deposits-per-leaf", "--cones", "--caster-buffer", "--load-guide", "--save-guide"},
+        "--deposits-per-leaf", "--cones", "--octree", "--caster-buffer", "--load-guide", "--save-guide"},
        "--method wfpg or wfpg-product",
        [](options o) { return is_wfpg(o.method); }},
       {{"--field-resolution"},
@@ -143,6 +143,9 @@ const std::vector<requirement>& requirements() {
        [](options o) { return is_openpgl(o.method); }},
       {{"--caster-buffer"}, "--device optix", [](options o) { return o.where == device::optix; }},
       {{"--caster-buffer"}, "--cones scene", [](options o) { return o.through == cones::scene; }},
+      {{"--octree"},
+       "--cones scene, or another source than samples",
+       [](options o) { return o.octree != octree_source::samples || o.through == cones::scene; }},
       {{"--guide-fraction"},
        "a --method other than pt",
        [](options o) { return o.method != sampling_method::pt; }},
@@ -192,6 +195,9 @@ void add_method_options(CLI::App& app, render_options& options) {
   add_choice<cones>(app, "--cones", options.through, cones_names(),
                     "cones of fields find light by rays through the scene (default), by rays through the "
                     "octree, or as cones through it");
+  add_choice<octree_source>(app, "--octree", options.octree, octree_names(),
+                            "built from triangles (default), from rays of the scene's caster, or from the "
+                            "first sample's hits");
   add_choice<wfpg::sample_combination>(
       app, "--combine", options.combine, combination_names(),
       "how samples add up (default: pt-linear; constant for pt, for records and with "

@@ -6,6 +6,7 @@
 #include "app/render_state.hpp"
 #include "app/saved_guider.hpp"
 #include "casters/octree_cones.hpp"
+#include "tracer/collecting_guider.hpp"
 #include "tracer/records_scene.hpp"
 #include "tracer/unguided.hpp"
 #include "tracer/wavefront.hpp"
@@ -13,6 +14,7 @@
 #include <wfpg/guides/octree/transient_guide.hpp>
 #include <wfpg/guides/records/irradiance_records.hpp>
 #include <wfpg/guides/sarsa/sarsa_grid.hpp>
+#include <wfpg/octree/fragments_from_caster.hpp>
 #include <wfpg/path_guider.hpp>
 
 #include <algorithm>
@@ -249,13 +251,51 @@ void trace_unguided(const sampling_job<Exec, Caster>& job) {
   take_samples(job, guider);
 }
 
+/// The box around a scene's triangles.
+inline wfpg::bounds3 bounds_of(const scene& host) {
+  wfpg::bounds3 box;
+  for (const uvec3& triangle : host.triangles)
+    for (int corner = 0; corner < 3; ++corner) {
+      const vec3 p = host.positions[triangle[corner]];
+      box = wfpg::bounds_union()(box, {p, p});
+    }
+  return box;
+}
+
+/// The guider of a job before its first sample. Its octree is that of a guide file, or is made of triangles
+/// or of what rays find, as the options say.
+template <class Exec, class Caster, class Options>
+auto begin_guider(const sampling_job<Exec, Caster>& job, const Options& guided) {
+  const auto begin = [&](const auto& from) {
+    return begin_guider(job.exec, job.host, from, guided, job.options, job.result.guide);
+  };
+  if (job.options.octree == octree_source::triangles) return begin([&] { return job.mesh(); });
+  wfpg::caster_fragments_options cast;
+  cast.octree_resolution = guided.octree_resolution;
+  cast.seed = job.options.seed;
+  return begin(
+      [&] { return wfpg::fragments_from_caster(job.exec, job.tracer.caster(), bounds_of(job.host), cast); });
+}
+
+/// Guides by an octree of the first sample's hits, which is not guided.
+template <class Exec, class Caster, class Options>
+void guide_by_samples(const sampling_job<Exec, Caster>& job, const Options& guided) {
+  using guider_type = wfpg::path_guider<Exec, wfpg::octree_guide_for<Exec, Options>>;
+  collecting_guider<Exec, guider_type> guider(job.exec, tagged(job.host, job.options, guided));
+  take_samples(job, guider);
+  report_guider(guider.guider(), job.tracer.segments(), job.result.report);
+  job.result.guide = saved_guide(guider.guider(), job.options);
+}
+
 /// Guides by the octree, with kept or transient fields as the type of `guided` says.
 template <class Exec, class Caster, class Options>
 void guide_by_fields(const sampling_job<Exec, Caster>& job, const Options& guided) {
   const render_options& options = job.options;
   render_report& report = job.result.report;
+  if (options.octree == octree_source::samples && options.resume.empty() && options.load_guide.empty())
+    return guide_by_samples(job, guided);
   const stopwatch build;
-  auto guider = begin_guider(job.exec, job.host, job.mesh(), guided, options, job.result.guide);
+  auto guider = begin_guider(job, guided);
   report.octree.build_seconds = build.seconds();
   job.building.add("octree", report.octree.build_seconds);
   // A guide that is loaded has counted another rendering's, one of a state this one's.

@@ -41,6 +41,9 @@ void add_guider_values(const render_options& o, named_values& values) {
                                {"--deposits-per-leaf", to_string(o.deposits_per_leaf.value_or(0))},
                                {"--guide-fraction", fraction},
                                {"--guided-depths", to_string(o.guided_depths)}});
+  // Only where it is not the default: state files without it stay valid.
+  if (o.octree != octree_source::triangles)
+    values.emplace_back("--octree", name_of(octree_names(), o.octree));
   if (o.lifetime == fields::kept)
     values.insert(values.end(), {{"--slot-resolution", to_string(o.kept.resolution)},
                                  {"--recast", to_string(o.kept.recast)},
