@@ -161,6 +161,9 @@ void require_fields(const render::render_options& options) {
   require(options.through == render::cones::scene, "cones",
           render::name_of(render::cones_names(), options.through),
           "scene: by others fields are not looked at");
+  require(options.octree == render::octree_source::triangles, "octree",
+          render::name_of(render::octree_names(), options.octree),
+          "triangles: fields are looked at over them");
   require(options.max_depth >= 2, "max_depth", options.max_depth, "at least 2, for light to arrive from");
 }
 

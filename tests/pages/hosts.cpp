@@ -1,6 +1,9 @@
 // The host that docs/hosts.md talks about, and its kernel as it stands there.
 #include <wfpg/base/types.hpp>
 #include <wfpg/exec/tbb.hpp>
+#include <wfpg/octree/fragments_from_caster.hpp>
+#include <wfpg/octree/surface_collector.hpp>
+#include <wfpg/octree/svo_ray_caster.hpp>
 #include <wfpg/path_guider.hpp>
 #include <wfpg/sampling/roulette.hpp>
 
@@ -49,9 +52,15 @@ void trace(const scene&, std::vector<path>&, std::uint32_t depth, const wfpg::pa
 void shade(const scene&, std::vector<path>&, std::uint32_t depth, const wfpg::guide_view&,
            const wfpg::path_recorder_view&);
 
+struct tracer {
+  void render_unguided_sample(const wfpg::surface_collector_view& hits);
+};
+
 }  // namespace my
 
 #include "hosts-3.inc"
+#include "hosts-4.inc"
+#include "hosts-5.inc"
 
 template bool scatter(const wfpg::guide_view&, const wfpg::path_recorder_view&, std::uint32_t,
                       const my::layered&, my::vertex&, float, wfpg::vec2);
@@ -78,3 +87,10 @@ struct caster {
 
 template void take_sample(wfpg::path_guider<wfpg::exec::tbb>&, const my::scene&, std::vector<my::path>&,
                           const my::caster&, std::uint32_t, std::uint32_t);
+
+template wfpg::path_guider<wfpg::exec::tbb> guider_from_caster(const wfpg::exec::tbb&,
+                                                               const wfpg::svo_ray_caster&,
+                                                               const wfpg::bounds3&,
+                                                               const wfpg::kept_guide_options&);
+template wfpg::path_guider<wfpg::exec::tbb> guider_from_first_sample(const wfpg::exec::tbb&, my::tracer&,
+                                                                     const wfpg::kept_guide_options&);

@@ -4,6 +4,7 @@
 #include <wfpg/guides/octree/options.hpp>
 #include <wfpg/guides/records/options.hpp>
 #include <wfpg/guides/sarsa/options.hpp>
+#include <wfpg/octree/fragments_from_caster.hpp>
 
 #include <fstream>
 #include <sstream>
@@ -33,6 +34,7 @@ std::string mebibytes(std::size_t bytes) {
 std::vector<option_default> defaults() {
   const wfpg::sampling_options every;
   const wfpg::octree_guide_options octree;
+  const wfpg::caster_fragments_options cast;
   const wfpg::kept_field_options kept;
   const wfpg::transient_guide_options transient;
   const wfpg::sarsa_grid_options sarsa;
@@ -57,6 +59,9 @@ std::vector<option_default> defaults() {
           {both, "deposit_capacity", octree.deposit_capacity ? "" : "unset"},
           {both, "caster_buffer_bytes", mebibytes(octree.caster_buffer_bytes)},
           {both, "scene_tag", text_of(octree.scene_tag)},
+          {both, "rays", cast.rays ? "" : "unset"},
+          {both, "rounds", text_of(cast.rounds)},
+          {both, "crossings", text_of(cast.crossings)},
           {both, "filter_alpha", text_of(octree.field.filter_alpha)},
           {both, "floor", text_of(octree.field.floor)},
           {both, "absolute_floor", text_of(octree.field.absolute_floor)},

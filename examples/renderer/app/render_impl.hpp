@@ -251,17 +251,6 @@ void trace_unguided(const sampling_job<Exec, Caster>& job) {
   take_samples(job, guider);
 }
 
-/// The box around a scene's triangles.
-inline wfpg::bounds3 bounds_of(const scene& host) {
-  wfpg::bounds3 box;
-  for (const uvec3& triangle : host.triangles)
-    for (int corner = 0; corner < 3; ++corner) {
-      const vec3 p = host.positions[triangle[corner]];
-      box = wfpg::bounds_union()(box, {p, p});
-    }
-  return box;
-}
-
 /// The guider of a job before its first sample. Its octree is that of a guide file, or is made of triangles
 /// or of what rays find, as the options say.
 template <class Exec, class Caster, class Options>

@@ -7,6 +7,7 @@
 #include "scene/texel_pair.hpp"
 
 #include <wfpg/base/error.hpp>
+#include <wfpg/base/math.hpp>
 #include <wfpg/exec/buffer.hpp>
 
 #include <algorithm>
@@ -178,6 +179,17 @@ struct scene_view {
   static constexpr float least_cosine = 1e-2f;
   static constexpr float least_alpha = 1e-3f;
 };
+
+/// The box around a scene's triangles.
+inline wfpg::bounds3 bounds_of(const scene& host) {
+  wfpg::bounds3 box;
+  for (const uvec3& triangle : host.triangles)
+    for (int corner = 0; corner < 3; ++corner) {
+      const vec3 p = host.positions[triangle[corner]];
+      box = wfpg::bounds_union()(box, {p, p});
+    }
+  return box;
+}
 
 /// Whether any material of a scene has holes.
 inline bool has_cut_outs(const scene& host) {
