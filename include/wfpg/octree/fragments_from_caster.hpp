@@ -42,8 +42,8 @@ struct caster_fragments_options {
 /// fragment counts little beside others. A line goes on a quarter of a voxel behind each hit. What lies
 /// nearer behind is found from the other side.
 ///
-/// The report counts hits that are skipped: `non_finite` for distances that are NaN or infinite,
-/// `out_of_range` for hits beyond the cube. Both end their line.
+/// The report counts hits that are skipped, which end their lines. `non_finite`: the distance is NaN or
+/// infinite, or leads beyond largest_coordinate. `out_of_range`: the hit is beyond the cube.
 ///
 /// `caster` has at least one form of ray_caster.hpp; the inline form is used where it has both. Rays begin
 /// inside the cube and have its far side as t_max, which casters may ignore.
