@@ -3,6 +3,8 @@
 #include "app/metrics.hpp"
 #include "app/plot.hpp"
 #include "scene/builtin_scenes.hpp"
+#include "scene/frame.hpp"
+#include "scene/scene_builder.hpp"
 #include "support/catch.hpp"
 #include "support/renderer_io.hpp"
 
@@ -274,7 +276,8 @@ TEST_CASE("Built-in scenes are valid", "[renderer][builtin]") {
       check_close(normal, {0.0f, name == "glossy-room" ? 1.0f : -1.0f, 0.0f});
       CHECK(m.base_color == vec3(0.0f));
     }
-    CHECK(emitters == (name == "furnace" ? 12 : name == "many-lamps" ? 24 : 2));
+    const std::map<std::string, int> others = {{"furnace", 12}, {"many-lamps", 24}, {"outdoor", 0}};
+    CHECK(emitters == (others.count(name) > 0 ? others.at(name) : 2));
   }
   CHECK_FALSE(render::is_builtin_scene("nowhere"));
   CHECK_THROWS_AS(render::make_builtin_scene("nowhere"), std::invalid_argument);
@@ -369,6 +372,45 @@ TEST_CASE("The water of caustic-pool is smooth and touches the walls; the camera
 
 TEST_CASE("The conductor box of ajar is closed", "[renderer][builtin]") {
   CHECK(open_edges(render::make_builtin_scene("ajar"), material_kind::conductor) == 0);
+}
+
+TEST_CASE("Spheres are closed, smooth and face outwards", "[renderer][builtin]") {
+  render::scene_builder b("sphere");
+  const vec3 centre(1.0f, 2.0f, 3.0f);
+  b.sphere(centre, 0.5f, 16, b.diffuse(vec3(0.5f)));
+  const scene s = b.finish(1);
+  check_consistent(s);
+  CHECK(open_edges(s, material_kind::lambert) == 0);
+  float volume = 0.0f;
+  for (std::size_t t = 0; t < s.triangles.size(); ++t) {
+    volume +=
+        glm::dot(corner(s, t, 0) - centre, glm::cross(corner(s, t, 1) - centre, corner(s, t, 2) - centre)) /
+        6.0f;
+    for (int i = 0; i < 3; ++i) {
+      check_close(s.normals[s.triangles[t][i]], 2.0f * (corner(s, t, i) - centre));
+      CHECK(glm::dot(s.normals[s.triangles[t][i]], face_normal(s, t)) > 0.95f);
+    }
+  }
+  CHECK(volume == Approx(render::pi / 6.0f).epsilon(0.03));
+  for (const char* name : {"materials", "outdoor"})
+    CHECK(open_edges(render::make_builtin_scene(name), material_kind::rough_dielectric) == 0);
+}
+
+TEST_CASE("The sun of outdoor is where its map is brightest, and texels differ little from the next",
+          "[renderer][builtin]") {
+  const render::environment_map sky = render::make_builtin_scene("outdoor").sky;
+  const auto at = [&](int row, int column) {
+    return wfpg::luminance(sky.texels[std::size_t(row * sky.width + column % sky.width)]);
+  };
+  float brightest = 0.0f, steepest = 1.0f;
+  for (int row = 0; row + 1 < sky.height; ++row)
+    for (int column = 0; column < sky.width; ++column) {
+      brightest = std::max(brightest, at(row, column));
+      for (const float next : {at(row, column + 1), at(row + 1, column)})
+        steepest = std::max(steepest, std::max(next / at(row, column), at(row, column) / next));
+    }
+  CHECK(brightest > 1000.0f);
+  CHECK(steepest < 3.0f);
 }
 
 TEST_CASE("plots: names do not overlap, and long names have room", "[renderer][plot]") {

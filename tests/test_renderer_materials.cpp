@@ -36,7 +36,8 @@ const vec3 colour(0.9f, 0.5f, 0.2f), white(1.0f);
 
 std::vector<named_bsdf> non_delta() {
   std::vector<named_bsdf> all = {{"lambert", make(material_kind::lambert, colour)},
-                                 {"plastic, black base", make(material_kind::plastic, vec3(0.0f), 0.2f)}};
+                                 {"plastic, black base", make(material_kind::plastic, vec3(0.0f), 0.2f)},
+                                 {"smooth plastic", make(material_kind::smooth_plastic, colour, 0.2f)}};
   for (const float alpha : {0.05f, 0.2f, 0.6f}) {
     const std::string roughness = ' ' + std::to_string(alpha);
     all.push_back({"conductor" + roughness, make(material_kind::conductor, colour, alpha)});
@@ -124,9 +125,11 @@ TEST_CASE("materials pass the library's checks of BSDFs", "[renderer][bsdf]") {
   for (const material_kind kind :
        {material_kind::mirror, material_kind::dielectric, material_kind::thin_dielectric})
     check("smooth", make(kind, white));
-  for (const material_kind kind : {material_kind::lambert, material_kind::conductor, material_kind::plastic})
+  for (const material_kind kind : {material_kind::lambert, material_kind::conductor, material_kind::plastic,
+                                   material_kind::smooth_plastic})
     check("white", make(kind, white, 0.2f));
   check("black", make(material_kind::lambert, vec3(0.0f)));
+  check("smooth coat over black", make(material_kind::smooth_plastic, vec3(0.0f)));
 }
 
 TEST_CASE("all lobes together pass the library's checks of BSDFs", "[renderer][bsdf]") {
@@ -165,7 +168,7 @@ TEST_CASE("a thin dielectric lets light straight through", "[renderer][bsdf]") {
     const vec3 wo = side * viewers()[1];
     const wfpg::bsdf_sample through = pane.sample(wo, {0.9f, 0.5f}), back = pane.sample(wo, {0.0f, 0.5f});
     CHECK(through.direction == -wo);
-    CHECK(pane.delta_weight_rgb(wo, through.direction) == colour);
+    CHECK(pane.delta_weight_rgb(wo, through.direction, through.pdf) == colour);
     CHECK(glm::length(back.direction - vec3(-wo.x, -wo.y, wo.z)) < 1e-5f);
     CHECK(through.pdf + back.pdf == Approx(1.0f));
   }
@@ -217,7 +220,7 @@ TEST_CASE("a mirror mirrors", "[renderer][bsdf]") {
   const wfpg::bsdf_sample drawn = mirror.sample(wo, {0.3f, 0.4f});
   CHECK(drawn.pdf == 1.0f);
   CHECK(glm::length(drawn.direction - vec3(-wo.x, -wo.y, wo.z)) < 1e-5f);
-  CHECK(mirror.delta_weight_rgb(wo, drawn.direction) == mirror.colour);
+  CHECK(mirror.delta_weight_rgb(wo, drawn.direction, drawn.pdf) == mirror.colour);
   CHECK((mirror.is_delta() && !mirror.transmits()));
   CHECK(mirror.eval(wo, drawn.direction) == 0.0f);
   CHECK(mirror.sample(-wo, {0.3f, 0.4f}).pdf == 0.0f);
@@ -233,7 +236,7 @@ TEST_CASE("a dielectric reflects and refracts by Fresnel and Snell", "[renderer]
       const float eta = side > 0.0f ? 1.5f : 1.0f / 1.5f;
       const wfpg::bsdf_sample reflected = glass.sample(wo, {0.0f, 0.0f});
       CHECK(glm::length(reflected.direction - vec3(-wo.x, -wo.y, wo.z)) < 1e-5f);
-      CHECK(glass.delta_weight_rgb(wo, reflected.direction) == vec3(1.0f));
+      CHECK(glass.delta_weight_rgb(wo, reflected.direction, reflected.pdf) == vec3(1.0f));
       const wfpg::bsdf_sample refracted = glass.sample(wo, {0.9999f, 0.0f});
       const float sine = std::sqrt(1.0f - wo.z * wo.z);
       if (sine >= eta) {
@@ -244,10 +247,10 @@ TEST_CASE("a dielectric reflects and refracts by Fresnel and Snell", "[renderer]
       CHECK(refracted.direction.z * wo.z < 0.0f);
       CHECK(glm::length(vec2(refracted.direction)) == Approx(sine / eta).margin(1e-5));
       CHECK(reflected.pdf + refracted.pdf == Approx(1.0f));
-      CHECK(glass.delta_weight_rgb(wo, refracted.direction).x == Approx(1.0f / (eta * eta)));
+      CHECK(glass.delta_weight_rgb(wo, refracted.direction, refracted.pdf).x == Approx(1.0f / (eta * eta)));
       // Light that enters and leaves is neither compressed nor spread.
-      CHECK(glass.delta_weight_rgb(wo, refracted.direction).x *
-                glass.delta_weight_rgb(refracted.direction, wo).x ==
+      CHECK(glass.delta_weight_rgb(wo, refracted.direction, refracted.pdf).x *
+                glass.delta_weight_rgb(refracted.direction, wo, 1.0f).x ==
             Approx(1.0f));
     }
 }
@@ -261,8 +264,8 @@ TEST_CASE("reflectance of smooth glass is 1 reflected, and its colour transmitte
       const vec3 reflected = glass.sample(wo, {0.0f, 0.0f}).direction;
       const vec3 transmitted = glass.sample(wo, {0.9999f, 0.0f}).direction;
       REQUIRE(transmitted.z * wo.z < 0.0f);
-      CHECK(glass.reflectance(wo, reflected) == Approx(1.0f));
-      CHECK(glass.reflectance(wo, transmitted) == Approx(is_black ? 0.0f : wfpg::luminance(colour)));
+      CHECK(glass.reflectance(wo, reflected, true) == Approx(1.0f));
+      CHECK(glass.reflectance(wo, transmitted, true) == Approx(is_black ? 0.0f : wfpg::luminance(colour)));
     }
 }
 
@@ -285,4 +288,75 @@ TEST_CASE("a rough dielectric of little roughness has the smooth one's albedo", 
       CHECK(through.mean() * eta * eta ==
             Approx(1.0 - reflected).margin(0.03 + 4.0 * through.error() * eta * eta));
     }
+}
+
+namespace {
+
+/// The fraction of light from everywhere that a coat of index 1.5 lets to a base, and the base's colour then
+/// sends toward a viewer: midpoint rule over the squared sine.
+float albedo_below(float cosine, float base) {
+  constexpr int steps = 20000;
+  double through = 0.0;
+  for (int i = 0; i < steps; ++i) {
+    const float incident = std::sqrt((static_cast<float>(i) + 0.5f) / static_cast<float>(steps));
+    through += double(1.0f - render::fresnel_dielectric(incident, 1.5f)) / steps;
+  }
+  return (1.0f - render::fresnel_dielectric(cosine, 1.5f)) * base * static_cast<float>(through);
+}
+
+}  // namespace
+
+TEST_CASE("a smooth coat mirrors by Fresnel, and its base is diffuse", "[renderer][bsdf]") {
+  const bsdf coat = make(material_kind::smooth_plastic, colour);
+  CHECK((!coat.is_delta() && !coat.transmits()));
+  for (const vec3 wo : viewers()) {
+    const float reflected = render::fresnel_dielectric(wo.z, 1.5f);
+    const wfpg::glossy_part part = coat.glossy(wo);
+    CHECK(part.alpha == 0.0f);
+    const wfpg::bsdf_sample drawn = coat.sample(wo, {0.0f, 0.4f}), alone = coat.sample_part(true, wo, {});
+    CHECK((drawn.is_delta && alone.is_delta));
+    CHECK(glm::length(drawn.direction - vec3(-wo.x, -wo.y, wo.z)) < 1e-5f);
+    CHECK(alone.direction == drawn.direction);
+    CHECK(alone.pdf == 1.0f);
+    CHECK(drawn.pdf == part.fraction);
+    const vec3 weight = coat.delta_weight_rgb(wo, drawn.direction, drawn.pdf);
+    CHECK(drawn.pdf * weight.x == Approx(reflected));
+    CHECK(weight.x == weight.z);
+    CHECK(coat.reflectance(wo, drawn.direction, true) == Approx(weight.x));
+    CHECK(0.5f * coat.delta_weight_rgb(wo, drawn.direction, 0.5f).x == Approx(reflected));
+    const wfpg::bsdf_sample diffuse = coat.sample(wo, {0.95f, 0.4f});
+    CHECK_FALSE((diffuse.is_delta || coat.sample_part(false, wo, {0.3f, 0.4f}).is_delta));
+    CHECK(diffuse.pdf == Approx((1.0f - part.fraction) * diffuse.direction.z / render::pi));
+    CHECK(coat.pdf_part(true, wo, drawn.direction) == 0.0f);
+  }
+  CHECK(coat.sample(-viewers()[1], {0.0f, 0.4f}).pdf == 0.0f);
+}
+
+TEST_CASE("samples of a smooth coat have its albedo", "[renderer][bsdf]") {
+  const bsdf coat = make(material_kind::smooth_plastic, vec3(0.6f));
+  for (const vec3 wo : viewers()) {
+    estimate mirrored, below;
+    for (std::uint32_t i = 0; i < 20000; ++i) {
+      const wfpg::bsdf_sample drawn = coat.sample(wo, numbers(i, 5));
+      const float weight = drawn.is_delta ? coat.delta_weight_rgb(wo, drawn.direction, drawn.pdf).x
+                                          : coat.eval(wo, drawn.direction) / drawn.pdf;
+      mirrored.add(drawn.is_delta ? double(weight) : 0.0);
+      below.add(drawn.is_delta ? 0.0 : double(weight));
+    }
+    CHECK(mirrored.mean() == Approx(render::fresnel_dielectric(wo.z, 1.5f)).margin(4.0 * mirrored.error()));
+    CHECK(below.mean() == Approx(albedo_below(wo.z, 0.6f)).margin(4.0 * below.error()));
+  }
+}
+
+TEST_CASE("a rough plastic of little roughness has the smooth one's albedo", "[renderer][bsdf]") {
+  const bsdf rough = make(material_kind::plastic, vec3(0.6f), 0.02f);
+  for (const vec3 wo : {viewers()[0], viewers()[1]}) {
+    estimate albedo;
+    for (std::uint32_t i = 0; i < 20000; ++i) {
+      const wfpg::bsdf_sample drawn = rough.sample(wo, numbers(i, 6));
+      albedo.add(drawn.pdf > 0.0f ? double(rough.eval(wo, drawn.direction) / drawn.pdf) : 0.0);
+    }
+    CHECK(albedo.mean() == Approx(render::fresnel_dielectric(wo.z, 1.5f) + albedo_below(wo.z, 0.6f))
+                               .margin(0.005 + 4.0 * albedo.error()));
+  }
 }

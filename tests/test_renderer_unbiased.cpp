@@ -28,7 +28,9 @@ TEST_CASE("pictures guided by kept fields have the mean of unguided ones", "[ren
     for (const bool nee : {false, true}) check_rendering({scene, nee});
   check_rendering({"cornell-wall", true});
   check_rendering({"many-lamps", true});  // the choice among them is learnt
+  check_rendering({"outdoor", true});     // hardly any path finds the sun by chance
   for (const bool nee : {false, true}) {
+    check_rendering({"materials", nee});
     check_rendering({map_scene, nee});
     check_precisely({"", nee});
     check_precisely({"", nee, wfpg_method, fields::kept, guiding::plain});
@@ -78,6 +80,7 @@ TEST_CASE("pictures guided by products have the mean of unguided ones", "[render
   for (const bool nee : {false, true}) {
     check_rendering({"cornell-enclosed", nee, product_method, fields::transient, guiding::oriented});
     check_rendering({"thin-wall", nee, product_method, fields::transient, guiding::plain});
+    check_rendering({"materials", nee, product_method});
     check_precisely({"", nee, product_method});
     check_precisely({"", nee, product_method, fields::transient, guiding::oriented});
   }

@@ -39,7 +39,7 @@ struct bsdf {
     }
   }
 
-  /// f |cos| per channel, per steradian. 0 for delta lobes.
+  /// f |cos| per channel, per steradian. Without delta lobes.
   WFPG_HD vec3 eval_rgb(vec3 outgoing, vec3 incident) const {
     if (has_all_lobes()) {
       const local_pair pair(*this, outgoing, incident);
@@ -50,10 +50,11 @@ struct bsdf {
     const vec3 wo = local.to_local(outgoing);
     const vec3 wi = local.to_local(incident);
     if (kind == material_kind::lambert) return colour * (wi.z / pi);
+    if (kind == material_kind::smooth_plastic) return colour * (below_coat(wo.z, wi.z) * wi.z / pi);
     const vec3 h = glm::normalize(wo + wi);
     const float facets = ggx{alpha}.eval(wo, wi, h);
     if (kind == material_kind::conductor) return fresnel_schlick(colour, glm::dot(wo, h)) * facets;
-    const float below = (1.0f - fresnel_dielectric(wo.z, ior)) * (1.0f - fresnel_dielectric(wi.z, ior));
+    const float below = below_coat(wo.z, wi.z);
     return vec3(fresnel_dielectric(glm::dot(wo, h), ior) * facets) + colour * (below * wi.z / pi);
   }
   WFPG_HD float eval(vec3 outgoing, vec3 incident) const {
@@ -61,17 +62,19 @@ struct bsdf {
     return reflects(outgoing, incident) ? wfpg::luminance(colour) * glm::dot(incident, normal) / pi : 0.0f;
   }
 
-  /// The light that facets reflect and refract, and the probability that sample() chooses them.
+  /// The light that facets or a smooth coat reflect and refract, and the probability that sample() chooses
+  /// them.
   WFPG_HD wfpg::glossy_part glossy(vec3 outgoing) const {
     if (kind == material_kind::lambert) return {};
     if (kind == material_kind::conductor) return {1.0f, alpha};
     const float above = glm::dot(outgoing, normal);
     if (kind == material_kind::plastic) return {coat_probability(above), alpha};
+    if (kind == material_kind::smooth_plastic) return {coat_probability(above), 0.0f};
     if (has_all_lobes()) return {lobes(side_of(above)).specular_probability(std::abs(above)), alpha};
     return {};
   }
 
-  /// Density of sample(), per steradian. 0 for delta lobes.
+  /// Density of sample(), per steradian. Without delta lobes.
   WFPG_HD float pdf(vec3 outgoing, vec3 incident) const {
     const float coat = glossy(outgoing).fraction;
     return (coat > 0.0f ? coat * pdf_part(true, outgoing, incident) : 0.0f) +
@@ -85,6 +88,7 @@ struct bsdf {
     }
     if (is_delta() || is_black() || !reflects(outgoing, incident)) return 0.0f;
     if (!coat) return glm::dot(incident, normal) / pi;
+    if (kind == material_kind::smooth_plastic) return 0.0f;
     const frame local(normal);
     const vec3 wo = local.to_local(outgoing);
     return ggx{alpha}.pdf(wo, glm::normalize(wo + local.to_local(incident)));
@@ -94,19 +98,20 @@ struct bsdf {
     if (is_black()) return {};
     if (kind == material_kind::dielectric) return sample_dielectric(outgoing, u.x);
     if (kind == material_kind::thin_dielectric) return sample_thin_dielectric(outgoing, u.x);
-    if (kind == material_kind::mirror) {
-      const vec3 incident = mirrored(outgoing, normal);
-      return {incident, reflects(outgoing, incident) ? 1.0f : 0.0f};
-    }
+    if (kind == material_kind::mirror) return sample_mirror(outgoing);
     const float coat = glossy(outgoing).fraction;
     const bool from_coat = chosen(u.x, coat);
     wfpg::bsdf_sample drawn = sample_part(from_coat, outgoing, u);
-    if (drawn.pdf > 0.0f && coat > 0.0f) drawn.pdf = pdf(outgoing, drawn.direction);
+    if (drawn.is_delta)
+      drawn.pdf *= coat;
+    else if (drawn.pdf > 0.0f && coat > 0.0f)
+      drawn.pdf = pdf(outgoing, drawn.direction);
     return drawn;
   }
-  /// Samples one part, with that part's density.
+  /// Samples one part, with that part's density. A smooth coat is a delta lobe.
   WFPG_HD wfpg::bsdf_sample sample_part(bool coat, vec3 outgoing, vec2 u) const {
     if (is_delta() || is_black()) return {};
+    if (coat && kind == material_kind::smooth_plastic) return sample_mirror(outgoing);
     const frame local(normal);
     vec3 wo = local.to_local(outgoing), wi;
     if (has_all_lobes()) {
@@ -124,10 +129,12 @@ struct bsdf {
     return {incident, pdf_part(coat, outgoing, incident)};
   }
 
-  /// Value over probability of the delta lobe that joins two directions, per channel.
-  WFPG_HD vec3 delta_weight_rgb(vec3 outgoing, vec3 incident) const {
+  /// Value over probability of the delta lobe that joins two directions, per channel. `probability`: that
+  /// of the lobe where a mixture drew it. It is sample()'s own where is_delta(), and is not read there.
+  WFPG_HD vec3 delta_weight_rgb(vec3 outgoing, vec3 incident, float probability) const {
     if (kind == material_kind::mirror) return colour;
     const float above = glm::dot(outgoing, normal);
+    if (kind == material_kind::smooth_plastic) return vec3(fresnel_dielectric(above, ior) / probability);
     if (above * glm::dot(incident, normal) > 0.0f) return vec3(1.0f);
     // Refraction compresses radiance into a smaller solid angle where the index is larger.
     const float eta = is_thin() ? 1.0f : relative_ior(above);
@@ -135,10 +142,14 @@ struct bsdf {
   }
 
   /// About the fraction of the light that continues, per sample of this BSDF, for Russian roulette. Ignores
-  /// how the index of refraction changes radiance, since paths that leave again undo this.
-  WFPG_HD float reflectance(vec3 outgoing, vec3 incident) const {
+  /// how the index of refraction changes radiance, since paths that leave again undo this. `by_delta`: a
+  /// delta lobe drew the direction.
+  WFPG_HD float reflectance(vec3 outgoing, vec3 incident, bool by_delta) const {
     const float eta = ior_beyond(outgoing, incident);
-    if (is_delta()) return eta * eta * wfpg::luminance(delta_weight_rgb(outgoing, incident));
+    if (by_delta) {
+      const float probability = glossy(outgoing).fraction;
+      return eta * eta * wfpg::luminance(delta_weight_rgb(outgoing, incident, probability));
+    }
     const float density = pdf(outgoing, incident);
     if (!(density > 0.0f)) return 0.0f;
     return eta * eta * eval(outgoing, incident) / density;
@@ -177,6 +188,12 @@ struct bsdf {
     return outgoing_cosine > 0.0f ? ior : 1.0f / ior;
   }
 
+  // The light that passes a coat twice: to the diffuse base and back.
+  WFPG_HD float below_coat(float outgoing_cosine, float incident_cosine) const {
+    return (1.0f - fresnel_dielectric(outgoing_cosine, ior)) *
+           (1.0f - fresnel_dielectric(incident_cosine, ior));
+  }
+
   // The probability of a plastic's coat: its fraction of the reflectance, bounded so that neither part is
   // left out.
   WFPG_HD float coat_probability(float cosine) const {
@@ -213,6 +230,11 @@ struct bsdf {
     if (kind == material_kind::rough_dielectric) fractions.specular = fractions.transmission = unorm8(1.0f);
     const bool solid = fractions.transmits() && !is_thin();
     return {colour, vec3(transmitted_colour), fractions, alpha, solid ? relative_ior(side) : ior, is_thin()};
+  }
+
+  WFPG_HD wfpg::bsdf_sample sample_mirror(vec3 outgoing) const {
+    const vec3 incident = mirrored(outgoing, normal);
+    return {incident, reflects(outgoing, incident) ? 1.0f : 0.0f, true};
   }
 
   WFPG_HD wfpg::bsdf_sample sample_dielectric(vec3 outgoing, float u) const {

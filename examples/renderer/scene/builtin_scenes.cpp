@@ -220,6 +220,81 @@ scene caustic_pool() {
   return b.finish(8);
 }
 
+/// Spheres of metal, of plastic and of glass on a floor.
+scene materials() {
+  scene_builder b("materials");
+  const auto floor = b.diffuse(vec3(0.45f)), light = b.lamp(vec3(15.0f));
+  const auto silver = b.glossy(material_kind::mirror, vec3(0.95f, 0.93f, 0.88f), 0.1f),
+             gold = b.glossy(material_kind::mirror, {1.0f, 0.78f, 0.34f}, 0.1f),
+             copper = b.glossy(material_kind::conductor, {0.95f, 0.64f, 0.54f}, 0.1f);
+  const auto varnish = b.glossy(material_kind::smooth_plastic, {0.5f, 0.03f, 0.03f}, 0.1f),
+             paint = b.glossy(material_kind::plastic, {0.06f, 0.2f, 0.6f}, 0.15f);
+  const auto clear = b.glass(material_kind::dielectric), frosted = b.glass(material_kind::rough_dielectric);
+  b.parallelogram({-8.0f, 0.0f, -8.0f}, {16.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 16.0f}, {up, floor});
+  const auto place = [&](float x, float z, std::uint32_t material_index) {
+    b.sphere({x, 0.501f, z}, 0.5f, 32, material_index);
+  };
+  place(-1.2f, -1.2f, silver);
+  place(0.0f, -1.2f, gold);
+  place(1.2f, -1.2f, copper);
+  place(-0.6f, 0.0f, varnish);
+  place(0.6f, 0.0f, paint);
+  place(-1.8f, 0.0f, clear);
+  place(1.8f, 0.0f, frosted);
+  b.box({{0.0f, 0.2f, 1.0f}, {2.4f, 0.4f, 0.4f}},
+        b.glossy(material_kind::smooth_plastic, {0.1f, 0.35f, 0.12f}, 0.1f));
+  b.ceiling_lamp({0.0f, 3.5f, 0.5f}, {1.5f, 1.5f}, light);
+  b.sky(vec3(0.16f, 0.19f, 0.24f));
+  b.look({0.0f, 2.2f, 5.2f}, {0.0f, 0.4f, -0.3f}, 0.62f);
+  return b.finish(8);
+}
+
+/// A hazy sky from the horizon to the zenith, the ground's colour below, and a sun whose glow falls by e from
+/// texel to texel. Texels are looked up bilinearly but sampled as constants, so a sharper disc would give
+/// bright pixels.
+environment_map sunny_sky(vec3 toward_sun) {
+  environment_map sky;
+  sky.width = 512;
+  sky.height = 256;
+  const float step = 3.14159265f / static_cast<float>(sky.height);
+  for (int row = 0; row < sky.height; ++row)
+    for (int column = 0; column < sky.width; ++column) {
+      const float theta = step * (static_cast<float>(row) + 0.5f);
+      const float phi = step * (static_cast<float>(column) + 0.5f - 0.5f * static_cast<float>(sky.width));
+      const vec3 w(std::sin(theta) * std::sin(phi), std::cos(theta), -std::sin(theta) * std::cos(phi));
+      const float haze = std::exp(-4.0f * glm::max(w.y, 0.0f));
+      vec3 radiance =
+          w.y < 0.0f ? vec3(0.3f, 0.28f, 0.24f) : glm::mix(vec3(0.16f, 0.3f, 0.62f), vec3(0.75f), haze);
+      const float angle = std::acos(glm::clamp(glm::dot(w, toward_sun), -1.0f, 1.0f));
+      radiance += std::exp(-angle / step) * vec3(3000.0f, 2600.0f, 2000.0f);
+      sky.texels.push_back(radiance);
+    }
+  return sky;
+}
+
+scene outdoor() {
+  scene_builder b("outdoor");
+  const auto ground = b.diffuse({0.32f, 0.3f, 0.24f}), wall = b.diffuse({0.7f, 0.65f, 0.58f}),
+             clay = b.diffuse({0.6f, 0.28f, 0.18f});
+  const auto paint = b.glossy(material_kind::plastic, {0.08f, 0.25f, 0.5f}, 0.2f),
+             brass = b.glossy(material_kind::conductor, {0.95f, 0.79f, 0.55f}, 0.25f),
+             varnish = b.glossy(material_kind::smooth_plastic, {0.35f, 0.02f, 0.03f}, 0.1f);
+  const auto frosted = b.glass(material_kind::rough_dielectric, 0.2f);
+  b.parallelogram({-12.0f, 0.0f, -16.0f}, {24.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 24.0f}, {up, ground});
+  b.box({{-1.2f, 1.0f, -1.9f}, {4.6f, 2.0f, 0.3f}, 0.35f}, wall);
+  const auto place = [&](float x, float z, float radius, std::uint32_t material_index) {
+    b.sphere({x, radius + 0.001f, z}, radius, 32, material_index);
+  };
+  place(-1.7f, -0.5f, 0.7f, clay);
+  place(-0.1f, -0.6f, 0.6f, brass);
+  place(1.3f, -0.5f, 0.7f, paint);
+  place(-0.8f, 0.8f, 0.4f, varnish);
+  place(0.5f, 0.8f, 0.45f, frosted);
+  b.sky(sunny_sky(glm::normalize(vec3(0.75f, 0.55f, 0.25f))));
+  b.look({0.3f, 1.7f, 5.6f}, {-0.1f, 0.6f, -0.3f}, 0.62f);
+  return b.finish(8);
+}
+
 scene furnace() {
   scene_builder b("furnace");
   material wall;
@@ -242,6 +317,8 @@ const std::vector<std::pair<std::string, maker>>& makers() {
                                                                  {"glossy-room", glossy_room},
                                                                  {"caustic-pool", caustic_pool},
                                                                  {"many-lamps", many_lamps},
+                                                                 {"materials", materials},
+                                                                 {"outdoor", outdoor},
                                                                  {"furnace", furnace}};
   return all;
 }

@@ -10,7 +10,7 @@
 namespace render {
 
 /// cornell-box, cornell-enclosed, cornell-wall, ajar, thin-wall, glossy-room, caustic-pool, many-lamps,
-/// furnace.
+/// materials, outdoor, furnace.
 std::vector<std::string> builtin_scene_names();
 
 bool is_builtin_scene(const std::string& name);
@@ -34,6 +34,9 @@ bool is_builtin_scene(const std::string& name);
 ///   Closed. After their second case.
 /// - `many-lamps`: four rooms in a row, each with three lamps of very different power, a bulb and a spot.
 ///   Lamps of other rooms are hardly visible. Closed.
+/// - `materials`: spheres of smooth and rough metal, plastic and glass under a lamp and a constant sky. Both
+///   are in view nearly everywhere, so guiding has little to gain. Open.
+/// - `outdoor`: a wall and spheres of five materials on a plane, under a map of the sky with a sun. Open.
 /// - `furnace`: a closed box of albedo 0.5 that emits radiance 1 everywhere; see furnace_radiance().
 scene make_builtin_scene(const std::string& name);
 

@@ -47,10 +47,11 @@ enum class material_kind : std::uint8_t {
   dielectric,               ///< smooth; reflects, and refracts times base_color
   rough_dielectric,         ///< dielectric with GGX facets
   thin_dielectric,          ///< smooth; reflects, and lets base_color through unbent
+  smooth_plastic,           ///< diffuse below a smooth dielectric coat
   metallic_roughness,       ///< all lobes of metallic_roughness.hpp, around a solid
   thin_metallic_roughness,  ///< all lobes of metallic_roughness.hpp, on a sheet
 };
-/// Whether it scatters into directions that have a probability, not a density.
+/// Whether all its directions have a probability, not a density. That of smooth_plastic is diffuse too.
 WFPG_HD constexpr bool is_smooth(material_kind kind) {
   return kind == material_kind::mirror || kind == material_kind::dielectric ||
          kind == material_kind::thin_dielectric;
@@ -69,7 +70,7 @@ struct material {
   float opacity = 1.0f;                          ///< in [0, 1]
   float alpha_cutoff = 0.0f;                     ///< smaller opacity makes a hole
   float alpha = 0.1f;                            ///< GGX roughness (not perceptual), (0, 1]
-  float ior = 1.5f;       ///< inside over outside, for plastic and dielectrics; not 1 if rough
+  float ior = 1.5f;       ///< inside over outside, for plastics and dielectrics; not 1 if rough
   float metallic = 0.0f;  ///< this and the next four: for kinds with all lobes, see lobe_factors
   float specular = 1.0f;
   float transmission = 0.0f;

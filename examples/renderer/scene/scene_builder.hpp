@@ -1,5 +1,5 @@
-// Builds scenes of quads, boxes and water. Every quad gets the side that it faces, because emitters emit only
-// on that side.
+// Builds scenes of quads, boxes, spheres and water. Every quad gets the side that it faces, because emitters
+// emit only on that side.
 #pragma once
 
 #include "scene/scene.hpp"
@@ -97,6 +97,9 @@ class scene_builder {
     return add(m);
   }
 
+  /// Smooth or rough glass; `alpha` is the roughness of the latter.
+  std::uint32_t glass(material_kind kind, float alpha = 0.1f) { return glossy(kind, vec3(1.0f), alpha); }
+
   /// A plastic or a metal.
   std::uint32_t glossy(material_kind kind, vec3 colour, float alpha) {
     material m;
@@ -159,6 +162,34 @@ class scene_builder {
     parallelogram(centre - 0.5f * (u + v), u, v, {vec3(0.0f, -1.0f, 0.0f), material_index});
   }
 
+  /// A closed sphere that faces outwards, of `rings` rings of twice as many quads, with smooth normals.
+  void sphere(vec3 centre, float radius, int rings, std::uint32_t material_index) {
+    const auto first = static_cast<std::uint32_t>(scene_.positions.size());
+    const auto row = 2 * static_cast<std::uint32_t>(rings), last = first + 1 + (row / 2 - 1) * row;
+    scene_.normals.resize(first, vec3(0.0f));
+    const auto add_vertex = [&](vec3 normal) {
+      scene_.positions.push_back(centre + radius * normal);
+      scene_.normals.push_back(normal);
+    };
+    add_vertex({0.0f, 1.0f, 0.0f});
+    for (int ring = 1; ring < rings; ++ring)
+      for (int i = 0; i < 2 * rings; ++i) {
+        const float step = 3.14159265f / static_cast<float>(rings);
+        const float theta = step * static_cast<float>(ring), phi = step * static_cast<float>(i);
+        add_vertex({std::sin(theta) * std::cos(phi), std::cos(theta), -std::sin(theta) * std::sin(phi)});
+      }
+    add_vertex({0.0f, -1.0f, 0.0f});
+    for (std::uint32_t i = 0; i < row; ++i) {
+      const std::uint32_t next = (i + 1) % row;
+      triangle({first, first + 1 + i, first + 1 + next}, material_index);
+      for (std::uint32_t above = first + 1; above + row < last; above += row) {
+        triangle({above + i, above + row + i, above + row + next}, material_index);
+        triangle({above + i, above + row + next, above + next}, material_index);
+      }
+      triangle({last, last - row + next, last - row + i}, material_index);
+    }
+  }
+
   /// Water over the square |x|, |z| <= half_side, of cells x cells squares, with smooth normals. It faces up.
   void water(const water_surface& surface, float half_side, int cells, std::uint32_t material_index) {
     const auto first = static_cast<std::uint32_t>(scene_.positions.size());
@@ -178,6 +209,9 @@ class scene_builder {
         triangle({a, a + row + 1, a + 1}, material_index);
       }
   }
+
+  void sky(environment_map map) { scene_.sky = std::move(map); }
+  void sky(vec3 constant) { scene_.environment = constant; }
 
   void look(vec3 from, vec3 at, float vertical_fov) {
     scene_.view.position = from;

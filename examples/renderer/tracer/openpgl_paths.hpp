@@ -86,7 +86,7 @@ class openpgl_recorder {
     here.directionIn = to_pgl(next.direction);
     here.pdfDirectionIn = next.pdf;
     here.isDelta = delta;
-    here.scatteringWeight = to_pgl(delta ? s.bsdf.delta_weight_rgb(s.outgoing, next.direction)
+    here.scatteringWeight = to_pgl(delta ? s.bsdf.delta_weight_rgb(s.outgoing, next.direction, next.pdf)
                                          : s.bsdf.eval_rgb(s.outgoing, next.direction) / next.pdf);
     here.eta = s.bsdf.ior_beyond(s.outgoing, next.direction);
     here.roughness = 1.0f + glossy.fraction * (glossy.alpha - 1.0f);

@@ -307,11 +307,11 @@ struct shade_paths {
     if (drawn.technique == wfpg::sampling_technique::none || !(drawn.pdf > 0.0f)) return false;
     const bool delta = drawn.technique == wfpg::sampling_technique::delta;
     const bsdf scatters = vertex.bsdf();
-    const vec3 weight = delta ? scatters.delta_weight_rgb(vertex.outgoing, drawn.direction)
+    const vec3 weight = delta ? scatters.delta_weight_rgb(vertex.outgoing, drawn.direction, drawn.pdf)
                               : scatters.eval_rgb(vertex.outgoing, drawn.direction) / drawn.pdf;
     if (!(wfpg::luminance(weight) > 0.0f)) return false;
     path.throughput *= weight;
-    path.reflectance *= scatters.reflectance(vertex.outgoing, drawn.direction);
+    path.reflectance *= scatters.reflectance(vertex.outgoing, drawn.direction, delta);
     path.pdf = delta ? 0.0f : drawn.pdf;
     path.origin = leave_surface(vertex.position, vertex.geometric_normal, drawn.direction, vertex.offset);
     path.direction = drawn.direction;

@@ -42,7 +42,7 @@ struct smooth_surfaces {
     const bsdf scatters = scene.surface(hit, back).surface.bsdf;
     if (!scatters.is_delta()) return {};
     const wfpg::bsdf_sample drawn = scatters.sample(back, u);
-    const float left = drawn.pdf > 0.0f ? scatters.reflectance(back, drawn.direction) : 0.0f;
+    const float left = drawn.pdf > 0.0f ? scatters.reflectance(back, drawn.direction, true) : 0.0f;
     return {true, drawn.direction, left};
   }
 };
