@@ -22,6 +22,10 @@
 #define WFPG_HD
 #endif
 
+/// Stands before a host's function that many places call and that takes long beside a call.
+/// The compiler then makes it once, not once in each of its callers.
+#define WFPG_NOINLINE __attribute__((noinline))
+
 /// Stands before a loop over the lanes of an emulated warp.
 /// Promises the compiler that iterations are independent, so that it vectorises them.
 /// Expands to nothing in device code.

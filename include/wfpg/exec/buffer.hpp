@@ -1,15 +1,15 @@
 // Owning storage in the memory of an execution policy, and a memory resource that keeps freed blocks.
 // A renderer's hot loop then allocates only in its first frame.
-// Cost: one call of the policy's memory resource a buffer; O(log blocks) a call of the retaining resource.
+// Cost: one call of the policy's memory resource a buffer; O(1) a call of the retaining resource.
 // Memory: the elements, and 24 bytes on the host for each buffer.
 #pragma once
 
 #include <wfpg/base/error.hpp>
 #include <wfpg/base/types.hpp>
+#include <wfpg/exec/detail/memory_block.hpp>
 #include <wfpg/exec/policy.hpp>
 
 #include <cstddef>
-#include <map>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -38,76 +38,44 @@ class buffer {
   /// Allocates `size` elements, aligned to 64 bytes.
   /// Asks for nothing where `size` is 0.
   /// Throws out_of_memory.
-  buffer(const Exec& exec, std::size_t size) : resource_(exec.resource()), size_(size) {
-    // No block for no element, as resources may return null or a unique address for 0 bytes.
-    if (size_ == 0) return;
-    try {
-      data_ = static_cast<T*>(resource_->allocate(bytes(), alignment));
-    } catch (const std::bad_alloc&) {
-      throw out_of_memory(bytes());
-    }
-  }
+  buffer(const Exec& exec, std::size_t size) : memory_(exec.resource(), size * sizeof(T)) {}
   /// Allocates and copies elements from the host.
   /// Throws out_of_memory.
   buffer(const Exec& exec, const std::vector<T>& host) : buffer(exec, host.size()) {
     // The copy is ordered with the policy's later work.
-    exec.copy_from_host(data_, host.data(), bytes());
-  }
-  /// Takes the memory of another buffer, which is then empty.
-  buffer(buffer&& other) noexcept { swap(other); }
-  /// Frees its own memory and takes that of another, which becomes empty.
-  /// Safe for self-assignment.
-  buffer& operator=(buffer&& other) noexcept {
-    buffer(std::move(other)).swap(*this);
-    return *this;
-  }
-  /// Gives the memory back to the resource.
-  /// Does not wait for kernels that use it.
-  ~buffer() {
-    // Not by data_: Thrust hands null to memmove for empty ranges, by which compilers take it for not null.
-    if (size_ > 0) resource_->deallocate(data_, bytes(), alignment);
+    exec.copy_from_host(data(), host.data(), bytes());
   }
 
   /// Exchanges the memory of two buffers.
   /// No element is copied.
   /// Both keep the resources their memory came from. O(1).
-  void swap(buffer& other) noexcept {
-    std::swap(resource_, other.resource_);
-    std::swap(data_, other.data_);
-    std::swap(size_, other.size_);
-  }
+  void swap(buffer& other) noexcept { memory_.swap(other.memory_); }
 
   /// Returns the address of the first element, in the policy's memory; null where empty.
-  T* data() const { return data_; }
+  T* data() const { return static_cast<T*>(memory_.data()); }
   /// Returns the number of elements.
   /// It never changes: a buffer that is too small is replaced.
-  std::size_t size() const { return size_; }
+  std::size_t size() const { return memory_.bytes() / sizeof(T); }
   /// Returns the size of all elements, bytes.
-  std::size_t bytes() const { return size_ * sizeof(T); }
+  std::size_t bytes() const { return memory_.bytes(); }
   /// Returns a view of all elements.
   /// Valid until the buffer is destroyed or moved into.
   /// A const buffer gives a view of mutable elements too, as a pointer would.
-  array_view<T> view() const { return {data_, size_}; }
+  array_view<T> view() const { return {data(), size()}; }
 
   /// Returns a copy of the first `count` elements on the host.
   /// Precondition: count <= size().
   /// Waits for the work before it, so it is for tests and reports, not for frames.
   std::vector<T> to_host(const Exec& exec, std::size_t count) const {
     std::vector<T> host(count);
-    exec.copy_to_host(host.data(), data_, count * sizeof(T));
+    exec.copy_to_host(host.data(), data(), count * sizeof(T));
     return host;
   }
   /// Returns a copy of all elements on the host; waits likewise.
-  std::vector<T> to_host(const Exec& exec) const { return to_host(exec, size_); }
+  std::vector<T> to_host(const Exec& exec) const { return to_host(exec, size()); }
 
  private:
-  // Bytes: a cache line of CPUs, and more than any vector load of GPUs needs.
-  static constexpr std::size_t alignment = 64;
-
-  /// Where data_ came from; null where there is none.
-  memory_resource* resource_ = nullptr;
-  T* data_ = nullptr;
-  std::size_t size_ = 0;
+  detail::memory_block memory_;
 };
 
 /// Returns one element, copied to the host from the policy's memory.
@@ -125,8 +93,8 @@ T read_element(const Exec& exec, const T* device) {
 /// Freeing never does, and never throws.
 /// Calls must not be concurrent.
 /// Blocks are rounded up to 2^k or 3 · 2^k bytes, at least 192: less than half is added above 128 bytes.
-/// Cost: O(log of the blocks held) a call.
-/// Host memory: 64 bytes a block, from the default resource at construction.
+/// Cost: O(1) a call.
+/// Host memory: 16 bytes a block, from the default resource at construction.
 /// Blocks are not split or merged, so that a request of a new size takes new memory.
 class retaining_resource : public memory_resource {
  public:
@@ -134,7 +102,8 @@ class retaining_resource : public memory_resource {
   /// Every block from upstream is aligned to 64 bytes, whatever a caller asks for.
   /// Nothing is allocated upstream before the first request.
   explicit retaining_resource(memory_resource* upstream)
-      : upstream_(upstream ? upstream : std::pmr::get_default_resource()) {}
+      : upstream_(upstream ? upstream : std::pmr::get_default_resource()),
+        entries_(std::pmr::get_default_resource()) {}
   /// Not copyable: blocks have one owner.
   retaining_resource(const retaining_resource&) = delete;
   retaining_resource& operator=(const retaining_resource&) = delete;
@@ -150,61 +119,88 @@ class retaining_resource : public memory_resource {
   /// Gives kept blocks back upstream.
   /// Blocks in use stay.
   void release() {
-    for (const auto& [size, block] : kept_) {
-      upstream_->deallocate(block, size, alignment);
-      bytes_ -= size;
+    for (int k = 0; k < size_count; ++k) {
+      while (entry* const freed = take(sizes_[k].kept)) {
+        upstream_->deallocate(freed->block, bytes_of(k), alignment);
+        bytes_ -= bytes_of(k);
+        entries_->deallocate(freed, sizeof(entry), alignof(entry));
+      }
     }
-    kept_.clear();
   }
 
  private:
   static constexpr std::size_t alignment = 64;
 
+  /// One for each block.
+  /// That of a block in use does not know which block it is.
+  struct entry {
+    void* block;
+    entry* next;
+  };
+  /// Blocks of one size, in two lists.
+  struct blocks {
+    /// Freed blocks.
+    entry* kept = nullptr;
+    /// As many entries as there are blocks in use.
+    entry* in_use = nullptr;
+  };
+
   // Sizes are powers of two or three quarters of one: a request that grows a little finds the same block.
-  static std::size_t rounded(std::size_t bytes) {
-    std::size_t size = 256;
-    while (size < bytes) size *= 2;
-    return bytes <= size / 4 * 3 ? size / 4 * 3 : size;
+  static constexpr int size_count = 2 * (64 - 8);
+  /// Returns the k-th size, bytes.
+  static std::size_t bytes_of(int k) { return std::size_t(k % 2 == 0 ? 192 : 256) << k / 2; }
+  /// Returns which size holds so many bytes.
+  static int size_of(std::size_t bytes) {
+    int k = 0;
+    while (k + 1 < size_count && bytes_of(k) < bytes) ++k;
+    return k;
+  }
+
+  /// Removes the first entry of a list and returns it; null where it has none.
+  static entry* take(entry*& list) {
+    entry* const first = list;
+    if (first) list = first->next;
+    return first;
+  }
+  /// Makes an entry the first of a list.
+  static void put(entry*& list, entry* first) {
+    first->next = list;
+    list = first;
   }
 
   void* do_allocate(std::size_t bytes, std::size_t) override {
-    const std::size_t size = rounded(bytes);
+    const int k = size_of(bytes);
     // Any kept block of this size will do.
-    const auto found = kept_.find(size);
-    if (found != kept_.end()) {
-      void* const block = found->second;
-      // Moving the node needs no memory.
-      in_use_.insert(kept_.extract(found));
-      used_bytes_ += bytes;
-      return block;
+    entry* found = take(sizes_[k].kept);
+    if (!found) {
+      // Its entry is made before it is, and moves: giving a block back asks for no memory.
+      found = static_cast<entry*>(entries_->allocate(sizeof(entry), alignof(entry)));
+      try {
+        found->block = upstream_->allocate(bytes_of(k), alignment);
+      } catch (...) {
+        entries_->deallocate(found, sizeof(entry), alignof(entry));
+        throw;
+      }
+      bytes_ += bytes_of(k);
     }
-    // Its entry is made before it is, and moves: giving a block back asks for no memory.
-    const auto entry = in_use_.emplace(size, nullptr);
-    try {
-      entry->second = upstream_->allocate(size, alignment);
-    } catch (...) {
-      in_use_.erase(entry);
-      throw;
-    }
-    bytes_ += size;
+    put(sizes_[k].in_use, found);
     used_bytes_ += bytes;
-    return entry->second;
+    return found->block;
   }
   void do_deallocate(void* block, std::size_t bytes, std::size_t) noexcept override {
-    auto entry = in_use_.extract(in_use_.find(rounded(bytes)));  // of any block of this size
-    entry.mapped() = block;
-    kept_.insert(std::move(entry));
+    const int k = size_of(bytes);
+    entry* const any = take(sizes_[k].in_use);
+    any->block = block;
+    put(sizes_[k].kept, any);
     used_bytes_ -= bytes;
   }
   // Blocks must return to the resource that gave them.
   bool do_is_equal(const memory_resource& other) const noexcept override { return this == &other; }
 
-  using blocks = std::pmr::multimap<std::size_t, void*>;  // by size
-
   memory_resource* upstream_;
-  /// Freed blocks, by size.
-  blocks kept_;
-  blocks in_use_;  // as many of each size as there are; which is which is not known
+  /// Where entries come from.
+  memory_resource* entries_;
+  blocks sizes_[size_count];
   /// Held from upstream.
   std::size_t bytes_ = 0;
   /// Requested and not yet freed.
