@@ -26,6 +26,10 @@
 /// The compiler then makes it once, not once in each of its callers.
 #define WFPG_NOINLINE __attribute__((noinline))
 
+/// Stands before a host's function that seldom runs, such as one that makes an exception.
+/// It is not inlined, and is compiled for size, which takes less time.
+#define WFPG_COLD __attribute__((cold, noinline))
+
 /// Stands before a loop over the lanes of an emulated warp.
 /// Promises the compiler that iterations are independent, so that it vectorises them.
 /// Expands to nothing in device code.

@@ -21,7 +21,7 @@ namespace wfpg {
 class out_of_memory : public std::runtime_error {
  public:
   /// `bytes`: the size of the request that failed.
-  explicit out_of_memory(std::size_t bytes)
+  WFPG_COLD explicit out_of_memory(std::size_t bytes)
       : std::runtime_error("wfpg: out of memory: " + std::to_string(bytes) + " bytes were asked for"),
         bytes_(bytes) {}
   /// Returns the size of the failed request, bytes.
@@ -61,27 +61,34 @@ class file_error : public std::runtime_error {
 
 namespace detail {
 
-/// Returns a value as messages show it: text as it is, an integer in full, another number with six digits.
-/// No stream is used: <sstream> is slow to compile, and this header is in every other.
-/// A number that is not finite reads "nan", "inf" or "-inf", as a stream would write it.
-template <class T>
-std::string to_text(const T& value) {
-  if constexpr (!std::is_arithmetic_v<T>)
-    return value;
-  else if constexpr (std::is_integral_v<T>)
-    return std::to_string(value);
-  else {
-    char text[32];  // "-1.23457e-308" and the end
-    std::snprintf(text, sizeof text, "%g", static_cast<double>(value));
-    return text;
-  }
-}
-
 /// Throws the error of require(): "wfpg: NAME is VALUE, expected EXPECTED".
-/// It is apart from require(), which is inlined, so that callers stay small.
-[[noreturn]] inline void refuse(const char* name, const std::string& value, const char* expected) {
+/// Each kind of value has one. They are apart from require(), which is inlined, so that callers stay small.
+[[noreturn]] WFPG_COLD inline void refuse(const char* name, const std::string& value, const char* expected) {
   throw std::invalid_argument(std::string("wfpg: ") + name + " is " + value + ", expected " + expected);
 }
+/// Refuses an integer, which is shown in full.
+[[noreturn]] WFPG_COLD inline void refuse(const char* name, unsigned long long value, const char* expected) {
+  refuse(name, std::to_string(value), expected);
+}
+/// Refuses a signed integer.
+[[noreturn]] WFPG_COLD inline void refuse(const char* name, long long value, const char* expected) {
+  refuse(name, std::to_string(value), expected);
+}
+/// Refuses another number, which is shown with six digits.
+/// No stream is used: <sstream> is slow to compile, and this header is in every other.
+/// A number that is not finite reads "nan", "inf" or "-inf", as a stream would write it.
+[[noreturn]] WFPG_COLD inline void refuse(const char* name, double value, const char* expected) {
+  char text[32];  // "-1.23457e-308" and the end
+  std::snprintf(text, sizeof text, "%g", value);
+  refuse(name, std::string(text), expected);
+}
+
+/// The kinds of value that refuse() takes.
+template <class T>
+using refused_as = std::conditional_t<
+    !std::is_arithmetic_v<T>, const T&,
+    std::conditional_t<!std::is_integral_v<T>, double,
+                       std::conditional_t<std::is_signed_v<T>, long long, unsigned long long>>>;
 
 }  // namespace detail
 
@@ -93,7 +100,7 @@ std::string to_text(const T& value) {
 template <class T>
 void require(bool holds, const char* name, const T& value, const char* expected) {
   if constexpr (std::is_floating_point_v<T>) holds = holds && is_finite(value);
-  if (!holds) detail::refuse(name, detail::to_text(value), expected);
+  if (!holds) detail::refuse(name, static_cast<detail::refused_as<T>>(value), expected);
 }
 
 }  // namespace wfpg
