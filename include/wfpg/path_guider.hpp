@@ -26,6 +26,7 @@
 #include <wfpg/exec/policy.hpp>
 #include <wfpg/guide/guide.hpp>
 #include <wfpg/guide/path_recorder.hpp>
+#include <wfpg/guide/recorded_surfaces.hpp>
 #include <wfpg/guide/sample_rays.hpp>
 #include <wfpg/guide/statistics.hpp>
 #include <wfpg/guides/octree/kept_guide.hpp>
@@ -110,7 +111,8 @@ class path_guider {
   /// depth. Throws std::invalid_argument where sampling_options::records_waves is not set, and as the other
   /// prepare(). A guide that evaluates BSDFs to prepare, such as the SARSA grid's, does not compile.
   ///
-  /// Cost: that of the other prepare(), and 8 bytes a path: the wave is read, and then forgotten.
+  /// Tell the recorder of a hit in the kernel that finds it. Paths that were not told of at this depth are
+  /// not guided. Cost: that of the other prepare(), and 8 bytes a path: the wave is read, and then forgotten.
   template <class Caster>
   view_type prepare(std::uint32_t depth, const Caster& caster);
 
@@ -330,11 +332,14 @@ template <class Caster>
 typename path_guider<Exec, Guide>::view_type path_guider<Exec, Guide>::prepare(std::uint32_t depth,
                                                                                const Caster& caster) {
   static_assert(Guide::records_paths, "Guide: prepare(depth, caster) needs a guide that reads paths");
+  // Without it the recorder has no place for vertices, and every wave would be empty.
   require(options_.records_waves, "records_waves", options_.records_waves,
           "true, for prepare(depth, caster) to know the wave");
   wave_recorder<Exec>& vertices = recorder_.wave();
   const auto view = prepare(
-      wave<recorded_surfaces, no_random>{depth, vertices.paths(), vertices.surfaces(depth), {}}, caster);
+      wave<recorded_surfaces, no_random>{
+          depth, vertices.paths(), recorded_surfaces{vertices.states(), vertices.places(), depth}, {}},
+      caster);
   vertices.forget(exec_, depth);
   return view;
 }

@@ -24,6 +24,7 @@
 #include <wfpg/guide/recorded_fraction.hpp>
 #include <wfpg/guide/recorded_path.hpp>
 #include <wfpg/guide/recorded_runs.hpp>
+#include <wfpg/guide/recorded_surfaces.hpp>
 #include <wfpg/guide/recorded_wave.hpp>
 #include <wfpg/guide/sample_rays.hpp>
 #include <wfpg/guide/sampling_options.hpp>

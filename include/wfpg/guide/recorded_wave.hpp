@@ -10,7 +10,6 @@
 
 #include <wfpg/base/types.hpp>
 #include <wfpg/exec/buffer.hpp>
-#include <wfpg/host/bsdf.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -42,40 +41,6 @@ struct forget_vertex {
 
 }  // namespace detail
 
-/// Stands for a BSDF that only the host's kernels know. Surfaces of a recorded wave have it. Guides ask it
-/// whether light can come from below.
-struct kernel_bsdf {
-  bool transmits_below = false;  ///< light can come from below the normal
-
-  /// Returns false. Hosts do not report surfaces whose BSDF is delta in all lobes, and leave other delta
-  /// lobes to the mixture.
-  WFPG_HD bool is_delta() const { return false; }
-  /// Returns what the host said of the vertex.
-  WFPG_HD bool transmits() const { return transmits_below; }
-};
-
-/// Functor from a path's index to its surface: the surfaces of a wave of one depth. Paths that are not at
-/// that depth are inactive.
-struct recorded_surfaces {
-  array_view<const std::uint32_t> states;       ///< of all paths
-  array_view<const detail::wave_place> places;  ///< likewise
-  std::uint32_t depth = 0;                      ///< of the wave
-
-  /// Returns the surface of path `path`. Its normal stands for the geometric normal and the outgoing
-  /// direction too: guides ask only for the side of the surface.
-  WFPG_HD surface<kernel_bsdf> operator()(std::uint32_t path) const {
-    surface<kernel_bsdf> s;
-    const std::uint32_t state = states[path];
-    s.active = state != detail::no_wave_vertex && (state & ~detail::wave_transmits) == depth;
-    if (!s.active) return s;
-    const detail::wave_place at = places[path];
-    s.position = at.position;
-    s.geometric_normal = s.normal = s.outgoing = at.normal;
-    s.bsdf.transmits_below = (state & detail::wave_transmits) != 0;
-    return s;
-  }
-};
-
 /// Records each path's last vertex. Trivially copyable.
 /// A default view has no paths, and ignores all calls.
 class wave_recorder_view {
@@ -90,6 +55,7 @@ class wave_recorder_view {
   }
 
  private:
+  // The owner of the memory, which sets what follows.
   template <class Exec>
   friend class wave_recorder;
 
@@ -123,11 +89,10 @@ class wave_recorder {
   /// 28 a path.
   std::size_t bytes() const { return states_.bytes() + places_.bytes(); }
 
-  /// Surfaces of the paths whose last vertex has this depth.
-  /// Valid until the next vertex is recorded, or this recorder is destroyed.
-  recorded_surfaces surfaces(std::uint32_t depth) const {
-    return {{states_.data(), states_.size()}, {places_.data(), places_.size()}, depth};
-  }
+  /// State of each path: the depth of its vertex, with a flag; or none. For recorded_surfaces.
+  array_view<const std::uint32_t> states() const { return {states_.data(), states_.size()}; }
+  /// Place of each path. It is not written where the path has no vertex.
+  array_view<const detail::wave_place> places() const { return {places_.data(), places_.size()}; }
   /// Forgets the vertices of one depth, so that a later wave of the same depth does not see them again.
   void forget(const Exec& exec, std::uint32_t depth) {
     exec.for_each(paths(), detail::forget_vertex{states_.data(), depth});
@@ -137,6 +102,7 @@ class wave_recorder {
   void clear(const Exec& exec) { exec.fill_bytes(states_.data(), 0xff, states_.bytes()); }
 
  private:
+  // Apart, so that a wave reads places only where it has a ray.
   buffer<std::uint32_t, Exec> states_;
   buffer<detail::wave_place, Exec> places_;
   // What kernels see of both.
