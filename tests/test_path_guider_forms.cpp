@@ -123,8 +123,8 @@ WFPG_TEST_CASE("path guider: a wave that the recorder knows samples as a wave of
         CHECK(same_draws(sample_recorded(recorded, stored, depth), expected));
       }
       // What was prepared is forgotten, and a sample begins without vertices.
-      whole.sample({}, box_caster{}, 1, 1);
-      CHECK(guides_none(recorded.guider.prepare(1, box_caster{})));
+      whole.sample({}, box_caster{}, 1, 7);
+      CHECK(guides_none(recorded.guider.prepare(7, box_caster{})));
       for (guided_box<Exec>* box : {&whole, &recorded}) {
         record(*box, 2);
         box->guider.end_sample();
