@@ -164,12 +164,10 @@ struct shade {
     path.direction = drawn.wi;
     at.recorder.scatter(i, at.depth, drawn.wi, drawn.is_delta ? wfpg::no_field : mixture.number);
     const float survival = std::fmin(2.0f * mean_of(path.throughput) * path.roulette_scale, 1.0f);
-    if (at.draw(i, 4).x < survival) {
+    if (at.draw(i, 4).x < survival)
       path.throughput /= survival;
-    } else {
+    else
       path.hit = material::none;
-      at.recorder.ended(i);
-    }
   }
 };
 

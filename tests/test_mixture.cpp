@@ -273,7 +273,7 @@ void check_delta_lobes(const Exec& exec, const directional_field& field, const B
   }
   CHECK(wrong == 0);
   CHECK(mirrored > 0);
-  if (bsdf.tells_part) CHECK(mirrored > 1000);  // as often as by the BSDF alone: a half and a third of 4000
+  if (bsdf.tells_part) CHECK(mirrored > 1000);  // as often as by the BSDF alone: 0.3 of 4000
 }
 
 WFPG_TEST_CASE("mixture: the library guides what is not delta in a BSDF, without bias", "[mixture]") {

@@ -333,7 +333,7 @@ typename path_guider<Exec, Guide>::view_type path_guider<Exec, Guide>::prepare(s
                                                                                const Caster& caster) {
   static_assert(Guide::records_paths, "Guide: prepare(depth, caster) needs a guide that reads paths");
   // Without it the recorder has no place for vertices, and every wave would be empty.
-  require(options_.records_waves, "records_waves", options_.records_waves,
+  require(options_.records_waves, "records_waves", "false",
           "true, for prepare(depth, caster) to know the wave");
   wave_recorder<Exec>& vertices = recorder_.wave();
   const auto view = prepare(

@@ -240,7 +240,7 @@ struct follow_path {
     if (!surface.active) return;
     recorder.scatter(path, depth, d);
     surface.active = d.pdf > 0.0f && hashed_numbers{seed}(path, 2).x < World::survival;
-    if (!surface.active) return recorder.ended(path);
+    if (!surface.active) return;
     step.throughput *= surface.bsdf.eval(surface.outgoing, d.direction) / (World::survival * d.pdf);
     wfpg::ray ray;
     ray.origin = surface.position;

@@ -72,7 +72,6 @@ class openpgl_recorder {
 
   // drawn() and emission() record the data of these.
   void scatter(std::uint32_t, std::uint32_t, const wfpg::sampled_direction&) const {}
-  void ended(std::uint32_t) const {}
   void escape(std::uint32_t, std::uint32_t, vec3) const {}
 
   /// Records the direction from vertex `depth`, a point on surface s.

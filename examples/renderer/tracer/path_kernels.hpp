@@ -282,7 +282,6 @@ struct shade_paths {
       const bool goes_on = scatter(vertices[id], directions[slot], path) &&
                            survive_roulette(path, at.draw(id, dimension::roulette).x);
       path.active = goes_on ? 1 : 0;
-      if (!goes_on) recorder.ended(id);
     });
   }
 

@@ -25,8 +25,9 @@ inline std::vector<wfpg::emitting_triangle> emitters_of(const scene& host) {
 
 /// Whether there are surfaces through which next-event estimation finds no lights.
 inline bool has_smooth_surfaces(const scene& host) {
-  return std::any_of(host.materials.begin(), host.materials.end(),
-                     [](const material& m) { return is_smooth(m.kind); });
+  return std::any_of(host.materials.begin(), host.materials.end(), [](const material& m) {
+    return is_smooth(m.kind) || m.kind == material_kind::smooth_plastic;
+  });
 }
 
 /// Continues light at smooth materials. A Caster finds triangles inside kernels.

@@ -7,7 +7,8 @@
 //
 // Source: Yalçıner & Akyüz, "Path Guiding for Wavefront Path Tracing", 2024, Eq. 5. Recording in part, and
 // recording directions so that kept fields learn from paths, are wfpg's own.
-// Cost: a call writes at most 52 bytes, and uses an atomic only where it is dropped.
+// Cost: a call writes at most 80 bytes, and 48 for each depth that is left out. It uses an atomic only where
+// it is dropped or follows a gap.
 // Memory: 40 bytes a vertex, 48 with directions, and 4 a recorded path. A recorded path has room for
 // max_depth vertices.
 #pragma once
@@ -59,8 +60,10 @@ struct alignas(8) recorded_direction {
 /// paths need it. The direction that led to a gap teaches nothing. All else is learnt as without it. Gaps are
 /// counted.
 ///
+/// A split path divides its light: add what branches of other indices find to the parent with radiance().
+///
 /// **Passes.** A sample may have several passes of the host, if no path index is used twice before
-/// end_sample(). A sample that the host throws away is begun again without end_sample(): nothing is learnt.
+/// end_sample(). Where the host begins a sample again without end_sample(), its paths teach nothing.
 ///
 /// Calls for paths that this sample does not record are ignored. They do not count as dropped. O(1) a call.
 ///
@@ -108,9 +111,6 @@ class path_recorder_view {
   /// Records the unit direction in which the path leaves vertex `depth`, which must be its last so far. The
   /// guide learns from it what the direction finds. `field`: number of the field in the mixture that drew it,
   /// or no_field, as for delta lobes. Ignored where directions are not recorded.
-  ///
-  /// A path that is not heard of again has found nothing in this direction, so that a host without an
-  /// environment needs no escape(). Where roulette ends the path after this call, say so with ended().
   WFPG_HD void scatter(std::size_t path, std::uint32_t depth, vec3 direction, std::uint32_t field) const {
     std::uint32_t place;
     if (!learns() || !find(path, place)) return;
@@ -124,13 +124,6 @@ class path_recorder_view {
     if (drawn.technique != sampling_technique::none) scatter(path, depth, drawn.direction, drawn.field);
   }
 
-  /// Records that the host ended the path, as by Russian roulette, after scatter() of its last vertex. What
-  /// comes from that direction is then unknown, not dark. Ignored where directions are not recorded.
-  WFPG_HD void ended(std::size_t path) const {
-    std::uint32_t place;
-    if (learns() && find(path, place)) lengths_[place] |= open_end;
-  }
-
   /// Records that the path left the scene: the environment becomes its vertex `depth`, the last one. Call it
   /// for dark environments too, so that guides learn that no light comes from there. `throughput` is the
   /// path's as it leaves the scene. Report the environment's radiance with emission(). Ignored where
@@ -138,8 +131,10 @@ class path_recorder_view {
   WFPG_HD void escape(std::size_t path, std::uint32_t depth, vec3 throughput) const {
     std::uint32_t place;
     if (!learns() || depth == 0 || !find(path, place)) return;
-    if (depth != length_of_surfaces(place)) return drop();
-    if (depth >= max_depth_) return;
+    const std::uint32_t length = length_of_surfaces(place);
+    if (length == ~0u || depth < length) return drop();
+    // From a medium: what the last direction finds is not known.
+    if (depth > length || depth >= max_depth_) return;
     light_[depth * recorded_ + place] = {throughput, vec3(0.0f)};
     lengths_[place] = (depth + 1) | escaped | (lengths_[place] & gaps);
   }
@@ -172,7 +167,8 @@ class path_recorder_view {
     vec3 known(0.0f);
     const std::uint32_t length = lengths_[place] & length_mask;
     for (std::uint32_t i = 0; i < length; ++i) known += light_[i * recorded_ + place].contribution;
-    add(place, depth, glm::max(sum - known, vec3(0.0f)));
+    // Light of a medium counts for the surface before.
+    if (length > 0) add(place, min(depth, length - 1u), glm::max(sum - known, vec3(0.0f)));
   }
   /// Adds the growth of a path's radiance that is a number.
   WFPG_HD void total(std::size_t path, std::uint32_t depth, float sum) const {
@@ -189,8 +185,6 @@ class path_recorder_view {
     if (!find(path, place)) return;
     const std::uint32_t length = lengths_[place] & length_mask;
     if (include_emission_ && depth < length) return add(place, depth, contribution);
-    // What is found without a vertex is no vertex' own: fields cannot learn how much arrived.
-    if (depth >= length) lengths_[place] |= open_end;
     const std::uint32_t before = min(depth, length);
     if (before > 0) add(place, before - 1, contribution);
   }
@@ -205,10 +199,8 @@ class path_recorder_view {
   friend class path_recorder;
   friend class recorded_path;
 
-  // Flags in a path's length. Its last vertex is the environment; some of its vertices are gaps; what its
-  // last direction finds is not known, since the host ended it there or found light that no vertex has.
-  static constexpr std::uint32_t escaped = 0x80000000u, gaps = 0x40000000u, open_end = 0x20000000u;
-  static constexpr std::uint32_t length_mask = open_end - 1u;
+  // Flags in a path's length: its last vertex is the environment; some of its vertices are gaps.
+  static constexpr std::uint32_t escaped = 0x80000000u, gaps = 0x40000000u, length_mask = gaps - 1u;
   // Indices of counters_.
   enum : std::uint32_t { counter_dropped, counter_gaps, counters };
 
@@ -281,8 +273,6 @@ struct no_path_recorder {
   WFPG_HD void scatter(std::size_t, std::uint32_t, const sampled_direction&) const {}
   /// Does nothing; see path_recorder_view::scatter().
   WFPG_HD void scatter(std::size_t, std::uint32_t, vec3, std::uint32_t) const {}
-  /// Does nothing; see path_recorder_view::ended().
-  WFPG_HD void ended(std::size_t) const {}
   /// Does nothing; see path_recorder_view::escape().
   template <class Light>
   WFPG_HD void escape(std::size_t, std::uint32_t, Light) const {}
@@ -301,7 +291,7 @@ struct no_path_recorder {
 };
 
 /// What a path_recorder records.
-struct path_recorder_options {
+struct path_recorder_settings {
   std::size_t paths = 0;        ///< most paths of a sample, below 2^32 - 1
   std::uint32_t max_depth = 8;  ///< most vertices of a path, at least 1
   /// Emitters' own radiance counts as leaving them, so that guiding looks for emitters. Unset it where
@@ -318,20 +308,20 @@ class path_recorder {
  public:
   /// A recorder of no paths. It may be assigned to.
   path_recorder() = default;
-  /// A recorder without paths yet. Until the first begin_sample() it records all of `options`' paths. Throws
+  /// A recorder without paths yet. Until the first begin_sample() it records all of `settings`' paths. Throws
   /// out_of_memory.
-  path_recorder(const Exec& exec, const path_recorder_options& options)
-      : lengths_(exec, detail::recorded_runs{options.fraction_shift}.size(options.paths)),
-        places_(exec, lengths_.size() * options.max_depth),
-        light_(exec, lengths_.size() * options.max_depth),
-        directions_(exec, options.directions ? lengths_.size() * options.max_depth : 0),
+  path_recorder(const Exec& exec, const path_recorder_settings& settings)
+      : lengths_(exec, detail::recorded_runs{settings.fraction_shift}.size(settings.paths)),
+        places_(exec, lengths_.size() * settings.max_depth),
+        light_(exec, lengths_.size() * settings.max_depth),
+        directions_(exec, settings.directions ? lengths_.size() * settings.max_depth : 0),
         counters_(exec, path_recorder_view::counters),
-        wave_(exec, options.waves ? options.paths : 0) {
-    view_.paths_ = options.paths;
+        wave_(exec, settings.waves ? settings.paths : 0) {
+    view_.paths_ = settings.paths;
     view_.recorded_ = lengths_.size();
-    view_.runs_.shift = options.fraction_shift;
-    view_.max_depth_ = options.max_depth;
-    view_.include_emission_ = options.include_emission;
+    view_.runs_.shift = settings.fraction_shift;
+    view_.max_depth_ = settings.max_depth;
+    view_.include_emission_ = settings.include_emission;
     view_.lengths_ = lengths_.data();
     view_.places_ = places_.data();
     view_.light_ = light_.data();
@@ -380,7 +370,7 @@ class path_recorder {
     return read_element(exec, counters_.data() + path_recorder_view::counter_gaps);
   }
 
-  /// The last vertices of all paths; of no paths where the options leave waves out.
+  /// The last vertices of all paths; of no paths where the settings leave waves out.
   wave_recorder<Exec>& wave() { return wave_; }
 
  private:

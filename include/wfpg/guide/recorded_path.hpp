@@ -11,10 +11,10 @@
 
 namespace wfpg {
 
-/// One recorded path, for guides to read. Its vertices are the surfaces that it met, in order. The
-/// environment is the last vertex if escape() recorded it. Valid until the recorder's begin_sample() or
-/// clear(). Precondition of members with a `depth`: it is below vertices(), or surfaces() where they say
-/// "surface".
+/// One recorded path, for guides to read. Its vertices are the surfaces that it met, in order, and gaps where
+/// depths were left out. Position, outgoing direction and direction of a gap mean nothing. The environment is
+/// the last vertex if escape() recorded it. Valid until the recorder's begin_sample() or clear().
+/// Precondition of members with a `depth`: it is below vertices(), or surfaces() where they say "surface".
 class recorded_path {
  public:
   /// Reads path `place` of the recorded ones, in [0, path_recorder::recorded()).
@@ -35,20 +35,13 @@ class recorded_path {
   WFPG_HD bool is_gap(std::uint32_t depth) const {
     return (flags_ & path_recorder_view::gaps) != 0 && paths_.places_[slot(depth)].outgoing == 0;
   }
-  /// Number of surfaces that are not gaps. O(1) for a path without gaps.
+  /// Number of surfaces that are not gaps.
+  /// O(1) for a path without gaps, else it reads all vertices.
   WFPG_HD std::uint32_t known_surfaces() const {
     if ((flags_ & path_recorder_view::gaps) == 0) return surfaces_;
     std::uint32_t n = 0;
     for (std::uint32_t depth = 0; depth < surfaces_; ++depth) n += is_gap(depth) ? 0u : 1u;
     return n;
-  }
-  /// Whether the path went on from its last surface and found nothing.
-  /// It has a direction from there, and the recorder heard of no vertex and of no light beyond.
-  /// False where the recorder had no room for a next vertex.
-  /// Precondition: the recorder records directions, and surfaces() is positive.
-  WFPG_HD bool found_nothing() const {
-    return flags_ == (flags_ & path_recorder_view::gaps) && vertices_ < paths_.max_depth_ &&
-           paths_.directions_[slot(surfaces_ - 1)].direction != 0;
   }
 
   /// Position of a surface, world space. It is what the renderer recorded, so it may be not finite.
@@ -81,11 +74,13 @@ class recorded_path {
   }
 
  private:
+  // Vertices of one depth lie side by side.
   /// Index of a vertex in the recorder's arrays.
   /// Neighbouring paths are neighbours in memory.
   WFPG_HD std::size_t slot(std::uint32_t depth) const { return depth * paths_.recorded_ + place_; }
 
   // What is read, and which path of it.
+  // The recorder's arrays, and the path's place in them.
   path_recorder_view paths_;
   std::size_t place_;
   // These differ by one where the last vertex is the environment, which is no surface.

@@ -35,6 +35,7 @@ struct sampling_options {
   std::uint32_t max_depth = 8;
   /// The recorder keeps the last vertex of each path, for path_guider::prepare(depth, caster). 28 bytes a
   /// path of max_paths.
+  /// Each wave then has max_paths rays, so leave max_rays unset.
   bool records_waves = false;
   /// Most rays of a wave, less than 2^32 - 1. Larger waves throw std::invalid_argument. Unset: max_paths.
   std::optional<std::size_t> max_rays;

@@ -46,10 +46,10 @@ struct glossy_part {
   /// delta. The part is all of the BSDF, with the GGX roughness that has this density at normal incidence:
   /// pdf = 1 / (4 pi alpha^2). A cosine lobe has at most 1/pi there, and alpha is then at least 1/2, so it
   /// keeps its guide. A diffuse BSDF under a thin coat is guided less than by its true part.
-  /// A density that is not positive gives none(). Source: Heitz 2018, "Sampling the GGX Distribution of
-  /// Visible Normals".
+  /// A density that is not positive, or not finite, gives none(). Source: Heitz 2018, "Sampling the GGX
+  /// Distribution of Visible Normals".
   WFPG_HD static glossy_part unknown(float pdf_at_mirror) {
-    if (!(pdf_at_mirror > 0.0f)) return none();
+    if (!is_finite(pdf_at_mirror) || !(pdf_at_mirror > 0.0f)) return none();
     return {1.0f, min(0.28209479f / std::sqrt(pdf_at_mirror), 1.0f)};
   }
 };
@@ -141,6 +141,7 @@ inline constexpr bool has_glossy_part_v = detail::has_glossy_part<B>::value;
 /// True where B can also draw the narrow part and the rest separately:
 ///   bsdf_sample sample_part(bool glossy, vec3 outgoing, vec2 u) const;
 ///   float pdf_part(bool glossy, vec3 outgoing, vec3 incident) const;      of sample_part(), per steradian
+/// A delta lobe's pdf is its probability: in the part for sample_part(), in the whole BSDF for sample().
 /// With the part's fraction p, p · pdf_part(true, ...) + (1 - p) · pdf_part(false, ...) is pdf(...).
 // clang-format on
 template <class B>

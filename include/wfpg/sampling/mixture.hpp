@@ -148,7 +148,8 @@ struct basic_guide_mixture {
       return result;
     }
     // The technique's number chooses among three intervals: the guide's, the narrow part's, the rest's.
-    const bool is_narrow = u_technique < parts.guide + parts.glossy;
+    // Where there is no rest, rounding must not choose it.
+    const bool is_narrow = u_technique < parts.guide + parts.glossy || !(parts.smooth > 0.0f);
     const bsdf_sample drawn = draw(s, is_narrow, u);
     // The whole sample fails: drawing again from the guide would change the density.
     if (!is_drawn(drawn)) return {};

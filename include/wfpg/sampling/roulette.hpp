@@ -49,13 +49,14 @@ struct roulette_window {
 /// So the picture is unbiased, whatever the guide expects.
 ///
 /// `throughput`: luminance of the path's, as it reaches the vertex. `radiance`: luminance that the guide
-/// expects to leave the vertex toward the path's origin, W/(m² sr), as exitance_cache_view::read() has it.
-/// `pixel`: an estimate of the pixel's luminance, such as its mean so far, or a blurred one. The result is 1
-/// where one of them is NaN, infinite or negative, or `pixel` is 0.
+/// expects to leave the vertex toward the path's origin, W/(m² sr). exitance_cache_view::radiance() has it,
+/// negative where it is not known. `pixel`: an estimate of the pixel's luminance, such as its mean so far, or
+/// a blurred one. The result is 1 where one of them is NaN, infinite or negative, or `pixel` is 0.
 WFPG_HD inline float guided_survival(float throughput, float radiance, float pixel,
                                      const roulette_window& window = {}) {
   const float expected = throughput * radiance;
-  const bool known = is_finite(expected) && expected >= 0.0f && is_finite(pixel) && pixel > 0.0f;
+  const bool known =
+      is_finite(expected) && throughput >= 0.0f && radiance >= 0.0f && is_finite(pixel) && pixel > 0.0f;
   if (!known) return 1.0f;
   return clamp(0.5f * (1.0f + window.width) * expected / pixel, window.least, 1.0f);
 }

@@ -13,7 +13,7 @@ enum class sampling_technique : std::uint32_t {
   none,   ///< nothing: the ray is inactive, or sampling failed; the path ends
   bsdf,   ///< the BSDF, alone or in a mixture
   guide,  ///< the guide: its field or product
-  delta,  ///< a delta BSDF; `pdf` is the probability of its lobe
+  delta,  ///< a delta lobe; `pdf` is its probability in the mixture
 };
 
 /// Stands for a field's number where there is no field.

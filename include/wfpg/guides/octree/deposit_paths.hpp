@@ -3,7 +3,7 @@
 //
 // Source: Yalciner and Akyuz (2024), Eq. 5. Learning fields are wfpg's own.
 //
-// Depths that the host left out are skipped. A direction whose path found nothing teaches a radiance of 0.
+// Depths that the host left out are skipped: what leaves them is not known.
 //
 // Cost: O(paths * depth), one thread a path. Memory: none beside the queues of the cache and of the fields.
 #pragma once
@@ -30,14 +30,9 @@ struct deposit_path {
     const std::uint32_t vertices = path.vertices(), surfaces = path.surfaces();
     if (surfaces == 0) return;
     const std::uint32_t known = path.known_surfaces(), first = cache.reserve(known);
-    // Fields learn along the directions between vertices, of which there is one fewer, and that a last
-    // direction found nothing.
-    const bool ends_dark = !learnt.empty() && path.found_nothing();
-    const std::uint32_t found = learnt.empty() ? 0 : vertices - 1 + (ends_dark ? 1u : 0u);
+    // Fields learn along the directions between vertices, of which there is one fewer.
+    const std::uint32_t found = learnt.empty() ? 0 : vertices - 1;
     const std::uint32_t first_found = found > 0 ? learnt.reserve(found) : 0;
-    if (ends_dark)
-      learnt.write(first_found + vertices - 1, path.field(vertices - 1), path.direction(vertices - 1), 0.0f);
-    // From the last vertex back, light is summed and entries are filled.
     vec3 arriving(0.0f);
     std::uint32_t entry = first + known;
     // From the last vertex back: `arriving` sums the contributions at this vertex and after.
