@@ -7,6 +7,7 @@
 
 #include <wfpg/path_guider.hpp>
 #include <wfpg/sampling/roulette.hpp>
+#include <wfpg/testing/statistics.hpp>
 
 #include <glm/vec4.hpp>
 
@@ -16,6 +17,7 @@
 
 using namespace wfpg_test;
 using glm::vec4;
+using wfpg::testing::sample_mean;
 
 namespace {
 
@@ -173,9 +175,9 @@ struct shade {
 
 constexpr std::uint32_t path_count = 4096, host_depth = 5;
 
-/// Mean radiance of the picture in each sample.
+/// Mean radiance of the picture, of each sample.
 template <class Exec>
-std::vector<double> render(const room& in, std::uint32_t samples, bool guided, bool forgets_guide = false) {
+sample_mean render(const room& in, std::uint32_t samples, bool guided, bool forgets_guide = false) {
   const Exec exec;
   const box_mesh<Exec> mesh(exec);
   wfpg::kept_guide_options options;
@@ -184,7 +186,7 @@ std::vector<double> render(const room& in, std::uint32_t samples, bool guided, b
   options.records_waves = true;
   options.unguided_samples = guided ? 1 : samples;
   wfpg::path_guider<Exec> guider(exec, mesh.view(), options);
-  std::vector<double> means;
+  sample_mean means;
   for (std::uint32_t sample = 0; sample < samples; ++sample) {
     std::vector<host_path> camera(path_count);
     random_numbers random(100);  // pixels are the same in each sample
@@ -206,7 +208,7 @@ std::vector<double> render(const room& in, std::uint32_t samples, bool guided, b
     guider.end_sample();
     double sum = 0.0;
     for (const host_path& path : paths.to_host(exec)) sum += double(path.radiance);
-    means.push_back(sum / path_count);
+    means.add(sum / path_count);
   }
   if (guided) {
     const wfpg::guider_statistics counted = guider.statistics();
@@ -217,42 +219,28 @@ std::vector<double> render(const room& in, std::uint32_t samples, bool guided, b
   return means;
 }
 
-struct mean_and_error {
-  double mean, error;
-  explicit mean_and_error(const std::vector<double>& values) {
-    double sum = 0.0, squares = 0.0;
-    for (const double v : values) {
-      sum += v;
-      squares += v * v;
-    }
-    const double n = double(values.size());
-    mean = sum / n;
-    error = std::sqrt((squares / n - mean * mean) / n);
-  }
-};
-
-double distance_in_errors(const mean_and_error& a, const mean_and_error& b, double factor = 1.0) {
-  return std::fabs(a.mean - factor * b.mean) / std::hypot(a.error, factor * b.error);
+double distance_in_errors(const sample_mean& a, const sample_mean& b, double factor = 1.0) {
+  return std::fabs(a.mean() - factor * b.mean()) / std::hypot(a.error(), factor * b.error());
 }
 
 WFPG_TEST_CASE("kernel host: fog and coats leave no bias, and no call is dropped", "[kernel_host]") {
   const room in{0.2f, true};
-  const mean_and_error plain(render<Exec>(in, 400, false)), guided(render<Exec>(in, 200, true)),
-      faulty(render<Exec>(in, 200, true, true));
-  INFO("unguided " << plain.mean << " +- " << plain.error << ", guided " << guided.mean << " +- "
-                   << guided.error << ", faulty " << faulty.mean << " +- " << faulty.error);
+  const sample_mean plain = render<Exec>(in, 400, false), guided = render<Exec>(in, 200, true),
+                    faulty = render<Exec>(in, 200, true, true);
+  INFO("unguided " << plain.mean() << " +- " << plain.error() << ", guided " << guided.mean() << " +- "
+                   << guided.error() << ", faulty " << faulty.mean() << " +- " << faulty.error());
   CHECK(distance_in_errors(guided, plain) < 4.0);
   CHECK(distance_in_errors(guided, plain, 1.05) > 4.0);
   CHECK(distance_in_errors(faulty, plain) > 4.0);
 }
 
 WFPG_TEST_CASE("kernel host: guiding gains where fields know all light", "[kernel_host]") {
-  const mean_and_error plain(render<Exec>({}, 200, false)), guided(render<Exec>({}, 100, true));
-  INFO("unguided " << plain.mean << " +- " << plain.error << ", guided " << guided.mean << " +- "
-                   << guided.error);
+  const sample_mean plain = render<Exec>({}, 200, false), guided = render<Exec>({}, 100, true);
+  INFO("unguided " << plain.mean() << " +- " << plain.error() << ", guided " << guided.mean() << " +- "
+                   << guided.error());
   CHECK(distance_in_errors(guided, plain) < 4.0);
   // At equal samples the variance is a third, or less.
-  CHECK(guided.error * guided.error / 2.0 < plain.error * plain.error / 3.0);
+  CHECK(guided.error() * guided.error() / 2.0 < plain.error() * plain.error() / 3.0);
 }
 
 }  // namespace

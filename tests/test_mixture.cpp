@@ -8,6 +8,7 @@
 
 #include <wfpg/sampling/mixture.hpp>
 #include <wfpg/sampling/roulette.hpp>
+#include <wfpg/testing/statistics.hpp>
 
 #include <array>
 #include <cmath>
@@ -83,20 +84,12 @@ double reflected(const Bsdf& bsdf, vec3 outgoing) {
   return sum * 4.0 * double(wfpg::pi) / (rows * columns);
 }
 
-/// Mean and standard error of values.
-struct estimate {
-  double mean = 0.0, error = 0.0;
+/// The mean of values, and how far it lies off an exact one in standard errors.
+struct estimate : wfpg::testing::sample_mean {
   explicit estimate(const std::vector<float>& values) {
-    double sum = 0.0, squares = 0.0;
-    for (const float v : values) {
-      sum += double(v);
-      squares += double(v) * double(v);
-    }
-    const double n = double(values.size());
-    mean = sum / n;
-    error = std::sqrt((squares / n - mean * mean) / n);
+    for (const float v : values) add(double(v));
   }
-  double deviation(double exact) const { return (mean - exact) / error; }
+  double deviation(double exact) const { return (mean() - exact) / error(); }
 };
 
 constexpr std::size_t many = 1u << 20;
@@ -104,13 +97,13 @@ constexpr std::size_t many = 1u << 20;
 /// Whether an estimate agrees with the exact value, and could tell it from one that is 1% off.
 void check_unbiased(const std::vector<float>& values, double exact) {
   const estimate found(values);
-  INFO("exact " << exact << ", found " << found.mean << " +- " << found.error);
+  INFO("exact " << exact << ", found " << found.mean() << " +- " << found.error());
   CHECK(std::abs(found.deviation(exact)) < 4.0);
   CHECK(std::abs(found.deviation(1.01 * exact)) > 4.0);
 }
 void check_biased(const std::vector<float>& values, double exact) {
   const estimate found(values);
-  INFO("exact " << exact << ", found " << found.mean << " +- " << found.error);
+  INFO("exact " << exact << ", found " << found.mean() << " +- " << found.error());
   CHECK(std::abs(found.deviation(exact)) > 4.0);
 }
 

@@ -33,6 +33,15 @@ struct sample_view {
   }
 };
 
+template <class Exec>
+std::vector<sampled_direction> sample_from(const Exec& exec, const wfpg::guide_view& view,
+                                           const stored_surfaces& stored) {
+  const std::size_t n = stored.surfaces.size();
+  const wfpg::buffer<sampled_direction, Exec> directions(exec, n);
+  exec.for_each(n, sample_view{view, stored, hashed_numbers{}, directions.view()});
+  return directions.to_host(exec);
+}
+
 template <class Exec, class Caster>
 std::vector<sampled_direction> sample_prepared(guided_box<Exec>& box,
                                                const wfpg::buffer<test_surface, Exec>& surfaces,
@@ -40,9 +49,7 @@ std::vector<sampled_direction> sample_prepared(guided_box<Exec>& box,
   const stored_surfaces stored{const_view<test_surface>(surfaces)};
   const wfpg::guide_view view =
       box.guider.prepare(wfpg::wave{depth, surfaces.size(), stored, hashed_numbers{}}, caster);
-  const wfpg::buffer<sampled_direction, Exec> directions(box.exec, surfaces.size());
-  box.exec.for_each(surfaces.size(), sample_view{view, stored, hashed_numbers{}, directions.view()});
-  return directions.to_host(box.exec);
+  return sample_from(box.exec, view, stored);
 }
 
 WFPG_TEST_CASE("path guider: both forms sample the same directions, bit for bit", "[path_guider]") {
@@ -90,9 +97,7 @@ std::vector<sampled_direction> sample_recorded(guided_box<Exec>& box,
   const stored_surfaces stored{const_view<test_surface>(surfaces)};
   box.exec.for_each(surfaces.size(), record_wave{box.guider.recorder(), stored, depth});
   const wfpg::guide_view view = box.guider.prepare(depth, box_caster{});
-  const wfpg::buffer<sampled_direction, Exec> directions(box.exec, surfaces.size());
-  box.exec.for_each(surfaces.size(), sample_view{view, stored, hashed_numbers{}, directions.view()});
-  return directions.to_host(box.exec);
+  return sample_from(box.exec, view, stored);
 }
 
 WFPG_TEST_CASE("path guider: a wave that the recorder knows samples as a wave of surfaces", "[path_guider]") {

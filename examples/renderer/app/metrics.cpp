@@ -54,7 +54,7 @@ pixel_error error_where_finite(vec3 test, vec3 reference) {
   return {infinite, infinite, infinite, infinite, infinite};
 }
 
-/// The mean without the largest `share` of the values. Reorders them.
+/// The mean without the largest `fraction` of the values. Reorders them.
 double trimmed_mean(std::vector<double>& values, double fraction) {
   const auto dropped = static_cast<std::size_t>(fraction * static_cast<double>(values.size()));
   const auto first_kept = values.begin() + static_cast<std::ptrdiff_t>(dropped);

@@ -15,8 +15,8 @@ struct image_error {
   double relmse = 0.0;          ///< (t - r)² / (r² + 0.01)
   double relmse_trimmed = 0.0;  ///< relmse without the worst 0.1% of the pixels (rounded down)
   double relmse_robust = 0.0;   ///< relmse without the worst 0.01% of the pixels (rounded down)
-  double worst_share =
-      0.0;  ///< the fraction of relmse's sum in those pixels, in [0, 1]; 1 if relmse is infinite
+  /// The fraction of relmse's sum in those pixels, in [0, 1]; 1 if relmse is infinite.
+  double worst_share = 0.0;
   double mse_reinhard = 0.0;   ///< (t' - r')² with c' = c / (1 + c), negative values taken as 0
   double mae = 0.0;            ///< |t - r|
   double smape = 0.0;          ///< |t - r| / (|t| + |r| + 0.01)

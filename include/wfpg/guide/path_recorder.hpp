@@ -49,6 +49,18 @@ struct alignas(8) recorded_direction {
 
 }  // namespace detail
 
+/// Throughput or radiance of a path: linear RGB, or a number where a host has no colours. The guide uses its
+/// luminance alone. A spectral host gives the mean of its wavelengths' values, or the luminance. A path uses
+/// one of the two forms throughout.
+struct path_light {
+  vec3 rgb;
+
+  /// A colour, linear RGB.
+  WFPG_HD path_light(vec3 colour) : rgb(colour) {}
+  /// A luminance: the grey of that number.
+  WFPG_HD path_light(float number) : rgb(number) {}
+};
+
 /// View of the recorder for kernels. Trivially copyable. A default-constructed view ignores all calls.
 /// Precondition: calls for one path come from one thread at a time, with vertices in order of depth. A call
 /// is dropped and counted in these cases:
@@ -66,9 +78,6 @@ struct alignas(8) recorded_direction {
 /// end_sample(). Where the host begins a sample again without end_sample(), its paths teach nothing.
 ///
 /// Calls for paths that this sample does not record are ignored. They do not count as dropped. O(1) a call.
-///
-/// Throughput and radiance are linear RGB, or a number: the guide only uses luminance. A spectral host gives
-/// the mean of its wavelengths' values, or the luminance. One path uses one of the two forms throughout.
 class path_recorder_view {
  public:
   /// Capacity in paths: valid path indices are [0, paths()), recorded or not.
@@ -80,7 +89,7 @@ class path_recorder_view {
   /// the unit direction toward the previous vertex. `throughput` is the path's before this vertex's BSDF,
   /// linear RGB: 1 at the camera's first hit.
   WFPG_HD void vertex(std::size_t path, std::uint32_t depth, vec3 position, vec3 outgoing,
-                      vec3 throughput) const {
+                      path_light throughput) const {
     std::uint32_t place;
     if (!find(path, place)) return;
     const std::uint32_t flags = lengths_[place], length = flags & length_mask;
@@ -88,24 +97,16 @@ class path_recorder_view {
     if (!in_order || !is_direction(outgoing)) return drop();
     for (std::uint32_t gap = length; gap < depth; ++gap) write_vertex(place, gap, {}, {});
     if (depth > length) atomic_add(counters_ + counter_gaps, 1);
-    write_vertex(place, depth, {position, pack_marked(outgoing)}, {throughput, vec3(0.0f)});
+    write_vertex(place, depth, {position, pack_marked(outgoing)}, {throughput.rgb, vec3(0.0f)});
     lengths_[place] = (depth + 1) | (depth > length ? gaps : flags & gaps);
   }
   /// Records a vertex for path_guider::prepare(depth, caster) as well: all that a host says of a hit.
   /// `normal`: shading normal on either side, unit length. `transmits`: light can come from below it. Leave
   /// it out for surfaces whose BSDF is delta in all lobes: they are not guided.
-  template <class Throughput>
   WFPG_HD void vertex(std::size_t path, std::uint32_t depth, vec3 position, vec3 outgoing, vec3 normal,
-                      bool transmits, Throughput throughput) const {
+                      bool transmits, path_light throughput) const {
     wave_.record(path, depth, position, glm::dot(normal, outgoing) >= 0.0f ? normal : -normal, transmits);
     vertex(path, depth, position, outgoing, throughput);
-  }
-
-  /// Records a vertex whose throughput is a number.
-  /// As luminance, each channel of the colour is that number.
-  WFPG_HD void vertex(std::size_t path, std::uint32_t depth, vec3 position, vec3 outgoing,
-                      float throughput) const {
-    vertex(path, depth, position, outgoing, vec3(throughput));
   }
 
   /// Records the unit direction in which the path leaves vertex `depth`, which must be its last so far. The
@@ -128,51 +129,37 @@ class path_recorder_view {
   /// for dark environments too, so that guides learn that no light comes from there. `throughput` is the
   /// path's as it leaves the scene. Report the environment's radiance with emission(). Ignored where
   /// directions are not recorded, and at the depth max_depth().
-  WFPG_HD void escape(std::size_t path, std::uint32_t depth, vec3 throughput) const {
+  WFPG_HD void escape(std::size_t path, std::uint32_t depth, path_light throughput) const {
     std::uint32_t place;
     if (!learns() || depth == 0 || !find(path, place)) return;
     const std::uint32_t length = length_of_surfaces(place);
     if (length == ~0u || depth < length) return drop();
     // From a medium: what the last direction finds is not known.
     if (depth > length || depth >= max_depth_) return;
-    light_[depth * recorded_ + place] = {throughput, vec3(0.0f)};
+    light_[depth * recorded_ + place] = {throughput.rgb, vec3(0.0f)};
     lengths_[place] = (depth + 1) | escaped | (lengths_[place] & gaps);
-  }
-
-  /// Records that the path left the scene, with a throughput that is a number.
-  WFPG_HD void escape(std::size_t path, std::uint32_t depth, float throughput) const {
-    escape(path, depth, vec3(throughput));
   }
 
   /// Adds radiance that vertex `depth` scatters toward the path's origin. Next-event estimation reports its
   /// result with it. `contribution` is the radiance as it arrives at the origin, linear RGB: it includes
   /// throughput, BSDF and MIS weight. May be called several times a vertex.
-  WFPG_HD void radiance(std::size_t path, std::uint32_t depth, vec3 contribution) const {
+  WFPG_HD void radiance(std::size_t path, std::uint32_t depth, path_light contribution) const {
     std::uint32_t place;
-    if (find(path, place)) add(place, depth, contribution);
-  }
-  /// Adds scattered radiance that is a number.
-  /// It is a luminance, or the mean of a spectrum.
-  WFPG_HD void radiance(std::size_t path, std::uint32_t depth, float contribution) const {
-    radiance(path, depth, vec3(contribution));
+    if (find(path, place)) add(place, depth, contribution.rgb);
   }
 
   /// Adds what the path's radiance has grown by since what is recorded of it, as scattered by vertex `depth`.
   /// For hosts that add light to their paths in other kernels. `sum` is all radiance that the path has
   /// brought to its origin so far. O(depth): it adds up what the path's vertices have. The sum may shrink by
   /// rounding, and a difference below 0 counts as 0.
-  WFPG_HD void total(std::size_t path, std::uint32_t depth, vec3 sum) const {
+  WFPG_HD void total(std::size_t path, std::uint32_t depth, path_light sum) const {
     std::uint32_t place;
     if (!find(path, place)) return;
     vec3 known(0.0f);
     const std::uint32_t length = lengths_[place] & length_mask;
     for (std::uint32_t i = 0; i < length; ++i) known += light_[i * recorded_ + place].contribution;
     // Light of a medium counts for the surface before.
-    if (length > 0) add(place, min(depth, length - 1u), glm::max(sum - known, vec3(0.0f)));
-  }
-  /// Adds the growth of a path's radiance that is a number.
-  WFPG_HD void total(std::size_t path, std::uint32_t depth, float sum) const {
-    total(path, depth, vec3(sum));
+    if (length > 0) add(place, min(depth, length - 1u), glm::max(sum.rgb - known, vec3(0.0f)));
   }
 
   /// Adds the radiance of an emitter that the path hit as vertex `depth`. Also that of the environment, where
@@ -180,18 +167,13 @@ class path_recorder_view {
   /// path's origin, linear RGB. It counts as scattered by the vertices before. It counts as leaving the
   /// emitter itself too, if sampling_options::include_emission is set and the emitter is a recorded vertex.
   /// Light of a medium may be told so, at any depth beyond the last vertex.
-  WFPG_HD void emission(std::size_t path, std::uint32_t depth, vec3 contribution) const {
+  WFPG_HD void emission(std::size_t path, std::uint32_t depth, path_light contribution) const {
     std::uint32_t place;
     if (!find(path, place)) return;
     const std::uint32_t length = lengths_[place] & length_mask;
-    if (include_emission_ && depth < length) return add(place, depth, contribution);
+    if (include_emission_ && depth < length) return add(place, depth, contribution.rgb);
     const std::uint32_t before = min(depth, length);
-    if (before > 0) add(place, before - 1, contribution);
-  }
-  /// Adds an emitter's radiance that is a number.
-  /// A number and the same number in all channels record alike.
-  WFPG_HD void emission(std::size_t path, std::uint32_t depth, float contribution) const {
-    emission(path, depth, vec3(contribution));
+    if (before > 0) add(place, before - 1, contribution.rgb);
   }
 
  private:
@@ -257,40 +239,33 @@ class path_recorder_view {
 
 /// Stands in for path_recorder_view where a guide reads no paths.
 /// An empty class with empty members, so that kernels compile for both and the compiler removes the calls.
-/// Takes colours and numbers alike.
 struct no_path_recorder {
   /// Returns 0: there is room for no path.
   WFPG_HD std::size_t paths() const { return 0; }
   /// Returns 0: a path has no vertices.
   WFPG_HD std::uint32_t max_depth() const { return 0; }
   /// Does nothing; see path_recorder_view::vertex().
-  template <class Throughput>
-  WFPG_HD void vertex(std::size_t, std::uint32_t, vec3, vec3, Throughput) const {}
+  WFPG_HD void vertex(std::size_t, std::uint32_t, vec3, vec3, path_light) const {}
   /// Does nothing; see path_recorder_view::vertex().
-  template <class Throughput>
-  WFPG_HD void vertex(std::size_t, std::uint32_t, vec3, vec3, vec3, bool, Throughput) const {}
+  WFPG_HD void vertex(std::size_t, std::uint32_t, vec3, vec3, vec3, bool, path_light) const {}
   /// Does nothing; see path_recorder_view::scatter().
   WFPG_HD void scatter(std::size_t, std::uint32_t, const sampled_direction&) const {}
   /// Does nothing; see path_recorder_view::scatter().
   WFPG_HD void scatter(std::size_t, std::uint32_t, vec3, std::uint32_t) const {}
   /// Does nothing; see path_recorder_view::escape().
-  template <class Light>
-  WFPG_HD void escape(std::size_t, std::uint32_t, Light) const {}
+  WFPG_HD void escape(std::size_t, std::uint32_t, path_light) const {}
   /// Does nothing; see path_recorder_view::radiance().
-  template <class Light>
-  WFPG_HD void radiance(std::size_t, std::uint32_t, Light) const {}
+  WFPG_HD void radiance(std::size_t, std::uint32_t, path_light) const {}
   /// Does nothing; see path_recorder_view::total().
-  template <class Light>
-  WFPG_HD void total(std::size_t, std::uint32_t, Light) const {}
+  WFPG_HD void total(std::size_t, std::uint32_t, path_light) const {}
   /// Does nothing; see path_recorder_view::emission().
-  template <class Light>
-  WFPG_HD void emission(std::size_t, std::uint32_t, Light) const {}
+  WFPG_HD void emission(std::size_t, std::uint32_t, path_light) const {}
 
   /// Returns a default view, which ignores all calls, for kernels that take that type.
   WFPG_HD operator path_recorder_view() const { return {}; }
 };
 
-/// What a path_recorder records.
+/// Size of a path_recorder, and which parts of paths it stores.
 struct path_recorder_settings {
   std::size_t paths = 0;        ///< most paths of a sample, below 2^32 - 1
   std::uint32_t max_depth = 8;  ///< most vertices of a path, at least 1

@@ -32,6 +32,7 @@ class recorded_path {
   /// Number of vertices that are surfaces or gaps: depths [0, surfaces()).
   WFPG_HD std::uint32_t surfaces() const { return surfaces_; }
   /// Whether a depth below surfaces() was left out. Nothing else is known of such a vertex.
+  /// A path without gaps answers without reading the vertex.
   WFPG_HD bool is_gap(std::uint32_t depth) const {
     return (flags_ & path_recorder_view::gaps) != 0 && paths_.places_[slot(depth)].outgoing == 0;
   }
@@ -51,6 +52,7 @@ class recorded_path {
     return unpack_direction(paths_.places_[slot(depth)].outgoing);
   }
   /// Throughput of the path before a vertex scatters, linear RGB.
+  /// Grey where the host gave a number.
   WFPG_HD vec3 throughput(std::uint32_t depth) const { return paths_.light_[slot(depth)].throughput; }
   /// What a vertex itself brought to the path's origin, linear RGB: its emission, and the light that
   /// next-event estimation sampled there. Sum the vertices from `depth` on for all that arrives from there.
@@ -74,12 +76,9 @@ class recorded_path {
   }
 
  private:
-  // Vertices of one depth lie side by side.
-  /// Index of a vertex in the recorder's arrays.
-  /// Neighbouring paths are neighbours in memory.
+  /// Index of a vertex in the recorder's arrays. Vertices of one depth lie side by side.
   WFPG_HD std::size_t slot(std::uint32_t depth) const { return depth * paths_.recorded_ + place_; }
 
-  // What is read, and which path of it.
   // The recorder's arrays, and the path's place in them.
   path_recorder_view paths_;
   std::size_t place_;

@@ -36,7 +36,7 @@ struct recorded_surfaces {
   WFPG_HD surface<kernel_bsdf> operator()(std::uint32_t path) const {
     surface<kernel_bsdf> s;
     const std::uint32_t state = states[path];
-    s.active = state != detail::no_wave_vertex && (state & ~detail::wave_transmits) == depth;
+    s.active = detail::is_at_depth(state, depth);
     if (!s.active) return s;
     const detail::wave_place at = places[path];
     s.position = at.position;

@@ -28,14 +28,17 @@ struct alignas(8) wave_place {
 inline constexpr std::uint32_t wave_transmits = 0x80000000u;
 inline constexpr std::uint32_t no_wave_vertex = 0xffffffffu;
 
+/// Whether a state is that of a vertex of this depth.
+WFPG_HD inline bool is_at_depth(std::uint32_t state, std::uint32_t depth) {
+  return state != no_wave_vertex && (state & ~wave_transmits) == depth;
+}
+
 /// Kernel: a path whose vertex has the depth has none afterwards.
 struct forget_vertex {
   std::uint32_t* states;
   std::uint32_t depth;
   WFPG_HD void operator()(std::size_t path) const {
-    const std::uint32_t state = states[path];
-    if (state != detail::no_wave_vertex && (state & ~detail::wave_transmits) == depth)
-      states[path] = detail::no_wave_vertex;
+    if (is_at_depth(states[path], depth)) states[path] = no_wave_vertex;
   }
 };
 

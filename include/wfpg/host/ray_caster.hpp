@@ -81,4 +81,20 @@ inline constexpr bool is_batch_caster_v = detail::is_batch_caster<C, Exec>::valu
 template <class C, class Exec>
 inline constexpr bool is_ray_caster_v = is_inline_caster_v<C> || is_batch_caster_v<C, Exec>;
 
+namespace detail {
+
+/// Casts `rays` with an inline or a batch caster, and writes as many `hits`.
+/// Both arrays lie in the policy's memory.
+/// Allocates nothing by itself, and throws what the caster throws.
+/// A caster that has both forms is called inline, in one kernel with the loop over rays.
+template <class Exec, class Caster>
+void cast_rays(const Exec& exec, const Caster& caster, array_view<const ray> rays, array_view<ray_hit> hits) {
+  if constexpr (is_inline_caster_v<Caster>)
+    exec.for_each(rays.size(), cast_each<Caster>{caster, rays, hits});
+  else
+    caster.cast(exec, rays, hits);
+}
+
+}  // namespace detail
+
 }  // namespace wfpg

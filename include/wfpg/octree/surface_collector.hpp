@@ -5,11 +5,11 @@
 //   surface_collector<Exec> hits(exec, pixels * max_depth);
 //   ...                                           kernels call hits.view().add(slot, position, normal)
 //   const auto samples = hits.samples(exec);
-//   const auto box = bounds_of_samples(exec, array_view<const surface_fragment>(samples.view()));
+//   const auto box = bounds_of_samples(exec, samples.view());
 //   path_guider<Exec> guider(exec, fragments_from_samples(exec, samples.view(), resolution, box), options);
 //
 // Source: none.
-// Cost: a call writes 28 bytes. Memory: 28 bytes a slot, and 36 more a slot while samples() runs.
+// Cost: a call writes 28 bytes. Memory: 28 bytes a slot, and 28 a hit of samples().
 #pragma once
 
 #include <wfpg/base/types.hpp>

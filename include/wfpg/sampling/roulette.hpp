@@ -46,7 +46,7 @@ struct roulette_window {
 /// A path of throughput T that is expected to bring radiance L from here on brings T L to its pixel. It
 /// survives surely where T L is at least 2 / (1 + width) of the pixel's own radiance, and in proportion to it
 /// below. The host ends the path with the rest of the probability, and divides the throughput by the result.
-/// So the picture is unbiased, whatever the guide expects.
+/// The picture is unbiased, whatever the guide expects.
 ///
 /// `throughput`: luminance of the path's, as it reaches the vertex. `radiance`: luminance that the guide
 /// expects to leave the vertex toward the path's origin, W/(m² sr). exitance_cache_view::radiance() has it,

@@ -258,17 +258,5 @@ struct emit_in_leaves {
   }
 };
 
-/// Casts the first n of `rays` with an inline or a batch caster, and writes as many `hits`. Building
-/// records casts at most 2^16 rays at a time, which bounds the memory in flight.
-template <class Exec, class Caster>
-void cast_rays(const Exec& exec, const Caster& caster, const buffer<ray, Exec>& rays,
-               const buffer<ray_hit, Exec>& hits, std::size_t n) {
-  // A caster that has both forms is called inline, in one kernel with the loop over rays.
-  if constexpr (is_inline_caster_v<Caster>)
-    exec.for_each(n, cast_each<Caster>{caster, rays.view(), hits.view()});
-  else
-    caster.cast(exec, array_view<const ray>(rays.data(), n), array_view<ray_hit>(hits.data(), n));
-}
-
 }  // namespace detail
 }  // namespace wfpg

@@ -8,6 +8,7 @@
 #include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/octree/fragments_from_caster.hpp>
 
+#include <thrust/copy.h>
 #include <thrust/scan.h>
 
 #include <cmath>
@@ -191,13 +192,6 @@ struct keep_scan_hits {
   }
 };
 
-/// Copies samples to a larger buffer.
-struct copy_samples {
-  array_view<const surface_fragment> from;
-  array_view<surface_fragment> to;
-  WFPG_HD void operator()(std::size_t i) const { to[i] = from[i]; }
-};
-
 /// Casts lines and collects their hits.
 template <class Exec, class Caster>
 class line_scanner {
@@ -238,7 +232,7 @@ class line_scanner {
     const array_view<scan_line> lines = lines_.view().subview(0, n);
     const array_view<ray_hit> hits = hits_.view().subview(0, 3 * n);
     exec_.for_each(n, write_scan_rays{cube_, lines, rays_.view()});
-    cast(rays_.view().subview(0, 3 * n), hits);
+    cast_rays(exec_, caster_, array_view<const ray>(rays_.data(), 3 * n), hits);
     exec_.for_each(n, read_scan_hits{cube_, lines, hits, found_.view(), counts_.view()});
     ::thrust::inclusive_scan(exec_.thrust(), counts_.data(), counts_.data() + n, counts_.data());
     const std::uint64_t sums = read_element(exec_, counts_.data() + n - 1);
@@ -250,18 +244,11 @@ class line_scanner {
     return static_cast<std::size_t>(sums >> 32);
   }
 
-  void cast(array_view<const ray> rays, array_view<ray_hit> hits) const {
-    if constexpr (is_inline_caster_v<Caster>)
-      exec_.for_each(rays.size(), cast_each<Caster>{caster_, rays, hits});
-    else
-      caster_.cast(exec_, rays, hits);
-  }
-
   /// Grows the samples' buffer by half where it is too small.
   void reserve(std::size_t wanted) {
     if (wanted <= samples_.size()) return;
     buffer<surface_fragment, Exec> larger(exec_, max(wanted, samples_.size() + samples_.size() / 2));
-    exec_.for_each(size_, copy_samples{samples_.view(), larger.view()});
+    ::thrust::copy_n(exec_.thrust(), samples_.data(), size_, larger.data());
     samples_.swap(larger);
   }
 

@@ -231,13 +231,18 @@ inline void require_fragment_count(std::uint64_t n) {
           "less than 2^32 - 1: lower the octree resolution");
 }
 
+/// Union of the boxes f(i), i in [0, n).
+template <class Exec, class F>
+bounds3 union_of_boxes(const Exec& exec, std::size_t n, const F& f) {
+  const ::thrust::counting_iterator<std::size_t> first(0);
+  return ::thrust::transform_reduce(exec.thrust(), first, first + static_cast<std::ptrdiff_t>(n), f,
+                                    bounds3{}, bounds_union());
+}
+
 /// World-space box around the valid triangles; empty without any.
 template <class Exec>
 bounds3 bounds_of(const Exec& exec, triangle_mesh_view mesh) {
-  const ::thrust::counting_iterator<std::size_t> first(0);
-  return ::thrust::transform_reduce(exec.thrust(), first,
-                                    first + static_cast<std::ptrdiff_t>(mesh.triangles.size()),
-                                    triangle_bounds{triangle_reader{mesh, {}}}, bounds3{}, bounds_union());
+  return union_of_boxes(exec, mesh.triangles.size(), triangle_bounds{triangle_reader{mesh, {}}});
 }
 
 /// The position of a sample as a box; an empty box where it is not valid.
@@ -334,11 +339,8 @@ voxel_fragments<Exec> fragments_from_samples(const Exec& exec, array_view<const 
   detail::require_resolution(resolution);
   const std::size_t n = samples.size();
   detail::require_fragment_count(n);
-  const ::thrust::counting_iterator<std::size_t> first(0);
-  const bounds3 box = bounds.empty() ? ::thrust::transform_reduce(
-                                           exec.thrust(), first, first + static_cast<std::ptrdiff_t>(n),
-                                           detail::sample_bounds{samples}, bounds3{}, bounds_union())
-                                     : bounds;
+  const bounds3 box =
+      bounds.empty() ? detail::union_of_boxes(exec, n, detail::sample_bounds{samples}) : bounds;
   const voxel_grid grid = detail::grid_around(box, resolution);
 
   const buffer<std::uint32_t, Exec> counters(exec, std::vector<std::uint32_t>(detail::counters, 0));

@@ -247,7 +247,7 @@ void irradiance_records<Exec, Smooth>::send_light(const Exec& exec, const Caster
     const std::size_t n = min(most, count - first);
     exec.for_each(n, detail::emit_rays{from, off_surface(), first, count, seed, rays.data(), powers.data()});
     for (std::uint32_t bounce = 0;; ++bounce) {
-      detail::cast_rays(exec, caster, rays, hits, n);
+      detail::cast_rays(exec, caster, array_view<const ray>(rays.data(), n), hits.view().subview(0, n));
       statistics_.rays += n;
       exec.fill_bytes(on_their_way.data(), 0, on_their_way.bytes());
       exec.for_each(n, detail::land_rays<Smooth>{smooth_, octree_.view(), normals_.data(), off_surface(),
@@ -298,7 +298,7 @@ void irradiance_records<Exec, Smooth>::see_environment(const Exec& exec, const C
   const buffer<ray_hit, Exec> hits(exec, n);
   exec.for_each(n, detail::look_outside{grid.origin + 0.5f * grid.side, grid.side, hash(options_.seed, 2),
                                         rays.data()});
-  detail::cast_rays(exec, caster, rays, hits, n);
+  detail::cast_rays(exec, caster, array_view<const ray>(rays.data(), n), hits.view().subview(0, n));
   statistics_.rays += n;
   exec.for_each(environment.size(), detail::average_outside{hits.data(), environment.data()});
 }
