@@ -53,7 +53,7 @@ struct alignas(8) recorded_direction {
 /// luminance alone. A spectral host gives the mean of its wavelengths' values, or the luminance. A path uses
 /// one of the two forms throughout.
 struct path_light {
-  vec3 rgb;
+  vec3 rgb;  ///< linear RGB
 
   /// A colour, linear RGB.
   WFPG_HD path_light(vec3 colour) : rgb(colour) {}
