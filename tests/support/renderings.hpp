@@ -103,13 +103,14 @@ struct rendering {
   }
 };
 
+/// The tiles of a square picture, whose side is a multiple of `tiles`.
 inline std::vector<double> tiles_of(const render::image& picture) {
   std::vector<double> result(tiles * tiles, 0.0);
+  const int side = picture.width / tiles;
   for (int i = 0; i < picture.width * picture.height; ++i) {
-    const int x = i % picture.width / tile_pixels, y = i / picture.width / tile_pixels;
+    const int x = i % picture.width / side, y = i / picture.width / side;
     result[static_cast<std::size_t>(y * tiles + x)] +=
-        static_cast<double>(wfpg::luminance(picture.pixels[static_cast<std::size_t>(i)])) /
-        (tile_pixels * tile_pixels);
+        static_cast<double>(wfpg::luminance(picture.pixels[static_cast<std::size_t>(i)])) / (side * side);
   }
   return result;
 }

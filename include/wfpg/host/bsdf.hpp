@@ -46,10 +46,14 @@ struct glossy_part {
   /// delta. The part is all of the BSDF, with the GGX roughness that has this density at normal incidence:
   /// pdf = 1 / (4 pi alpha^2). A cosine lobe has at most 1/pi there, and alpha is then at least 1/2, so it
   /// keeps its guide. A diffuse BSDF under a thin coat is guided less than by its true part.
+  /// Where light refracts, give the larger of the densities at the mirrored and the refracted direction.
+  /// A peak above 32 per steradian is narrower than a field's cell. It counts as delta: the guide leaves it
+  /// to the BSDF.
   /// A density that is not positive, or not finite, gives none(). Source: Heitz 2018, "Sampling the GGX
   /// Distribution of Visible Normals".
   WFPG_HD static glossy_part unknown(float pdf_at_mirror) {
     if (!is_finite(pdf_at_mirror) || !(pdf_at_mirror > 0.0f)) return none();
+    if (pdf_at_mirror > 32.0f) return {1.0f, 0.0f};
     return {1.0f, min(0.28209479f / std::sqrt(pdf_at_mirror), 1.0f)};
   }
 };

@@ -1,0 +1,96 @@
+// What the host's kernels run on: one thread, TBB's threads, or a GPU. A device has
+//   array<T>        an array in its memory: of a size, of a std::vector, or empty
+//   launch(n, k)    calls k(i) for each i in [0, n); they are done when the host reads memory
+//   thrust()        Thrust's policy for it
+//   policy          the execution policy of the renderer's scene, and of the guide
+#pragma once
+
+#include <wfpg/exec/seq.hpp>
+#if defined(__CUDACC__)
+#include <wfpg/exec/cuda.hpp>
+#else
+#include <wfpg/exec/tbb.hpp>
+#endif
+
+#include <thrust/copy.h>
+#include <thrust/iterator/counting_iterator.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#if defined(__CUDACC__)
+#include <thrust/device_vector.h>
+#define KERNELS_BOTH __host__ __device__
+#else
+#define KERNELS_BOTH
+#endif
+
+namespace kernels {
+
+struct serial {
+  using policy = wfpg::exec::seq;
+  template <class T>
+  using array = std::vector<T>;
+
+  template <class Kernel>
+  static void launch(std::size_t n, const Kernel& kernel) {
+    for (std::size_t i = 0; i < n; ++i) kernel(i);
+  }
+  static auto thrust() { return ::thrust::cpp::par; }
+};
+
+#if !defined(__CUDACC__)
+struct tbb_threads {
+  using policy = wfpg::exec::tbb;
+  template <class T>
+  using array = std::vector<T>;
+
+  template <class Kernel>
+  static void launch(std::size_t n, const Kernel& kernel) {
+    ::tbb::parallel_for(::tbb::blocked_range<std::size_t>(0, n, 256), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) kernel(i);
+    });
+  }
+  static auto thrust() { return ::thrust::tbb::par; }
+};
+#else
+template <class Kernel>
+__global__ void call_for_each(std::size_t n, Kernel kernel) {
+  const std::size_t i = std::size_t(blockIdx.x) * blockDim.x + threadIdx.x;
+  if (i < n) kernel(i);
+}
+
+struct gpu {
+  using policy = wfpg::exec::cuda;
+  template <class T>
+  using array = ::thrust::device_vector<T>;
+
+  /// Throws where the launch fails.
+  template <class Kernel>
+  static void launch(std::size_t n, const Kernel& kernel) {
+    constexpr unsigned block = 128;
+    if (n == 0) return;
+    call_for_each<<<static_cast<unsigned>((n + block - 1) / block), block> > >(n, kernel);
+    wfpg::check_cuda(cudaGetLastError(), "a kernel of the host");
+  }
+  static auto thrust() { return ::thrust::cuda::par; }
+};
+#endif
+
+/// The address of an array's first element, for kernels.
+template <class Array>
+auto address(Array& array) {
+  return ::thrust::raw_pointer_cast(array.data());
+}
+
+/// Writes the indices in [0, n) for which `wanted` is true, in order, and returns their number.
+template <class Device, class Wanted>
+std::size_t select(std::size_t n, const Wanted& wanted, std::uint32_t* indices) {
+  const ::thrust::counting_iterator<std::uint32_t> first(0u);
+  const auto last = first + static_cast<std::ptrdiff_t>(n);
+  return static_cast<std::size_t>(::thrust::copy_if(Device::thrust(), first, last, indices, wanted) -
+                                  indices);
+}
+
+}  // namespace kernels

@@ -1,0 +1,129 @@
+// From arguments to a picture.
+#include "program.hpp"
+
+#include "app/image_io.hpp"
+#include "app/metrics.hpp"
+#include "app/number_options.hpp"
+#include "app/output_files.hpp"
+#include "app/progress_bar.hpp"
+#include "app/render_arguments.hpp"
+#include "renderer.hpp"
+
+#include <wfpg/sampling/sample_combiner.hpp>
+
+#include <CLI/CLI.hpp>
+
+#include <chrono>
+#include <cstdio>
+#include <map>
+#include <optional>
+#include <ostream>
+
+namespace kernels {
+namespace {
+
+constexpr int failure = 2;
+
+struct arguments {
+  render::scene_arguments scene;
+  render::render_options options;  // of which the picture's and the budget's are used
+  std::string output, png, reference, where = "tbb";
+  float fog = 0.0f;
+  bool unguided = false;
+};
+
+const std::map<std::string, device> devices{
+    {"serial", device::serial}, {"tbb", device::tbb}, {"cuda", device::cuda}};
+
+void add_options(CLI::App& app, arguments& given) {
+  render::add_scene_options(app, given.scene);
+  render::add_budget_options(app, given.options);
+  render::add_picture_options(app, given.options);
+  app.add_option("-o,--output", given.output, "picture, OpenEXR")->transform(render::file_path());
+  app.add_option("--png", given.png, "picture, sRGB PNG")->transform(render::file_path());
+  app.add_option("--reference", given.reference, "picture to print the error against, OpenEXR")
+      ->transform(render::file_path());
+  app.add_option("--fog", given.fog, "scattering events per scene unit (default: 0)")
+      ->transform(render::number(0.0, 1.0e6));
+  app.add_flag("--unguided", given.unguided, "no sample is guided");
+  app.add_option("--device", given.where, "serial, tbb or cuda (default: tbb)")
+      ->check(CLI::IsMember({"serial", "tbb", "cuda"}));
+}
+
+/// Takes samples until the budget is spent, and returns their weighted mean.
+render::image take_samples(renderer& host, const arguments& given, int width, int height) {
+  const auto begin = std::chrono::steady_clock::now();
+  const auto combination =
+      given.unguided ? wfpg::sample_combination::constant : wfpg::sample_combination::pt_linear;
+  std::vector<glm::dvec3> sums(std::size_t(width) * std::size_t(height), glm::dvec3(0.0));
+  double weights = 0.0, seconds = 0.0;
+  const double limit = given.options.seconds;
+  render::progress_bar bar;
+  for (int i = 1; limit > 0.0 ? i == 1 || seconds < limit : i <= given.options.spp; ++i) {
+    const double weight = wfpg::sample_weight(combination, static_cast<std::uint32_t>(i));
+    const std::vector<vec3> colours = host.sample();
+    for (std::size_t p = 0; p < sums.size(); ++p) sums[p] += weight * glm::dvec3(colours[p]);
+    weights += weight;
+    seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    bar.show({i, std::min(1.0, limit > 0.0 ? seconds / limit : double(i) / given.options.spp), seconds, 0.0});
+  }
+  bar.finish();
+  render::image picture = render::make_image(width, height);
+  for (std::size_t p = 0; p < sums.size(); ++p) picture.pixels[p] = vec3(sums[p] / weights);
+  return picture;
+}
+
+void run(arguments& given, std::ostream& out, std::ostream& log) {
+  render::check_outputs({{"--output", given.output, ".exr"}, {"--png", given.png, ".png"}},
+                        {{"--reference", given.reference, ""}});
+  const render::scene scene = render::load_scene(given.scene, given.options, "wfpg-kernels", log);
+  const render::render_options options = render::completed(scene, given.options);
+  std::optional<render::image> reference;
+  if (!given.reference.empty()) reference = render::read_exr(given.reference);
+  if (reference && (reference->width != options.width || reference->height != options.height))
+    throw std::invalid_argument("--reference: " + given.reference + " has another size than the picture");
+  settings wanted;
+  wanted.width = options.width;
+  wanted.height = options.height;
+  wanted.max_depth = static_cast<std::uint32_t>(options.max_depth);
+  wanted.roulette_depth = static_cast<std::uint32_t>(options.roulette_depth);
+  wanted.fog = given.fog;
+  wanted.guided = !given.unguided;
+  wanted.seed = options.seed;
+  const auto host = make_renderer(devices.at(given.where), scene, wanted);
+  const render::image picture = take_samples(*host, given, options.width, options.height);
+  if (!given.output.empty()) render::write_exr(given.output, picture);
+  if (!given.png.empty()) render::write_png(given.png, picture);
+  if (reference) {
+    const render::image_error error = render::compare(picture, *reference);
+    char line[100];
+    std::snprintf(line, sizeof line, "mse %.6e  relmse %.6e  mse reinhard %.6e\n", error.mse, error.relmse,
+                  error.mse_reinhard);
+    out << line;
+  }
+}
+
+}  // namespace
+
+int run_program(int argc, const char* const* argv, std::ostream& out, std::ostream& log) {
+  arguments given;
+  CLI::App app{"Renders a scene with kernels by material, four wavelengths a path, and a fog."};
+  render::report_in_one_line(app, "wfpg-kernels");
+  add_options(app, given);
+  try {
+    app.parse(argc, argv);
+    if (given.output.empty() && given.png.empty() && given.reference.empty())
+      throw CLI::RequiredError("one of -o, --png, --reference");
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error, out, log) == 0 ? 0 : failure;
+  }
+  try {
+    run(given, out, log);
+  } catch (const std::exception& error) {
+    log << "wfpg-kernels: " << render::reason_of(error) << '\n';
+    return failure;
+  }
+  return 0;
+}
+
+}  // namespace kernels

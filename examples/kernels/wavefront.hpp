@@ -1,0 +1,198 @@
+// The host: one sample of all pixels is a wave that goes from vertex to vertex.
+#pragma once
+
+#include "kernels.hpp"
+#include "renderer.hpp"
+
+#include <wfpg/base/error.hpp>
+#if KERNELS_GUIDE
+#include <wfpg/octree/fragments_from_caster.hpp>
+#endif
+
+namespace kernels {
+
+#if KERNELS_GUIDE
+/// A batch of hits as the guide asks for them: the distance, or the environment's luminance.
+struct answer_guide {
+  render::scene_view scene;
+  wfpg::array_view<const wfpg::ray> rays;
+  const triangle_hit* found;
+  wfpg::array_view<wfpg::ray_hit> hits;
+
+  KERNELS_BOTH void operator()(std::size_t i) const {
+    const wfpg::ray& asked = rays[i];
+    if (found[i].is_hit())
+      hits[i] = {glm::length(scene.point(found[i]).position - asked.origin), 0.0f};
+    else
+      hits[i] = {-1.0f, wfpg::luminance(scene.environment.radiance(asked.direction))};
+  }
+};
+
+template <class Device>
+struct guide_caster {
+  const geometry<Device>* traced;
+  render::scene_view scene;
+
+  template <class Exec>
+  void cast(const Exec& exec, wfpg::array_view<const wfpg::ray> rays,
+            wfpg::array_view<wfpg::ray_hit> hits) const {
+    const wfpg::buffer<triangle_hit, Exec> found(exec, rays.size());
+    traced->trace(rays.data(), rays.size(), found.data());
+    Device::launch(rays.size(), answer_guide{scene, rays, found.data(), hits});
+  }
+};
+
+inline wfpg::kept_guide_options guide_options(const settings& wanted) {
+  wfpg::kept_guide_options options;
+  options.max_paths = std::size_t(wanted.width) * std::size_t(wanted.height);
+  options.max_depth = wanted.max_depth;
+  options.guided_depths = wanted.max_depth > 3 ? wanted.max_depth - 2 : 1;
+  options.unguided_samples = wanted.guided ? 1 : ~0u;
+  options.records_waves = true;
+  options.seed = wanted.seed;
+  return options;
+}
+
+template <class Device>
+using guider_of = wfpg::path_guider<typename Device::policy>;
+#endif
+
+template <class Device, class Accelerated>
+class wavefront : public renderer {
+ public:
+  wavefront(const render::scene& host, const settings& wanted)
+      : wanted_(wanted),
+        count_(std::size_t(wanted.width) * std::size_t(wanted.height)),
+        arrays_(policy(), host),
+        lights_(policy(), host),
+        geometry_(std::make_unique<accelerated_geometry<Device, Accelerated>>(host, arrays_.view())),
+        camera_(host.view, wanted.width, wanted.height),
+        paths_(count_),
+        vertices_(count_),
+        queues_(count_),
+        queue_(count_),
+        rays_(count_),
+        hits_(count_),
+        shadows_(count_),
+        hidden_(count_),
+        colours_(count_)
+#if KERNELS_GUIDE
+        ,
+        guider_(policy(),
+                wfpg::fragments_from_caster(policy(), guide_caster<Device>{geometry_.get(), arrays_.view()},
+                                            geometry_->bounds()),
+                guide_options(wanted))
+#endif
+  {
+  }
+
+  std::vector<vec3> sample() override {
+    wave at = first_wave();
+    Device::launch(count_, start_paths{at, camera_});
+#if KERNELS_GUIDE
+    guider_.begin_sample();
+#endif
+    for (; at.depth < at.max_depth; ++at.depth) {
+      find_vertices_of(at);
+      if (at.is_last()) break;
+      shade_all(at);
+    }
+#if KERNELS_GUIDE
+    guider_.end_sample();
+#endif
+    ++samples_;
+    Device::launch(count_, write_colours{at, address(colours_)});
+    std::vector<vec3> colours(count_);
+    ::thrust::copy(colours_.begin(), colours_.end(), colours.begin());
+    return colours;
+  }
+
+ private:
+  using policy = typename Device::policy;
+  template <class T>
+  using array = typename Device::template array<T>;
+
+  wave first_wave() {
+    wave at;
+    at.scene = arrays_.view();
+    at.lights = lights_.view();
+    at.random = {wanted_.seed, samples_};
+    at.max_depth = wanted_.max_depth;
+    at.fog = wanted_.fog;
+    at.paths = address(paths_);
+    at.vertices = address(vertices_);
+    at.queues = address(queues_);
+    at.rays = address(rays_);
+    at.hits = address(hits_);
+    at.shadows = address(shadows_);
+    at.hidden = address(hidden_);
+    return at;
+  }
+
+  void find_vertices_of(const wave& at) {
+    Device::launch(count_, write_rays{at});
+    geometry_->trace(at.rays, count_, at.hits);
+#if KERNELS_GUIDE
+    Device::launch(count_, find_vertices{at, guider_.recorder()});
+#else
+    Device::launch(count_, find_vertices{at});
+#endif
+  }
+
+  void shade_all(const wave& at) {
+#if KERNELS_GUIDE
+    view_ = guider_.prepare(at.depth, guide_caster<Device>{geometry_.get(), at.scene});
+#endif
+    Device::launch(count_, ask_nothing{at});
+    shade_queue<matte>(at);
+    shade_queue<metal>(at);
+    shade_queue<mirror>(at);
+    shade_queue<glass>(at);
+    shade_queue<frosted_glass>(at);
+    shade_queue<varnish>(at);
+    shade_queue<paint>(at);
+    Device::launch(fill_queue(fog_queue), scatter_in_fog{at, address(queue_)});
+    geometry_->occluded(at.rays, count_, at.hidden);
+#if KERNELS_GUIDE
+    Device::launch(count_, add_light{at, guider_.recorder()});
+#else
+    Device::launch(count_, add_light{at});
+#endif
+  }
+
+  std::size_t fill_queue(std::uint32_t wanted) {
+    return select<Device>(count_, is_in_queue{address(queues_), wanted}, address(queue_));
+  }
+
+  template <class Bsdf>
+  void shade_queue(const wave& at) {
+    const std::size_t n = fill_queue(static_cast<std::uint32_t>(Bsdf::kind));
+#if KERNELS_GUIDE
+    Device::launch(n, shade<Bsdf>{at, address(queue_), wanted_.roulette_depth, view_, guider_.recorder()});
+#else
+    Device::launch(n, shade<Bsdf>{at, address(queue_), wanted_.roulette_depth});
+#endif
+  }
+
+  settings wanted_;
+  std::size_t count_;
+  render::device_scene<policy> arrays_;
+  render::light_distribution<policy> lights_;
+  std::unique_ptr<const geometry<Device>> geometry_;
+  render::pinhole camera_;
+  array<path> paths_;
+  array<vertex> vertices_;
+  array<std::uint32_t> queues_, queue_;
+  array<ray> rays_;
+  array<triangle_hit> hits_;
+  array<shadow_query> shadows_;
+  array<std::uint32_t> hidden_;
+  array<vec3> colours_;
+  std::uint32_t samples_ = 0;
+#if KERNELS_GUIDE
+  guider_of<Device> guider_;
+  wfpg::guide_view view_;
+#endif
+};
+
+}  // namespace kernels

@@ -1,0 +1,146 @@
+// The host of examples/kernels: guided pictures have the mean of unguided ones, in fog and with estimated
+// densities. They are less noisy. Bad input is refused before the first sample.
+#include "program.hpp"
+#include "support/command_lines.hpp"
+#include "support/kernel_pictures.hpp"
+#include "support/pictures.hpp"
+#include "support/temporary_folder.hpp"
+
+#include <cstdio>
+#include <string>
+#include <vector>
+
+namespace {
+
+using wfpg_test::check_unbiased;
+using wfpg_test::host_of;
+using wfpg_test::kernel_picture;
+using wfpg_test::tile_means;
+using wfpg_test::tiles_of;
+
+/// Checks that guiding leaves a picture's mean. Where it is `precise`, a bias of 1% is found.
+void check_kernels(const kernel_picture& what, bool precise = false) {
+  const tile_means truth = tiles_of(what, false), tested = tiles_of(what, true);
+  const auto report =
+      wfpg_test::check_renderers_unbiased([&](int n) { return n == 1 ? truth : tiles_of(what, false, n); },
+                                          [&](int n) { return n == 1 ? tested : tiles_of(what, true, n); });
+  INFO(what.scene << ", fog " << what.fog << ": " << report.message);
+  CHECK(report);
+  if (!precise) return;
+  INFO("standard errors of the whole " << wfpg_test::error_of_picture(truth) << " and "
+                                       << wfpg_test::error_of_picture(tested));
+  CHECK(wfpg_test::found_bias(truth, tested) <= 0.01 * truth.picture_mean());
+  const std::vector<double> dark(truth.size(), 0.0);
+  CHECK_FALSE(check_unbiased(truth, tested.scaled_beyond(dark, 1.01)));
+}
+
+}  // namespace
+
+TEST_CASE("kernels: guided pictures have the mean of unguided ones", "[kernels][unbiased]") {
+  for (const char* scene : {"cornell-box", "cornell-enclosed", "materials", "outdoor"})
+    check_kernels({scene});
+  check_kernels({"ajar", 0.0f, 4, 64, 64});
+  check_kernels({"cornell-enclosed", 0.2f});
+}
+
+TEST_CASE("kernels: a bias of 1% shows, with fog and without", "[kernels][unbiased]") {
+  check_kernels({"bright-room", 0.0f, 12, 12, 64}, true);
+  check_kernels({"bright-room", 0.2f, 12, 12, 64}, true);
+}
+
+// Takes half an hour, so that it runs by name alone.
+TEST_CASE("kernels: guided pictures have the mean of unguided ones to 0.2%", "[.long]") {
+  const kernel_picture what = GENERATE(
+      kernel_picture{"materials", 0.0f, 24, 24, 64}, kernel_picture{"cornell-enclosed", 0.0f, 180, 400, 64},
+      kernel_picture{"cornell-enclosed", 0.1f, 300, 600, 64}, kernel_picture{"ajar", 0.0f, 400, 2600, 64});
+  const tile_means truth = tiles_of(what, false), tested = tiles_of(what, true);
+  std::printf("%s, fog %g: unguided %.5f +- %.3f%%, guided %.5f +- %.3f%%; tiles +- %.2f%% and %.2f%%\n",
+              what.scene.c_str(), static_cast<double>(what.fog), truth.picture_mean(),
+              100.0 * wfpg_test::error_of_picture(truth), tested.picture_mean(),
+              100.0 * wfpg_test::error_of_picture(tested), 100.0 * wfpg_test::median_error(truth),
+              100.0 * wfpg_test::median_error(tested));
+  for (const tile_means* of : {&truth, &tested}) {
+    CHECK(wfpg_test::error_of_picture(*of) <= 0.002);
+    CHECK(wfpg_test::median_error(*of) <= 0.02);
+  }
+  const auto report = check_unbiased(truth, tested);
+  INFO(report.message);
+  CHECK(report);
+  const std::vector<double> dark(truth.size(), 0.0);
+  CHECK_FALSE(check_unbiased(truth, tested.scaled_beyond(dark, 1.01)));
+}
+
+TEST_CASE("kernels: unguided pictures are the renderer's", "[kernels]") {
+  const kernel_picture what{"cornell-enclosed"};
+  wfpg_test::rendering like{what.scene, true};
+  const auto report = wfpg_test::check_renderers_unbiased([&](int n) { return unguided_tiles(like, n); },
+                                                          [&](int n) { return tiles_of(what, false, n); });
+  INFO(report.message);
+  CHECK(report);
+}
+
+TEST_CASE("kernels: one thread and TBB give one picture", "[kernels]") {
+  const render::scene world = wfpg_test::make_test_scene("materials");
+  const auto one = host_of(world, 16, 0.1f, true, 1, kernels::device::serial),
+             several = host_of(world, 16, 0.1f, true, 1, kernels::device::tbb);
+  for (int sample = 0; sample < 4; ++sample) CHECK(render_test::same_bits(one->sample(), several->sample()));
+}
+
+TEST_CASE("kernels: guiding reduces noise where light is hard to find", "[kernels]") {
+  const kernel_picture what{"ajar", 0.0f, 4, 4, 64};
+  const tile_means plain = tiles_of(what, false), guided = tiles_of(what, true);
+  CHECK(wfpg_test::median_error(guided) < 0.5 * wfpg_test::median_error(plain));
+}
+
+TEST_CASE("kernels: settings out of range and foreign materials throw", "[kernels]") {
+  const render::scene box = wfpg_test::make_test_scene("cornell-box");
+  const auto make = [&](const kernels::settings& wanted) {
+    return kernels::make_renderer(kernels::device::serial, box, wanted);
+  };
+  kernels::settings small;
+  small.width = small.height = 4;
+  CHECK(make(small)->sample().size() == 16);
+  kernels::settings wrong = small;
+  wrong.width = 0;
+  CHECK_THROWS_AS(make(wrong), std::invalid_argument);
+  wrong = small;
+  wrong.max_depth = 0;
+  CHECK_THROWS_AS(make(wrong), std::invalid_argument);
+  for (const float fog :
+       {-1.0f, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
+    wrong = small;
+    wrong.fog = fog;
+    CHECK_THROWS_AS(make(wrong), std::invalid_argument);
+  }
+  render::scene foreign = box;
+  foreign.materials[0].kind = render::material_kind::metallic_roughness;
+  CHECK_THROWS_AS(kernels::make_renderer(kernels::device::serial, foreign, small), std::invalid_argument);
+  foreign = box;
+  foreign.textures.resize(1);
+  CHECK_THROWS_AS(kernels::make_renderer(kernels::device::serial, foreign, small), std::invalid_argument);
+}
+
+TEST_CASE("wfpg-kernels writes what is asked for, and refuses the rest in one line", "[kernels]") {
+  const wfpg_test::temporary_folder folder;
+  const std::string picture = folder.file("a.exr");
+  const auto run = [](const std::vector<std::string>& arguments) {
+    return render_test::run_command(kernels::run_program, "wfpg-kernels", arguments);
+  };
+  CHECK(run({"cornell-box", "--size", "8x8", "--spp", "2", "--device", "serial", "-o", picture}).code == 0);
+  const auto compared =
+      run({"cornell-box", "--size", "8x8", "--spp", "2", "--device", "serial", "--reference", picture});
+  CHECK(compared.code == 0);
+  CHECK(compared.out.rfind("mse 0.0", 0) == 0);
+  for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
+           {"cornell-box"},
+           {"cornell-box", "-o", "a.jpg"},
+           {"cornell-box", "-o", picture, "--fog", "-1"},
+           {"cornell-box", "-o", picture, "--device", "abacus"},
+           {"nowhere", "-o", picture},
+           {"cornell-box", "--size", "9x8", "--spp", "1", "--reference", picture}}) {
+    const auto refused = run(wrong);
+    INFO(refused.log);
+    CHECK(refused.code == 2);
+    CHECK(std::count(refused.log.begin(), refused.log.end(), '\n') == 1);
+  }
+}
