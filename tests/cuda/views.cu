@@ -2,6 +2,7 @@
 // that device code is annotated for the device.
 #include <wfpg/octree/svo_ray_caster.hpp>
 #include <wfpg/testing/check_bsdf.hpp>
+#include <wfpg/testing/check_host.hpp>
 #include <wfpg/testing/check_ray_caster.hpp>
 #include <wfpg/testing/check_surfaces.hpp>
 #include <wfpg/wfpg.hpp>
@@ -57,6 +58,13 @@ __global__ void use_mixture(wfpg::guide_view view, float* out) {
   const wfpg::vec3 direction = mixture.choose(u) ? mixture.sample(wfpg::vec2(u)) : wfpg::vec3(0, 0, 1);
   const float pdf = mixture.pdf(direction, 0.25f) + mixture.delta_pdf(0.5f);
   out[threadIdx.x] = wfpg::roulette_scale(0.25f, pdf);
+}
+
+__global__ void use_checker(wfpg::testing::host_checker_view checker, wfpg::guide_view view) {
+  const auto mixture = view.mixture(threadIdx.x, wfpg::glossy_part::none());
+  checker.scatter(threadIdx.x, 0, view, mixture, wfpg::testing::host_step());
+  checker.query(threadIdx.x, 0, mixture, wfpg::vec3(0, 0, 1), 0.25f, 0.25f);
+  checker.radiance(threadIdx.x, 1.0f);
 }
 
 __global__ void use_learnt(wfpg::learnt_radiance_view learnt) {
@@ -121,6 +129,7 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   use_bins<<<1, 32>>>(wfpg::bins_view{}, out);
   use_guide<<<1, 32>>>(wfpg::guide_view{}, directions, out);
   use_mixture<<<1, 32>>>(wfpg::guide_view{}, out);
+  use_checker<<<1, 32>>>(wfpg::testing::host_checker_view{}, wfpg::guide_view{});
   use_caster<<<1, 1>>>(wfpg::svo_ray_caster(tree), wfpg::ray{}, nullptr);
   use_cones<<<1, 1>>>(wfpg::svo_cone_caster(cache, wfpg::voxel_opacity_view()), wfpg::ray{}, nullptr);
 
@@ -182,4 +191,5 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(d::probe_surfaces<surfaces>{});
   launch(d::cast_each<wfpg::svo_ray_caster>{wfpg::svo_ray_caster(tree), {}, {}});
   launch(d::find_hit_leaves{});
+  launch(d::read_recorded_path{});
 }

@@ -6,11 +6,14 @@
 #include <wfpg/octree/svo_ray_caster.hpp>
 #include <wfpg/path_guider.hpp>
 #include <wfpg/sampling/roulette.hpp>
+#include <wfpg/testing/check_host.hpp>
 
 #include <glm/vec4.hpp>
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 namespace my {
@@ -30,6 +33,10 @@ struct vertex {
 };
 inline wfpg::vec3 mirrored(wfpg::vec3 wo, wfpg::vec3 normal) {
   return 2.0f * glm::dot(wo, normal) * normal - wo;
+}
+
+inline float mean_of(glm::vec4 wavelengths) {
+  return 0.25f * (wavelengths.x + wavelengths.y + wavelengths.z + wavelengths.w);
 }
 
 struct layered {
@@ -54,6 +61,8 @@ void shade(const scene&, std::vector<path>&, std::uint32_t depth, const wfpg::gu
 
 struct tracer {
   void render_unguided_sample(const wfpg::surface_collector_view& hits);
+  template <class Guider, class Caster>
+  void trace_sample(Guider&, const Caster&, const wfpg::testing::host_checker_view&) {}
 };
 
 }  // namespace my
@@ -61,6 +70,8 @@ struct tracer {
 #include "hosts-3.inc"
 #include "hosts-4.inc"
 #include "hosts-5.inc"
+#include "hosts-6.inc"
+#include "hosts-7.inc"
 
 template bool scatter(const wfpg::guide_view&, const wfpg::path_recorder_view&, std::uint32_t,
                       const my::layered&, my::vertex&, float, wfpg::vec2);
@@ -94,3 +105,5 @@ template wfpg::path_guider<wfpg::exec::tbb> guider_from_caster(const wfpg::exec:
                                                                const wfpg::kept_guide_options&);
 template wfpg::path_guider<wfpg::exec::tbb> guider_from_first_sample(const wfpg::exec::tbb&, my::tracer&,
                                                                      const wfpg::kept_guide_options&);
+template std::string faults_of_host(const wfpg::exec::tbb&, wfpg::path_guider<wfpg::exec::tbb>&, my::tracer&,
+                                    const my::caster&);

@@ -84,6 +84,15 @@ class path_recorder_view {
   WFPG_HD std::size_t paths() const { return paths_; }
   /// Capacity in vertices of one path: valid depths are [0, max_depth()).
   WFPG_HD std::uint32_t max_depth() const { return max_depth_; }
+  /// Number of places for recorded paths: recorded_path takes those below it. 0 in a sample that records
+  /// nothing.
+  WFPG_HD std::size_t recorded() const { return recorded_; }
+  /// Whether scatter() and escape() are recorded. Without it, recorded_path knows no directions.
+  WFPG_HD bool records_directions() const { return learns(); }
+  /// Writes the place of a path among the recorded ones. False where this sample does not record the path.
+  WFPG_HD bool has_place(std::size_t path, std::uint32_t& place) const {
+    return path < paths_ && recorded_ > 0 && runs_.find(path, place);
+  }
 
   /// Records vertex `depth` of a path; 0 is the first surface. `position` is in world space. `outgoing` is
   /// the unit direction toward the previous vertex. `throughput` is the path's before this vertex's BSDF,
@@ -199,9 +208,8 @@ class path_recorder_view {
   /// Index of a path among the recorded ones. False where it is not recorded; counts a drop where it is not
   /// in [0, paths()).
   WFPG_HD bool find(std::size_t path, std::uint32_t& place) const {
-    if (path < paths_) return recorded_ > 0 && runs_.find(path, place);
-    drop();
-    return false;
+    if (path >= paths_) drop();
+    return has_place(path, place);
   }
   /// Number of a path's vertices, or one that no depth follows where the path has left the scene.
   WFPG_HD std::uint32_t length_of_surfaces(std::uint32_t place) const {

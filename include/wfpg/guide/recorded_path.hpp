@@ -68,6 +68,12 @@ class recorded_path {
       return true;
     }
     direction = this->direction(depth);
+    return has_scattered(depth);
+  }
+  /// Whether scatter() recorded a direction at a surface or a gap.
+  /// False where the host never told of one. Where it is true, direction() may be called.
+  /// Precondition: records_directions() of the recorder.
+  WFPG_HD bool has_scattered(std::uint32_t depth) const {
     return paths_.directions_[slot(depth)].direction != 0;
   }
   /// Unit direction that scatter() recorded. Precondition: directions are recorded, and scatter() was called.

@@ -4,10 +4,10 @@
 
 #include <string>
 
-/// Checks of what a host hands to the guider: BSDFs, ray casters, surfaces.
+/// Checks of what a host hands to the guider: BSDFs, ray casters, surfaces, and how it uses directions.
 namespace wfpg::testing {
 
-/// The result of a check: success, or the first violation.
+/// The result of a check: success, or the first violation. host_checker has a line for each violation.
 struct check_report {
   /// The first violation: where, what was found, what was expected. Empty where all holds.
   std::string message;
