@@ -106,21 +106,18 @@ struct planted_fault {
 };
 
 std::vector<planted_fault> planted_faults() {
-  room coated, foggy, glossy, open, thick;
+  room coated, foggy, glossy, open;
   coated.coats = true;
   foggy.fog = 0.2f;
   foggy.coats = true;
   glossy.alpha = 0.1f;
   open.open = true;
-  thick.open = true;
-  thick.fog = 0.3f;
   return {
       {host_fault::guided_roulette, {}, {"roulette ends guided paths", "wfpg::roulette_scale()"}},
       {host_fault::guided_roulette, foggy, {"roulette ends guided paths"}},
       {host_fault::narrow_in_full, glossy, {"narrow lobes", "wfpg::glossy_part::unknown()"}},
       {host_fault::narrow_in_full, coated, {"delta lobes", "glossy_part{probability, 0}"}},
       {host_fault::silent_escapes, open, {"escapes are not told", "recorder.escape()"}},
-      {host_fault::silent_escapes, thick, {"escapes are not told", "recorder.escape()"}},
       {host_fault::lost_light, {}, {"recorded radiance", "recorder.total()"}},
       {host_fault::lost_light, foggy, {"recorded radiance"}},
       {host_fault::local_scatter, {}, {"recorder.scatter() has other directions", "world space"}},

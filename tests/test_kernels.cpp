@@ -34,7 +34,39 @@ void check_kernels(const kernel_picture& what, bool precise = false) {
   CHECK_FALSE(check_unbiased(truth, tested.scaled_beyond(dark, 1.01)));
 }
 
+/// What the check says of the host in eight scenes and in fog, by its first four samples of 128x128 pixels.
+std::string said_of_host(std::uint64_t seeds) {
+  std::string said;
+  const auto check = [&](const char* scene, float fog, std::uint64_t seed) {
+    kernels::settings wanted;
+    wanted.width = wanted.height = 128;
+    wanted.max_depth = 6;
+    wanted.fog = fog;
+    wanted.seed = seed;
+    wanted.check = true;
+    const auto host = kernels::make_renderer(kernels::device::tbb, wfpg_test::make_test_scene(scene), wanted);
+    for (int sample = 0; sample < 4; ++sample) host->sample();
+    if (!host->faults().empty()) said += scene + std::string(": ") + host->faults() + '\n';
+  };
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    for (const char* scene : {"cornell-box", "cornell-enclosed", "ajar", "glossy-room", "caustic-pool",
+                              "many-lamps", "materials", "outdoor"})
+      check(scene, 0.0f, seed);
+    check("cornell-enclosed", 0.2f, seed);
+  }
+  return said;
+}
+
 }  // namespace
+
+TEST_CASE("kernels: the check of a host finds nothing wrong", "[kernels][check_host]") {
+  CHECK(said_of_host(1) == "");
+}
+
+// Takes minutes, so that it runs by name alone.
+TEST_CASE("kernels: the check of a host finds nothing wrong, with 20 seeds", "[.seeds]") {
+  CHECK(said_of_host(20) == "");
+}
 
 TEST_CASE("kernels: guided pictures have the mean of unguided ones", "[kernels][unbiased]") {
   for (const char* scene : {"cornell-box", "cornell-enclosed", "materials", "outdoor"})
@@ -131,9 +163,13 @@ TEST_CASE("wfpg-kernels writes what is asked for, and refuses the rest in one li
       run({"cornell-box", "--size", "8x8", "--spp", "2", "--device", "serial", "--reference", picture});
   CHECK(compared.code == 0);
   CHECK(compared.out.rfind("mse 0.0", 0) == 0);
+  const auto checked = run({"materials", "--size", "32x32", "--spp", "4", "--device", "serial", "--check"});
+  CHECK(checked.code == 0);
+  CHECK(checked.out == "the guide is used as it should be\n");
   for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
            {"cornell-box"},
            {"cornell-box", "-o", "a.jpg"},
+           {"cornell-box", "--check", "--unguided"},
            {"cornell-box", "-o", picture, "--fog", "-1"},
            {"cornell-box", "-o", picture, "--device", "abacus"},
            {"nowhere", "-o", picture},

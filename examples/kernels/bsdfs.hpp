@@ -99,7 +99,7 @@ struct metal {
   }
 };
 
-/// The two functions of a BSDF that has delta lobes alone.
+/// What a BSDF answers that has delta lobes alone.
 struct delta_lobes {
   template <class Numbers>
   KERNELS_BOTH spectrum value(vec3, vec3, Numbers&) const {
@@ -107,6 +107,10 @@ struct delta_lobes {
   }
   template <class Numbers>
   KERNELS_BOTH float density(vec3, vec3, Numbers&) const {
+    return 0.0f;
+  }
+  template <class Numbers>
+  KERNELS_BOTH float peak(vec3, Numbers&) const {
     return 0.0f;
   }
 };

@@ -1,5 +1,6 @@
 // The host's kernels, in the order in which a wave runs them. What wfpg needs of a kernel stands in
-// #if KERNELS_GUIDE; without it, each kernel is that of a path tracer.
+// #if KERNELS_GUIDE; without it, each kernel is that of a path tracer. What the check of the host needs
+// stands in #if KERNELS_CHECK.
 #pragma once
 
 #include "path.hpp"
@@ -7,6 +8,9 @@
 #if KERNELS_GUIDE
 #include <wfpg/path_guider.hpp>
 #include <wfpg/sampling/roulette.hpp>
+#endif
+#if KERNELS_CHECK
+#include <wfpg/testing/check_host.hpp>
 #endif
 
 namespace kernels {
@@ -76,6 +80,7 @@ struct find_vertices {
 
   KERNELS_BOTH void enter_surface(std::size_t i, const render::hit_surface& found) const {
     path& p = at.paths[i];
+    if (at.depth == 0) p.begins_at_surface = true;
     const auto& surface = found.surface;
     const render::bsdf& scatters = surface.bsdf;
     const float distance = glm::length(surface.position - p.next.origin);
@@ -162,6 +167,8 @@ struct shading {
   render::frame local;
   vec3 wo;  ///< in the surface's frame
   path_numbers walks;
+  drawn_direction drawn;  ///< in which the path goes on
+  float pdf = 0.0f;       ///< with which the host drew it; of a delta lobe its probability
 #if KERNELS_GUIDE
   wfpg::kernel_mixture mixture;
 #endif
@@ -199,6 +206,9 @@ struct shade {
   wfpg::guide_view guide;
   wfpg::path_recorder_view recorder;
 #endif
+#if KERNELS_CHECK
+  wfpg::testing::host_checker_view checker;
+#endif
 
   KERNELS_BOTH void operator()(std::size_t slot) const {
     shading<Bsdf> s(at, queue[slot]);
@@ -207,7 +217,17 @@ struct shade {
 #endif
     if constexpr (!Bsdf::is_delta) sample_light(s);
     path& p = at.paths[s.id];
-    p.active = scatter(s, p) && survives(s, p);
+    p.active = scatter(s, p);
+    if (!p.active) return;
+    const float survival = survival_of(p);
+    p.active = at.draw(s.id, render::dimension::roulette).x < survival;
+#if KERNELS_CHECK
+    path_numbers walks = s.walks;
+    checker.scatter(s.id, at.depth, guide, s.mixture,
+                    {p.next.direction, s.drawn.pdf, s.pdf, s.bsdf.peak(s.wo, walks), std::abs(s.wo.z),
+                     mean_of(p.throughput), survival, s.drawn.is_delta, p.active});
+#endif
+    p.throughput /= survival;
   }
 
  private:
@@ -225,7 +245,10 @@ struct shade {
     if (!(light.pdf > 0.0f) || !s.can_pass(wi, light.direction)) return;
     const spectrum value = s.bsdf.value(s.wo, wi, s.walks);
     if (!(mean_of(value) > 0.0f)) return;
-    const float pdf = s.density(light.direction, s.bsdf.density(s.wo, wi, s.walks));
+    const float bsdf_pdf = s.bsdf.density(s.wo, wi, s.walks), pdf = s.density(light.direction, bsdf_pdf);
+#if KERNELS_CHECK
+    checker.query(s.id, at.depth, s.mixture, light.direction, bsdf_pdf, pdf);
+#endif
     const float weight = light.is_delta ? 1.0f : mis_weight(light.pdf, pdf);
     const path& p = at.paths[s.id];
     ask(at, s.id, render::leave_surface(s.v.position, s.v.geometric_normal, light.direction, s.v.offset),
@@ -236,7 +259,7 @@ struct shade {
   KERNELS_BOTH bool scatter(shading<Bsdf>& s, path& p) const {
     float u = at.draw(s.id, render::dimension::direction).x;
     const vec2 u2 = at.draw(s.id, render::dimension::direction + 1);
-    drawn_direction drawn;
+    drawn_direction& drawn = s.drawn;
     vec3 direction;
     spectrum value;
 #if KERNELS_GUIDE
@@ -254,14 +277,14 @@ struct shade {
       value = drawn.weight * drawn.pdf;
     }
     if (!(mean_of(value) > 0.0f) || !s.can_pass(drawn.wi, direction)) return false;
-    float pdf = drawn.is_delta ? drawn.pdf : s.density(direction, drawn.pdf);
+    s.pdf = drawn.is_delta ? drawn.pdf : s.density(direction, drawn.pdf);
 #if KERNELS_GUIDE
-    if (drawn.is_delta) pdf = s.mixture.delta_pdf(drawn.pdf);
-    p.scale *= wfpg::roulette_scale(drawn.pdf, pdf);
+    if (drawn.is_delta) s.pdf = s.mixture.delta_pdf(drawn.pdf);
+    p.scale *= wfpg::roulette_scale(drawn.pdf, s.pdf);
     recorder.scatter(s.id, at.depth, direction, drawn.is_delta ? wfpg::no_field : s.mixture.number);
 #endif
-    p.throughput *= value / pdf;
-    p.pdf = drawn.is_delta ? 0.0f : pdf;
+    p.throughput *= value / s.pdf;
+    p.pdf = drawn.is_delta ? 0.0f : s.pdf;
     p.next = {};
     p.next.origin = render::leave_surface(s.v.position, s.v.geometric_normal, direction, s.v.offset);
     p.next.direction = direction;
@@ -273,13 +296,10 @@ struct shade {
     return true;
   }
 
-  /// Russian roulette of paths that bring less than a tenth of what arrives.
-  KERNELS_BOTH bool survives(const shading<Bsdf>& s, path& p) const {
-    if (at.depth < roulette_depth) return true;
-    const float probability = glm::min(1.0f, 10.0f * mean_of(p.throughput) * p.scale);
-    if (!(at.draw(s.id, render::dimension::roulette).x < probability)) return false;
-    p.throughput /= probability;
-    return true;
+  /// Probability with which roulette lets a path go on. It spares those that bring a tenth of what arrives.
+  KERNELS_BOTH float survival_of(const path& p) const {
+    if (at.depth < roulette_depth) return 1.0f;
+    return glm::min(1.0f, 10.0f * mean_of(p.throughput) * p.scale);
   }
 };
 
@@ -330,8 +350,15 @@ struct add_light {
 struct write_colours {
   wave at;
   vec3* colours;
+#if KERNELS_CHECK
+  wfpg::testing::host_checker_view checker;
+#endif
 
   KERNELS_BOTH void operator()(std::size_t i) const {
+#if KERNELS_CHECK
+    // The recorder has no vertex yet for light that the fog scatters toward the camera.
+    if (at.paths[i].begins_at_surface) checker.radiance(i, mean_of(at.paths[i].radiance));
+#endif
     colours[i] = at.paths[i].waves.to_colour(at.paths[i].radiance);
   }
 };

@@ -19,6 +19,7 @@ struct path {
   float pdf = 0.0f;    ///< of its direction, per steradian; 0: a delta lobe's, or the camera's
   float scale = 1.0f;  ///< times throughput: what roulette looks at
   bool active = true;
+  bool begins_at_surface = false;  ///< not in the fog, and not at infinity
 };
 
 /// A point where a path goes on.

@@ -18,6 +18,7 @@
 #include <map>
 #include <optional>
 #include <ostream>
+#include <string>
 
 namespace kernels {
 namespace {
@@ -29,7 +30,7 @@ struct arguments {
   render::render_options options;  // of which the picture's and the budget's are used
   std::string output, png, reference, where = "tbb";
   float fog = 0.0f;
-  bool unguided = false;
+  bool unguided = false, check = false;
 };
 
 const std::map<std::string, device> devices{
@@ -45,7 +46,10 @@ void add_options(CLI::App& app, arguments& given) {
       ->transform(render::file_path());
   app.add_option("--fog", given.fog, "scattering events per scene unit (default: 0)")
       ->transform(render::number(0.0, 1.0e6));
-  app.add_flag("--unguided", given.unguided, "no sample is guided");
+  CLI::Option* const unguided = app.add_flag("--unguided", given.unguided, "no sample is guided");
+  app.add_flag("--check", given.check,
+               "says what is wrong in the use of the guide, and whether it pays; needs --spp of 4 or more")
+      ->excludes(unguided);
   app.add_option("--device", given.where, "serial, tbb or cuda (default: tbb)")
       ->check(CLI::IsMember({"serial", "tbb", "cuda"}));
 }
@@ -89,9 +93,16 @@ void run(arguments& given, std::ostream& out, std::ostream& log) {
   wanted.roulette_depth = static_cast<std::uint32_t>(options.roulette_depth);
   wanted.fog = given.fog;
   wanted.guided = !given.unguided;
+  wanted.check = given.check;
+  if (given.check) wanted.unguided_samples = static_cast<std::uint32_t>(std::max(options.spp / 2, 2));
   wanted.seed = options.seed;
   const auto host = make_renderer(devices.at(given.where), scene, wanted);
   const render::image picture = take_samples(*host, given, options.width, options.height);
+  if (given.check) {
+    const std::string faults = host->faults(), note = host->note();
+    out << (faults.empty() ? "the guide is used as it should be" : faults) << '\n';
+    if (!note.empty()) out << note << '\n';
+  }
   if (!given.output.empty()) render::write_exr(given.output, picture);
   if (!given.png.empty()) render::write_png(given.png, picture);
   if (reference) {
@@ -112,8 +123,8 @@ int run_program(int argc, const char* const* argv, std::ostream& out, std::ostre
   add_options(app, given);
   try {
     app.parse(argc, argv);
-    if (given.output.empty() && given.png.empty() && given.reference.empty())
-      throw CLI::RequiredError("one of -o, --png, --reference");
+    if (given.output.empty() && given.png.empty() && given.reference.empty() && !given.check)
+      throw CLI::RequiredError("one of -o, --png, --reference, --check");
   } catch (const CLI::ParseError& error) {
     return app.exit(error, out, log) == 0 ? 0 : failure;
   }

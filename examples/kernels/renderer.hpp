@@ -5,7 +5,9 @@
 
 #include "scene/scene.hpp"
 
+#include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace kernels {
@@ -17,7 +19,9 @@ struct settings {
   std::uint32_t max_depth = 8;       ///< most vertices of a path, at least 1
   std::uint32_t roulette_depth = 3;  ///< Russian roulette begins at this vertex; the camera's first hit is 0
   float fog = 0.0f;                  ///< scattering events of the fog per scene unit, at least 0
-  bool guided = true;                ///< from the second sample on
+  bool guided = true;                ///< after unguided_samples
+  std::uint32_t unguided_samples = 1;
+  bool check = false;  ///< whether faults() and note() know anything
   std::uint64_t seed = 0;
 };
 
@@ -26,6 +30,11 @@ class renderer {
   virtual ~renderer() = default;
   /// Renders one sample of each pixel and returns its colours, row by row from the top, linear RGB.
   virtual std::vector<vec3> sample() = 0;
+  /// What the samples so far show to be wrong in the host's use of the guide, a sentence a line. Empty where
+  /// nothing is, or nothing is checked.
+  virtual std::string faults() const { return {}; }
+  /// Says that guiding does not pay, where so, after two samples of each kind.
+  virtual std::string note() const { return {}; }
 };
 
 enum class device { serial, tbb, cuda };

@@ -8,6 +8,11 @@
 #if KERNELS_GUIDE
 #include <wfpg/octree/fragments_from_caster.hpp>
 #endif
+#if KERNELS_CHECK
+#include <wfpg/testing/check_host.hpp>
+#endif
+
+#include <optional>
 
 namespace kernels {
 
@@ -47,7 +52,7 @@ inline wfpg::kept_guide_options guide_options(const settings& wanted) {
   options.max_paths = std::size_t(wanted.width) * std::size_t(wanted.height);
   options.max_depth = wanted.max_depth;
   options.guided_depths = wanted.max_depth > 3 ? wanted.max_depth - 2 : 1;
-  options.unguided_samples = wanted.guided ? 1 : ~0u;
+  options.unguided_samples = wanted.guided ? wanted.unguided_samples : ~0u;
   options.records_waves = true;
   options.seed = wanted.seed;
   return options;
@@ -84,6 +89,11 @@ class wavefront : public renderer {
                 guide_options(wanted))
 #endif
   {
+#if KERNELS_CHECK
+    wfpg::testing::host_check_options options;
+    options.media = wanted.fog > 0.0f;
+    if (wanted.check) checker_.emplace(policy(), count_, wanted.max_depth, options);
+#endif
   }
 
   std::vector<vec3> sample() override {
@@ -97,20 +107,40 @@ class wavefront : public renderer {
       if (at.is_last()) break;
       shade_all(at);
     }
+    ++samples_;
+#if KERNELS_CHECK
+    Device::launch(count_, write_colours{at, address(colours_), checker()});
+    if (checker_) checker_->end_sample(guider_.recorder(), guide_caster<Device>{geometry_.get(), at.scene});
+#else
+    Device::launch(count_, write_colours{at, address(colours_)});
+#endif
 #if KERNELS_GUIDE
     guider_.end_sample();
 #endif
-    ++samples_;
-    Device::launch(count_, write_colours{at, address(colours_)});
     std::vector<vec3> colours(count_);
     ::thrust::copy(colours_.begin(), colours_.end(), colours.begin());
     return colours;
   }
 
+#if KERNELS_CHECK
+  std::string faults() const override {
+    return checker_ ? checker_->report().message : "";
+  }
+  std::string note() const override {
+    return checker_ ? checker_->note() : "";
+  }
+#endif
+
  private:
   using policy = typename Device::policy;
   template <class T>
   using array = typename Device::template array<T>;
+
+#if KERNELS_CHECK
+  wfpg::testing::host_checker_view checker() const {
+    return checker_ ? checker_->view() : wfpg::testing::host_checker_view();
+  }
+#endif
 
   wave first_wave() {
     wave at;
@@ -167,7 +197,10 @@ class wavefront : public renderer {
   template <class Bsdf>
   void shade_queue(const wave& at) {
     const std::size_t n = fill_queue(static_cast<std::uint32_t>(Bsdf::kind));
-#if KERNELS_GUIDE
+#if KERNELS_CHECK
+    Device::launch(
+        n, shade<Bsdf>{at, address(queue_), wanted_.roulette_depth, view_, guider_.recorder(), checker()});
+#elif KERNELS_GUIDE
     Device::launch(n, shade<Bsdf>{at, address(queue_), wanted_.roulette_depth, view_, guider_.recorder()});
 #else
     Device::launch(n, shade<Bsdf>{at, address(queue_), wanted_.roulette_depth});
@@ -192,6 +225,9 @@ class wavefront : public renderer {
 #if KERNELS_GUIDE
   guider_of<Device> guider_;
   wfpg::guide_view view_;
+#endif
+#if KERNELS_CHECK
+  std::optional<wfpg::testing::host_checker<policy>> checker_;
 #endif
 };
 

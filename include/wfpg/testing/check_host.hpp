@@ -63,7 +63,8 @@ struct host_step {
 
 /// Options of a host_checker: what the host does, and how strict the checks are.
 struct host_check_options {
-  /// Paths may end in a medium or below a surface, and nobody tells the recorder.
+  /// Paths may end in a medium or below a surface, and nobody tells the recorder. Escapes are then not
+  /// checked.
   bool media = false;
   /// Relative difference allowed between two densities, or two sums of radiance, of one thing. In (0, 1).
   float tolerance = 1.0e-3f;
@@ -178,7 +179,8 @@ class host_checker {
   ///
   /// It compares variances of pixels, of values c / (1 + c), between guided and unguided samples. A path's
   /// index is that of its pixel, and radiance() is called for it. Two samples of each kind are needed, so set
-  /// sampling_options::unguided_samples to 2. Time does not count.
+  /// sampling_options::unguided_samples to 2 or more. It speaks from one standard error on: a few dozen
+  /// samples make that small. Time does not count.
   std::string note() const { return findings_.note(); }
 
  private:

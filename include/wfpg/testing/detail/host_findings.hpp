@@ -123,7 +123,7 @@ class pixel_variances {
       squares += without * without;
     }
     const double error = std::sqrt(squares * double(parts - 1) / double(parts));
-    if (!(ratio - 2.0 * error > 1.0)) return {};
+    if (!(ratio - error > 1.0)) return {};
     return sentence("guiding does not pay here: the variance of guided samples is ", ratio, " +- ", error,
                     " of unguided ones");
   }
@@ -358,10 +358,9 @@ class host_findings {
     rays.push_back(r);
   }
 
-  /// In media a ray that misses may not have left the scene, so that only silence tells.
+  /// In media a ray that misses may not have left the scene.
   bool has_unheard_escapes() const {
-    if (unheard_ < 8) return false;
-    return media_ ? escapes_ == 0 && unheard_ >= 32 : double(unheard_) > 0.1 * double(unheard_ + escapes_);
+    return !media_ && unheard_ >= 8 && double(unheard_) > 0.1 * double(unheard_ + escapes_);
   }
 
   bool media_ = false;
