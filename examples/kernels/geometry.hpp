@@ -18,10 +18,6 @@ class geometry {
   virtual void trace(const ray* rays, std::size_t n, triangle_hit* hits) const = 0;
   /// Finds whether anything lies inside (t_min, t_max) of each ray; a ray with t_max = 0 is not asked.
   virtual void occluded(const ray* rays, std::size_t n, std::uint32_t* hidden) const = 0;
-#if KERNELS_GUIDE
-  /// The box around all that rays can hit.
-  virtual wfpg::bounds3 bounds() const = 0;
-#endif
 };
 
 template <class Caster>
@@ -49,11 +45,7 @@ template <class Device, class Accelerated>
 class accelerated_geometry : public geometry<Device> {
  public:
   accelerated_geometry(const render::scene& host, const render::scene_view& arrays)
-      : accelerated_(typename Device::policy(), host, arrays) {
-#if KERNELS_GUIDE
-    bounds_ = render::bounds_of(host);
-#endif
-  }
+      : accelerated_(typename Device::policy(), host, arrays) {}
 
   void trace(const ray* rays, std::size_t n, triangle_hit* hits) const override {
     Device::launch(n, trace_rays<caster>{accelerated_.caster(), rays, hits});
@@ -61,19 +53,11 @@ class accelerated_geometry : public geometry<Device> {
   void occluded(const ray* rays, std::size_t n, std::uint32_t* hidden) const override {
     Device::launch(n, find_occluded<caster>{accelerated_.caster(), rays, hidden});
   }
-#if KERNELS_GUIDE
-  wfpg::bounds3 bounds() const override {
-    return bounds_;
-  }
-#endif
 
  private:
   using caster = decltype(std::declval<const Accelerated&>().caster());
 
   Accelerated accelerated_;
-#if KERNELS_GUIDE
-  wfpg::bounds3 bounds_;
-#endif
 };
 
 }  // namespace kernels

@@ -57,14 +57,14 @@ void add_options(CLI::App& app, arguments& given) {
 /// Takes samples until the budget is spent, and returns their weighted mean.
 render::image take_samples(renderer& host, const arguments& given, int width, int height) {
   const auto begin = std::chrono::steady_clock::now();
-  const auto combination =
-      given.unguided ? wfpg::sample_combination::constant : wfpg::sample_combination::pt_linear;
   std::vector<glm::dvec3> sums(std::size_t(width) * std::size_t(height), glm::dvec3(0.0));
   double weights = 0.0, seconds = 0.0;
   const double limit = given.options.seconds;
   render::progress_bar bar;
   for (int i = 1; limit > 0.0 ? i == 1 || seconds < limit : i <= given.options.spp; ++i) {
-    const double weight = wfpg::sample_weight(combination, static_cast<std::uint32_t>(i));
+    using wfpg::sample_combination, wfpg::sample_weight;
+    const auto number = static_cast<std::uint32_t>(i);
+    const double weight = given.unguided ? 1.0 : sample_weight(sample_combination::pt_linear, number);
     const std::vector<vec3> colours = host.sample();
     for (std::size_t p = 0; p < sums.size(); ++p) sums[p] += weight * glm::dvec3(colours[p]);
     weights += weight;

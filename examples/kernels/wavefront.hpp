@@ -1,13 +1,10 @@
 // The host: one sample of all pixels is a wave that goes from vertex to vertex.
 #pragma once
 
+#include "guiding.hpp"
 #include "kernels.hpp"
 #include "renderer.hpp"
 
-#include <wfpg/base/error.hpp>
-#if KERNELS_GUIDE
-#include <wfpg/octree/fragments_from_caster.hpp>
-#endif
 #if KERNELS_CHECK
 #include <wfpg/testing/check_host.hpp>
 #endif
@@ -15,52 +12,6 @@
 #include <optional>
 
 namespace kernels {
-
-#if KERNELS_GUIDE
-/// A batch of hits as the guide asks for them: the distance, or the environment's luminance.
-struct answer_guide {
-  render::scene_view scene;
-  wfpg::array_view<const wfpg::ray> rays;
-  const triangle_hit* found;
-  wfpg::array_view<wfpg::ray_hit> hits;
-
-  KERNELS_BOTH void operator()(std::size_t i) const {
-    const wfpg::ray& asked = rays[i];
-    if (found[i].is_hit())
-      hits[i] = {glm::length(scene.point(found[i]).position - asked.origin), 0.0f};
-    else
-      hits[i] = {-1.0f, wfpg::luminance(scene.environment.radiance(asked.direction))};
-  }
-};
-
-template <class Device>
-struct guide_caster {
-  const geometry<Device>* traced;
-  render::scene_view scene;
-
-  template <class Exec>
-  void cast(const Exec& exec, wfpg::array_view<const wfpg::ray> rays,
-            wfpg::array_view<wfpg::ray_hit> hits) const {
-    const wfpg::buffer<triangle_hit, Exec> found(exec, rays.size());
-    traced->trace(rays.data(), rays.size(), found.data());
-    Device::launch(rays.size(), answer_guide{scene, rays, found.data(), hits});
-  }
-};
-
-inline wfpg::kept_guide_options guide_options(const settings& wanted) {
-  wfpg::kept_guide_options options;
-  options.max_paths = std::size_t(wanted.width) * std::size_t(wanted.height);
-  options.max_depth = wanted.max_depth;
-  options.guided_depths = wanted.max_depth > 3 ? wanted.max_depth - 2 : 1;
-  options.unguided_samples = wanted.guided ? wanted.unguided_samples : ~0u;
-  options.records_waves = true;
-  options.seed = wanted.seed;
-  return options;
-}
-
-template <class Device>
-using guider_of = wfpg::path_guider<typename Device::policy>;
-#endif
 
 template <class Device, class Accelerated>
 class wavefront : public renderer {
@@ -83,10 +34,8 @@ class wavefront : public renderer {
         colours_(count_)
 #if KERNELS_GUIDE
         ,
-        guider_(policy(),
-                wfpg::fragments_from_caster(policy(), guide_caster<Device>{geometry_.get(), arrays_.view()},
-                                            geometry_->bounds()),
-                guide_options(wanted))
+        guider_(make_guider(guide_caster<Device>{geometry_.get(), arrays_.view()}, render::bounds_of(host),
+                            wanted))
 #endif
   {
 #if KERNELS_CHECK
@@ -223,7 +172,7 @@ class wavefront : public renderer {
   array<vec3> colours_;
   std::uint32_t samples_ = 0;
 #if KERNELS_GUIDE
-  guider_of<Device> guider_;
+  guider_on<Device> guider_;
   wfpg::guide_view view_;
 #endif
 #if KERNELS_CHECK
