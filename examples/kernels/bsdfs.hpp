@@ -196,9 +196,10 @@ struct frosted_glass {
       vec3 sum = wo + (reflects ? 1.0f : eta) * wi;
       if (wo.z == 0.0f || wi.z == 0.0f || sum == vec3(0.0f)) return;
       h = glm::normalize(sum.z < 0.0f ? -sum : sum);
-      const float out = glm::dot(wo, h), in = glm::dot(wi, h);
-      exists = out > 0.0f && (reflects || in < 0.0f);
-      if (exists) reflected = reflects ? fresnel_dielectric(out, eta) : fresnel_dielectric(out, -in, eta);
+      const float outside = glm::dot(wo, h), inside = glm::dot(wi, h);
+      exists = outside > 0.0f && (reflects || inside < 0.0f);
+      if (exists)
+        reflected = reflects ? fresnel_dielectric(outside, eta) : fresnel_dielectric(outside, -inside, eta);
     }
   };
 };
