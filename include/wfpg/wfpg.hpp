@@ -55,6 +55,7 @@
 #include <wfpg/host/geometry.hpp>
 #include <wfpg/host/ray_caster.hpp>
 #include <wfpg/host/wave.hpp>
+#include <wfpg/light/path_weights.hpp>
 #include <wfpg/octree/bottom_up.hpp>
 #include <wfpg/octree/exitance_cache.hpp>
 #include <wfpg/octree/fragments_from_caster.hpp>

@@ -67,6 +67,15 @@ __global__ void use_checker(wfpg::testing::host_checker_view checker, wfpg::guid
   checker.radiance(threadIdx.x, 1.0f);
 }
 
+__global__ void use_path_weights(wfpg::path_techniques techniques, wfpg::path_departure to, float* out) {
+  const auto light = wfpg::subpath_weights::from_light(techniques, {}).arrive({1.0f});
+  const auto camera = wfpg::subpath_weights::from_camera(1.0f).arrive({1.0f});
+  const auto next = light.depart(techniques, to).arrive({1.0f});
+  out[0] = next.connection(techniques, to, camera, to, {1.0f}) + next.splat(techniques, to, 1.0f, {1.0f}) +
+           next.merge(techniques, wfpg::merge_technique::beams, camera, to) +
+           camera.next_event(techniques, to, {}, {1.0f}) + camera.light_hit(techniques, {});
+}
+
 __global__ void use_learnt(wfpg::learnt_radiance_view learnt) {
   if (!learnt.empty()) learnt.deposit(0, wfpg::vec3(0, 0, 1), 1.0f);
 }
