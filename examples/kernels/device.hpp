@@ -13,6 +13,7 @@
 #endif
 
 #include <thrust/copy.h>
+#include <thrust/for_each.h>
 #include <thrust/iterator/counting_iterator.h>
 
 #include <cstddef>
@@ -55,24 +56,15 @@ struct tbb_threads {
   static auto thrust() { return ::thrust::tbb::par; }
 };
 #else
-template <class Kernel>
-__global__ void call_for_each(std::size_t n, Kernel kernel) {
-  const std::size_t i = std::size_t(blockIdx.x) * blockDim.x + threadIdx.x;
-  if (i < n) kernel(i);
-}
-
 struct gpu {
   using policy = wfpg::exec::cuda;
   template <class T>
   using array = ::thrust::device_vector<T>;
 
-  /// Throws where the launch fails.
+  /// Throws thrust::system_error where a kernel fails.
   template <class Kernel>
   static void launch(std::size_t n, const Kernel& kernel) {
-    constexpr unsigned block = 128;
-    if (n == 0) return;
-    call_for_each<<<static_cast<unsigned>((n + block - 1) / block), block> > >(n, kernel);
-    wfpg::check_cuda(cudaGetLastError(), "a kernel of the host");
+    ::thrust::for_each_n(::thrust::cuda::par, ::thrust::counting_iterator<std::size_t>(0), n, kernel);
   }
   static auto thrust() { return ::thrust::cuda::par; }
 };

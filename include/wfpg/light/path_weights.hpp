@@ -92,7 +92,7 @@ struct basic_path_arrival {
 /// How a subpath leaves a vertex, for its next one or for a vertex of the other subpath.
 template <class Real>
 struct basic_path_departure {
-  scattering_kind kind = scattering_kind::surface;
+  scattering_kind kind = scattering_kind::surface;  ///< of the vertex
   Real pdf = 0;       ///< of the direction in which it leaves, per steradian; of a delta lobe its probability
   Real pdf_back = 0;  ///< of a path that comes the other way: toward the vertex before; not read for delta
   Real cosine = 1;    ///< |cos| between normal and that direction; 1 in media
