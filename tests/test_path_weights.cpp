@@ -231,6 +231,7 @@ class recursion {
     to.kind = x_.kind(i);
     to.pdf = for_light ? value(x_.direction_of_camera, i - 1) : value(x_.direction_of_light, i + 1);
     to.pdf_back = for_light ? value(x_.direction_of_light, i + 1) : value(x_.direction_of_camera, i - 1);
+    if (to.kind == scattering_kind::delta) to.pdf_back = 0;  // not read
     to.cosine = value(for_light ? x_.cosine_before : x_.cosine_behind, i);
     if (counts_.beams > 0) {  // else neither is read
       to.sine = broken_ == fault::no_sine ? Real(1) : value(x_.sine, i);
@@ -240,7 +241,7 @@ class recursion {
       to.kind = scattering_kind::surface;
     if (to.kind == scattering_kind::delta && broken_ == fault::delta_has_two_ways) {
       to.kind = scattering_kind::surface;
-      to.pdf_back *= Real(0.5);
+      to.pdf_back = Real(0.5) * to.pdf;
     }
     return to;
   }
