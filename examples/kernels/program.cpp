@@ -77,6 +77,21 @@ render::image take_samples(renderer& host, const arguments& given, int width, in
   return picture;
 }
 
+/// A picture of luminance alone. Four wavelengths a path make more noise of colour than of luminance.
+render::image grey(render::image picture) {
+  for (vec3& pixel : picture.pixels) pixel = vec3(wfpg::luminance(pixel));
+  return picture;
+}
+
+void print_error(const render::image& picture, const render::image& reference, std::ostream& out) {
+  const render::image_error error = render::compare(picture, reference);
+  const double of_luminance = render::compare(grey(picture), grey(reference)).mse_reinhard;
+  char line[160];
+  std::snprintf(line, sizeof line, "mse %.6e  relmse %.6e  mse reinhard %.6e, of luminance %.6e\n", error.mse,
+                error.relmse, error.mse_reinhard, of_luminance);
+  out << line;
+}
+
 void run(arguments& given, std::ostream& out, std::ostream& log) {
   render::check_outputs({{"--output", given.output, ".exr"}, {"--png", given.png, ".png"}},
                         {{"--reference", given.reference, ""}});
@@ -105,13 +120,7 @@ void run(arguments& given, std::ostream& out, std::ostream& log) {
   }
   if (!given.output.empty()) render::write_exr(given.output, picture);
   if (!given.png.empty()) render::write_png(given.png, picture);
-  if (reference) {
-    const render::image_error error = render::compare(picture, *reference);
-    char line[100];
-    std::snprintf(line, sizeof line, "mse %.6e  relmse %.6e  mse reinhard %.6e\n", error.mse, error.relmse,
-                  error.mse_reinhard);
-    out << line;
-  }
+  if (reference) print_error(picture, *reference, out);
 }
 
 }  // namespace
