@@ -53,6 +53,8 @@
 #include <wfpg/guides/sarsa/sarsa_grid.hpp>
 #include <wfpg/host/bsdf.hpp>
 #include <wfpg/host/geometry.hpp>
+#include <wfpg/host/medium.hpp>
+#include <wfpg/host/phase.hpp>
 #include <wfpg/host/ray_caster.hpp>
 #include <wfpg/host/wave.hpp>
 #include <wfpg/light/path_weights.hpp>

@@ -76,6 +76,12 @@ __global__ void use_path_weights(wfpg::path_techniques techniques, wfpg::path_de
            camera.next_event(techniques, to, {}, {1.0f}) + camera.light_hit(techniques, {});
 }
 
+__global__ void use_medium(wfpg::homogeneous_medium medium, wfpg::henyey_greenstein phase, float* out) {
+  const auto drawn = medium.sample(0.25f, 0.5f, 1.0f);
+  const auto turned = phase.sample(wfpg::vec3(0, 0, 1), wfpg::vec2(0.5f));
+  out[0] = drawn.weight.x + medium.pdf(drawn.distance, drawn.scatters) + turned.pdf;
+}
+
 __global__ void use_learnt(wfpg::learnt_radiance_view learnt) {
   if (!learnt.empty()) learnt.deposit(0, wfpg::vec3(0, 0, 1), 1.0f);
 }
