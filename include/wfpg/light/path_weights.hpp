@@ -218,7 +218,6 @@ class basic_vertex_weights {
     if (is_delta) return left;
     // Merges at this vertex. A part of them is over the density of the distance back from the next vertex,
     // which is not known before the path arrives there.
-    // Density of the next vertex, of which the arrival divides by the rest.
     const Real over = to.cosine / to.pdf;
     if (to.kind == scattering_kind::surface) {
       left.merges_ = over * t.surface_points;
