@@ -6,7 +6,10 @@
 #include "support/pictures.hpp"
 #include "support/temporary_folder.hpp"
 
+#include <algorithm>
 #include <cstdio>
+#include <limits>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -165,11 +168,13 @@ TEST_CASE("wfpg-kernels writes what is asked for, and refuses the rest in one li
   CHECK(compared.out.rfind("mse 0.0", 0) == 0);
   const auto checked = run({"materials", "--size", "32x32", "--spp", "4", "--device", "serial", "--check"});
   CHECK(checked.code == 0);
-  CHECK(checked.out == "the guide is used as it should be\n");
+  CHECK(checked.out.rfind("the guide is used as it should be\n", 0) == 0);  // a note may follow
   for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
            {"cornell-box"},
            {"cornell-box", "-o", "a.jpg"},
            {"cornell-box", "--check", "--unguided"},
+           {"cornell-box", "--check", "--spp", "3"},
+           {"cornell-box", "--check", "--seconds", "1"},
            {"cornell-box", "-o", picture, "--fog", "-1"},
            {"cornell-box", "-o", picture, "--device", "abacus"},
            {"nowhere", "-o", picture},

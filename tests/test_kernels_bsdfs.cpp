@@ -1,6 +1,7 @@
 // The BSDFs of examples/kernels: value, density and drawn directions agree, also where the first two are
 // estimates.
 #include "bsdfs.hpp"
+#include "materials/materials.hpp"
 #include "support/catch.hpp"
 #include "support/policies.hpp"
 
@@ -70,6 +71,62 @@ vec2 pair_of(wfpg_test::random_numbers& random) {
   return {first, random.unit()};
 }
 
+/// The renderer's BSDF of one of the kernels' kinds, with its normals along z.
+render::bsdf renderers(render::material_kind kind, float alpha) {
+  render::bsdf f;
+  f.kind = kind;
+  f.colour = vec3(0.9f, 0.6f, 0.3f);
+  f.alpha = alpha;
+  f.ior = 1.5f;
+  return f;
+}
+/// The kernels' BSDF with the same colours.
+template <class Bsdf>
+Bsdf kernels_own(float alpha) {
+  Bsdf bsdf;
+  bsdf.in = {{0.9f, 0.6f, 0.3f, 0.3f}, alpha, 1.5f};
+  return bsdf;
+}
+
+/// Checks value and density against the renderer's, which has tests of its own.
+template <class Bsdf>
+void check_values(float alpha) {
+  const render::bsdf expected = renderers(Bsdf::kind, alpha);
+  const Bsdf found = kernels_own<Bsdf>(alpha);
+  wfpg_test::random_numbers random(21);
+  no_numbers n;
+  for (int i = 0; i < 1000; ++i) {
+    const vec3 wo = random.direction(), wi = random.direction();
+    const vec3 value = expected.eval_rgb(wo, wi), own = vec3(found.value(wo, wi, n));
+    INFO(value.x << ' ' << own.x << ", " << expected.pdf(wo, wi) << ' ' << found.density(wo, wi, n));
+    CHECK(glm::distance(value, own) <= 1e-4f * glm::length(value));
+  }
+}
+
+/// Checks the delta lobes of both sides: their weights, and that they are drawn as the renderer's are.
+template <class Bsdf>
+void check_delta_lobes() {
+  const render::bsdf expected = renderers(Bsdf::kind, 0.1f);
+  const Bsdf found = kernels_own<Bsdf>(0.1f);
+  wfpg_test::random_numbers random(22);
+  no_numbers n;
+  for (int i = 0; i < 1000; ++i) {
+    const vec3 wo = random.direction();
+    const float u = random.unit();
+    const wfpg::bsdf_sample drawn = expected.sample(wo, vec2(u, 0.5f));
+    const kernels::drawn_direction own = found.draw(wo, u, vec2(0.5f), n);
+    if (!(drawn.pdf > 0.0f)) {
+      CHECK(kernels::mean_of(own.weight) == 0.0f);
+      continue;
+    }
+    CHECK(own.is_delta);
+    CHECK(glm::distance(own.wi, drawn.direction) < 1e-5f);
+    CHECK(own.pdf == Approx(drawn.pdf));
+    const vec3 weight = expected.delta_weight_rgb(wo, drawn.direction, drawn.pdf);
+    CHECK(glm::distance(weight, vec3(own.weight)) <= 1e-5f * glm::length(weight));
+  }
+}
+
 /// Random numbers of a walk.
 struct walk_numbers {
   wfpg_test::random_numbers* random;
@@ -83,6 +140,28 @@ TEST_CASE("kernels' BSDFs: values, densities and directions agree", "[kernels]")
   for (const float alpha : {0.1f, 0.5f}) check<kernels::metal>(alpha);
   check<kernels::varnish>(0.1f);
   for (const float alpha : {0.1f, 0.4f}) check<kernels::frosted_glass>(alpha, true);
+}
+
+TEST_CASE("kernels' BSDFs: those that the renderer has too are the same", "[kernels]") {
+  check_values<kernels::matte>(0.1f);
+  for (const float alpha : {0.1f, 0.5f}) {
+    check_values<kernels::metal>(alpha);
+    check_values<kernels::frosted_glass>(alpha);
+  }
+  check_delta_lobes<kernels::mirror>();
+  check_delta_lobes<kernels::glass>();
+}
+
+TEST_CASE("kernels' BSDFs: a coat reflects what Fresnel's formula says", "[kernels]") {
+  const auto varnish = kernels_own<kernels::varnish>(0.1f);
+  no_numbers n;
+  for (const float z : {0.1f, 0.5f, 1.0f}) {
+    const vec3 wo(std::sqrt(1.0f - z * z), 0.0f, z);
+    const kernels::drawn_direction drawn = varnish.draw(wo, 0.0f, vec2(0.5f), n);
+    CHECK(drawn.is_delta);
+    CHECK(drawn.wi == vec3(-wo.x, -wo.y, wo.z));
+    CHECK(drawn.weight.x * drawn.pdf == Approx(kernels::fresnel_dielectric(z, 1.5f)));
+  }
 }
 
 TEST_CASE("kernels' BSDFs: the estimates of a layered one have the means of its directions", "[kernels]") {

@@ -10,6 +10,7 @@
 
 #include <glm/vec4.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 

@@ -1,8 +1,10 @@
-// The host's geometry, which is private to who casts rays: nobody else sees triangles.
+// Casting rays, behind an interface: what answers them is private to it.
 #pragma once
 
 #include "device.hpp"
 #include "scene/device_scene.hpp"
+
+#include <utility>
 
 namespace kernels {
 

@@ -5,6 +5,8 @@
 
 #include "path.hpp"
 
+#include <cmath>
+
 #if KERNELS_GUIDE
 #include <wfpg/path_guider.hpp>
 #include <wfpg/sampling/roulette.hpp>
@@ -80,7 +82,7 @@ struct find_vertices {
 
   KERNELS_BOTH void enter_surface(std::size_t i, const render::hit_surface& found) const {
     path& p = at.paths[i];
-    if (at.depth == 0) p.begins_at_surface = true;
+    p.has_met_surface = true;
     const auto& surface = found.surface;
     const render::bsdf& scatters = surface.bsdf;
     const float distance = glm::length(surface.position - p.next.origin);
@@ -261,21 +263,20 @@ struct shade {
     const vec2 u2 = at.draw(s.id, render::dimension::direction + 1);
     drawn_direction& drawn = s.drawn;
     vec3 direction;
-    spectrum value;
 #if KERNELS_GUIDE
     if (s.mixture.choose(u)) {
       direction = s.mixture.sample(u2);
       drawn.wi = s.local.to_local(direction);
-      value = s.bsdf.value(s.wo, drawn.wi, s.walks);
-      drawn.pdf = s.bsdf.density(s.wo, drawn.wi, s.walks);
     } else
 #endif
     {
       drawn = s.bsdf.draw(s.wo, u, u2, s.walks);
       direction = glm::normalize(s.local.to_world(drawn.wi));
-      if (!drawn.is_delta) drawn.pdf = s.bsdf.density(s.wo, drawn.wi, s.walks);
-      value = drawn.weight * drawn.pdf;
     }
+    if (!drawn.is_delta) drawn.pdf = s.bsdf.density(s.wo, drawn.wi, s.walks);
+    // A direction that the BSDF did not draw has no weight.
+    const bool has_weight = mean_of(drawn.weight) > 0.0f;
+    const spectrum value = has_weight ? drawn.weight * drawn.pdf : s.bsdf.value(s.wo, drawn.wi, s.walks);
     if (!(mean_of(value) > 0.0f) || !s.can_pass(drawn.wi, direction)) return false;
     s.pdf = drawn.is_delta ? drawn.pdf : s.density(direction, drawn.pdf);
 #if KERNELS_GUIDE
@@ -341,7 +342,9 @@ struct add_light {
     path& p = at.paths[i];
     p.radiance += radiance;
 #if KERNELS_GUIDE
-    recorder.total(i, at.depth, mean_of(p.radiance));
+    // The recorder has no vertex for light that the fog scatters toward the camera.
+    if (!p.has_met_surface) p.unrecorded += mean_of(radiance);
+    recorder.total(i, at.depth, mean_of(p.radiance) - p.unrecorded);
 #endif
   }
 };
@@ -356,8 +359,8 @@ struct write_colours {
 
   KERNELS_BOTH void operator()(std::size_t i) const {
 #if KERNELS_CHECK
-    // The recorder has no vertex yet for light that the fog scatters toward the camera.
-    if (at.paths[i].begins_at_surface) checker.radiance(i, mean_of(at.paths[i].radiance));
+    const path& p = at.paths[i];
+    checker.radiance(i, mean_of(p.radiance) - p.unrecorded);
 #endif
     colours[i] = at.paths[i].waves.to_colour(at.paths[i].radiance);
   }

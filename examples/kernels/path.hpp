@@ -8,7 +8,7 @@
 
 namespace kernels {
 
-/// Queues of vertices: one for each kind of material, one for the fog. `none` is no vertex.
+/// Queues of vertices: one for each kind of material, one for the fog. `no_queue` is no vertex.
 enum queue : std::uint32_t { fog_queue = 100, no_queue = 101 };
 
 struct path {
@@ -19,7 +19,8 @@ struct path {
   float pdf = 0.0f;    ///< of its direction, per steradian; 0: a delta lobe's, or the camera's
   float scale = 1.0f;  ///< times throughput: what roulette looks at
   bool active = true;
-  bool begins_at_surface = false;  ///< not in the fog, and not at infinity
+  bool has_met_surface = false;
+  float unrecorded = 0.0f;  ///< radiance from before it met a surface
 };
 
 /// A point where a path goes on.
@@ -36,7 +37,7 @@ struct shadow_query {
   spectrum radiance{0.0f};
 };
 
-/// Random numbers of one vertex of a path. The first eight are render::dimension's.
+/// Random numbers of one vertex of a path. Those below `of_fog` are render::dimension's.
 struct path_numbers {
   render::random_stream stream;
   std::uint32_t id = 0, next = 0;

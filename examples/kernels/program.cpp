@@ -13,12 +13,16 @@
 
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <map>
 #include <optional>
 #include <ostream>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace kernels {
 namespace {
@@ -109,6 +113,8 @@ void run(arguments& given, std::ostream& out, std::ostream& log) {
   wanted.fog = given.fog;
   wanted.guided = !given.unguided;
   wanted.check = given.check;
+  if (given.check && (options.seconds > 0.0 || options.spp < 4))
+    throw std::invalid_argument("--check: expected --spp of 4 or more, half of which is guided");
   if (given.check) wanted.unguided_samples = static_cast<std::uint32_t>(std::max(options.spp / 2, 2));
   wanted.seed = options.seed;
   const auto host = make_renderer(devices.at(given.where), scene, wanted);

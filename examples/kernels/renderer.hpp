@@ -1,6 +1,6 @@
 // A small spectral path tracer of the kind that production renderers are: hits are sorted into queues by
 // material, a BSDF exists only in its material's kernel, geometry is behind an interface, a fog scatters. It
-// shows what such a host adds for wfpg: the lines in #if KERNELS_GUIDE.
+// shows what such a host adds for wfpg: the lines in #if KERNELS_GUIDE, and those that name it.
 #pragma once
 
 #include "scene/scene.hpp"

@@ -4,8 +4,11 @@
 #include "renderer.hpp"
 #include "support/renderings.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
