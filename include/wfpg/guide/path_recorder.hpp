@@ -159,8 +159,8 @@ class path_recorder_view {
 
   /// Adds what the path's radiance has grown by since what is recorded of it, as scattered by vertex `depth`.
   /// For hosts that add light to their paths in other kernels. `sum` is all radiance that the path has
-  /// brought to its origin so far. O(depth): it adds up what the path's vertices have. The sum may shrink by
-  /// rounding, and a difference below 0 counts as 0.
+  /// brought to its origin so far, without what came before its first recorded vertex. O(depth). The sum may
+  /// shrink by rounding, and a difference below 0 counts as 0.
   WFPG_HD void total(std::size_t path, std::uint32_t depth, path_light sum) const {
     std::uint32_t place;
     if (!find(path, place)) return;

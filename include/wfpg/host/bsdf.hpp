@@ -47,7 +47,7 @@ struct glossy_part {
   /// pdf = 1 / (4 pi alpha^2). A cosine lobe has at most 1/pi there, and alpha is then at least 1/2, so it
   /// keeps its guide. A diffuse BSDF under a thin coat is guided less than by its true part.
   /// Where light refracts, give the larger of the densities at the mirrored and the refracted direction.
-  /// A peak above 32 per steradian is narrower than a field's cell. It counts as delta: the guide leaves it
+  /// A peak above 32 per steradian spans few of a field's cells. It counts as delta: the guide leaves it
   /// to the BSDF.
   /// A density that is not positive, or not finite, gives none(). Source: Heitz 2018, "Sampling the GGX
   /// Distribution of Visible Normals".

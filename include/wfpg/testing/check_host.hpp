@@ -133,7 +133,7 @@ class host_checker_view {
   wfpg::detail::logged_light* lights_ = nullptr;
 };
 
-/// Checks how a host uses its guide. Each of these is one line of the report:
+/// Checks how a host uses its guide. Each of these has a line of the report, or several:
 ///
 ///   roulette     where the guide chose a path's directions, roulette ends it no sooner. Vertices are
 ///                compared with others of their depth and of their throughput without a guide
