@@ -3,7 +3,6 @@
 //   spectrum value(wo, wi, numbers)            f |cos| without delta lobes; may be an estimate
 //   float density(wo, wi, numbers)             of draw(), per steradian, without delta lobes; may be one
 //   drawn_direction draw(wo, u, u2, numbers)   u chooses a lobe, u2 draws from it
-//   float peak(wo, numbers)                    density() where its narrowest lobe is
 //   is_delta                                   all its lobes are
 // What only the layered one draws at random comes from `numbers`. That of value() and density() is
 // independent.
@@ -20,16 +19,24 @@ using render::material_kind;
 using render::mirrored;
 using render::pi;
 
-/// What a material's kernel knows of a hit.
+/// Inputs of a BSDF: all that a material's kernel knows of a hit.
 struct lobe_inputs {
   spectrum colour{0.0f};
   float alpha = 0.1f;  ///< GGX roughness
   float ior = 1.5f;    ///< inside over outside
+
+  /// Index beyond the boundary over that on the side of `w`.
+  KERNELS_BOTH float eta(vec3 w) const { return w.z < 0.0f ? 1.0f / ior : ior; }
 };
 
 /// `w` as a mirror reflects it.
 KERNELS_BOTH inline vec3 flipped(vec3 w) {
   return {-w.x, -w.y, w.z};
+}
+
+/// 1 above the surface, and -1 below.
+KERNELS_BOTH inline float side_of(vec3 w) {
+  return w.z < 0.0f ? -1.0f : 1.0f;
 }
 
 struct drawn_direction {
@@ -39,12 +46,15 @@ struct drawn_direction {
   bool is_delta = false;
 };
 
-KERNELS_BOTH inline spectrum schlick(const spectrum& colour, float cosine) {
-  const float x = glm::max(0.0f, 1.0f - cosine), x2 = x * x;
-  return colour + (spectrum(1.0f) - colour) * (x2 * x2 * x);
-}
 KERNELS_BOTH inline bool both_above(vec3 wo, vec3 wi) {
   return wo.z > 0.0f && wi.z > 0.0f;
+}
+
+/// The direction `wi` that a BSDF drew, with its weight.
+template <class Bsdf, class Numbers>
+KERNELS_BOTH drawn_direction weighted(const Bsdf& bsdf, vec3 wo, vec3 wi, Numbers& n) {
+  const float pdf = bsdf.density(wo, wi, n);
+  return pdf > 0.0f ? drawn_direction{wi, bsdf.value(wo, wi, n) / pdf} : drawn_direction{};
 }
 
 struct matte {
@@ -59,10 +69,6 @@ struct matte {
   template <class Numbers>
   KERNELS_BOTH float density(vec3 wo, vec3 wi, Numbers&) const {
     return both_above(wo, wi) ? wi.z / pi : 0.0f;
-  }
-  template <class Numbers>
-  KERNELS_BOTH float peak(vec3 wo, Numbers& n) const {
-    return density(wo, flipped(wo), n);
   }
   template <class Numbers>
   KERNELS_BOTH drawn_direction draw(vec3 wo, float, vec2 u2, Numbers&) const {
@@ -80,26 +86,21 @@ struct metal {
   KERNELS_BOTH spectrum value(vec3 wo, vec3 wi, Numbers&) const {
     if (!both_above(wo, wi)) return spectrum(0.0f);
     const vec3 h = glm::normalize(wo + wi);
-    return schlick(in.colour, glm::dot(wo, h)) * ggx{in.alpha}.eval(wo, wi, h);
+    return render::fresnel_schlick(in.colour, glm::dot(wo, h)) * ggx{in.alpha}.eval(wo, wi, h);
   }
   template <class Numbers>
   KERNELS_BOTH float density(vec3 wo, vec3 wi, Numbers&) const {
     return both_above(wo, wi) ? ggx{in.alpha}.pdf(wo, glm::normalize(wo + wi)) : 0.0f;
   }
   template <class Numbers>
-  KERNELS_BOTH float peak(vec3 wo, Numbers& n) const {
-    return density(wo, flipped(wo), n);
-  }
-  template <class Numbers>
   KERNELS_BOTH drawn_direction draw(vec3 wo, float, vec2 u2, Numbers& n) const {
     if (!(wo.z > 0.0f)) return {};
     const vec3 wi = mirrored(wo, ggx{in.alpha}.sample(wo, u2));
-    const float pdf = density(wo, wi, n);
-    return pdf > 0.0f ? drawn_direction{wi, value(wo, wi, n) / pdf} : drawn_direction{};
+    return weighted(*this, wo, wi, n);
   }
 };
 
-/// What a BSDF answers that has delta lobes alone.
+/// Base of BSDFs that have delta lobes alone.
 struct delta_lobes {
   template <class Numbers>
   KERNELS_BOTH spectrum value(vec3, vec3, Numbers&) const {
@@ -107,10 +108,6 @@ struct delta_lobes {
   }
   template <class Numbers>
   KERNELS_BOTH float density(vec3, vec3, Numbers&) const {
-    return 0.0f;
-  }
-  template <class Numbers>
-  KERNELS_BOTH float peak(vec3, Numbers&) const {
     return 0.0f;
   }
 };
@@ -134,7 +131,7 @@ struct glass : delta_lobes {
 
   template <class Numbers>
   KERNELS_BOTH drawn_direction draw(vec3 wo, float u, vec2, Numbers&) const {
-    const float side = wo.z < 0.0f ? -1.0f : 1.0f, eta = side > 0.0f ? in.ior : 1.0f / in.ior;
+    const float side = side_of(wo), eta = in.eta(wo);
     const float reflected = fresnel_dielectric(side * wo.z, eta);
     if (u < reflected) return {flipped(wo), spectrum(1.0f), reflected, true};
     // Radiance is compressed where the index is larger.
@@ -164,22 +161,14 @@ struct frosted_glass {
                       : (1.0f - f.reflected) * ggx{in.alpha}.pdf_through(f.wo, f.wi, f.h, f.eta);
   }
   template <class Numbers>
-  KERNELS_BOTH float peak(vec3 wo, Numbers& n) const {
-    const float side = wo.z < 0.0f ? -1.0f : 1.0f, eta = side > 0.0f ? in.ior : 1.0f / in.ior;
-    const vec3 through = render::refracted(wo, vec3(0.0f, 0.0f, side), eta);
-    const float mirrored_pdf = density(wo, flipped(wo), n);
-    return through == vec3(0.0f) ? mirrored_pdf : glm::max(mirrored_pdf, density(wo, through, n));
-  }
-  template <class Numbers>
   KERNELS_BOTH drawn_direction draw(vec3 wo, float u, vec2 u2, Numbers& n) const {
-    const float side = wo.z < 0.0f ? -1.0f : 1.0f, eta = side > 0.0f ? in.ior : 1.0f / in.ior;
+    const float side = side_of(wo), eta = in.eta(wo);
     const vec3 h = ggx{in.alpha}.sample(side * wo, u2);
     const bool reflects = u < fresnel_dielectric(glm::dot(side * wo, h), eta);
     const vec3 seen = reflects ? mirrored(side * wo, h) : render::refracted(side * wo, h, eta);
     if ((seen.z > 0.0f) != reflects) return {};  // a second facet would be in the way
     const vec3 wi = side * seen;
-    const float pdf = density(wo, wi, n);
-    return pdf > 0.0f ? drawn_direction{wi, value(wo, wi, n) / pdf} : drawn_direction{};
+    return weighted(*this, wo, wi, n);
   }
 
  private:
@@ -190,8 +179,8 @@ struct frosted_glass {
     bool reflects, exists = false;
 
     KERNELS_BOTH facet(const frosted_glass& of, vec3 from, vec3 to) {
-      const float side = from.z < 0.0f ? -1.0f : 1.0f;
-      wo = side * from, wi = side * to, eta = side > 0.0f ? of.in.ior : 1.0f / of.in.ior;
+      const float side = side_of(from);
+      wo = side * from, wi = side * to, eta = of.in.eta(from);
       reflects = wi.z > 0.0f;
       vec3 sum = wo + (reflects ? 1.0f : eta) * wi;
       if (wo.z == 0.0f || wi.z == 0.0f || sum == vec3(0.0f)) return;
@@ -231,10 +220,6 @@ struct varnish {
            glm::mix(matte{in}.density(wo, wi, n), metal_flakes().density(wo, wi, n), flakes);
   }
   template <class Numbers>
-  KERNELS_BOTH float peak(vec3 wo, Numbers& n) const {
-    return density(wo, flipped(wo), n);
-  }
-  template <class Numbers>
   KERNELS_BOTH drawn_direction draw(vec3 wo, float u, vec2 u2, Numbers& n) const {
     if (!(wo.z > 0.0f)) return {};
     const float of_coat = coat(wo);
@@ -242,8 +227,7 @@ struct varnish {
       return {flipped(wo), spectrum(fresnel_dielectric(wo.z, in.ior) / of_coat), of_coat, true};
     const bool is_flake = u < narrow(wo);
     const vec3 wi = is_flake ? metal_flakes().draw(wo, u, u2, n).wi : render::cosine_hemisphere(u2);
-    const float pdf = density(wo, wi, n);
-    return pdf > 0.0f ? drawn_direction{wi, value(wo, wi, n) / pdf} : drawn_direction{};
+    return weighted(*this, wo, wi, n);
   }
 
  private:
@@ -272,10 +256,6 @@ struct paint {
     const vec3 h = glm::normalize(wo + wi);
     return fresnel_dielectric(glm::dot(wo, h), in.ior) * ggx{in.alpha}.pdf(wo, h) +
            passed(wo, n) * (wi.z / pi);
-  }
-  template <class Numbers>
-  KERNELS_BOTH float peak(vec3 wo, Numbers& n) const {
-    return density(wo, flipped(wo), n);
   }
   template <class Numbers>
   KERNELS_BOTH drawn_direction draw(vec3 wo, float u, vec2 u2, Numbers& n) const {
@@ -309,5 +289,18 @@ struct paint {
     return left;
   }
 };
+
+/// The density of a BSDF where its narrowest lobe is: at the mirrored direction.
+template <class Bsdf, class Numbers>
+KERNELS_BOTH float peak(const Bsdf& bsdf, vec3 wo, Numbers& n) {
+  return bsdf.density(wo, flipped(wo), n);
+}
+/// Of rough glass, it may be at the refracted direction.
+template <class Numbers>
+KERNELS_BOTH float peak(const frosted_glass& bsdf, vec3 wo, Numbers& n) {
+  const float mirrored_pdf = bsdf.density(wo, flipped(wo), n);
+  const vec3 through = render::refracted(wo, vec3(0.0f, 0.0f, side_of(wo)), bsdf.in.eta(wo));
+  return through == vec3(0.0f) ? mirrored_pdf : glm::max(mirrored_pdf, bsdf.density(wo, through, n));
+}
 
 }  // namespace kernels

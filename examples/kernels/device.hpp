@@ -1,6 +1,5 @@
-// What the host's kernels run on: one thread, TBB's threads, or a GPU. A device has
+// Devices that the host's kernels run on: one thread, TBB's threads, or a GPU. A device has
 //   array<T>        an array in its memory: of a size, of a std::vector, or empty
-//   launch(n, k)    calls k(i) for each i in [0, n); they are done when the host reads memory
 //   thrust()        Thrust's policy for it
 //   policy          the execution policy of the renderer's scene, and of the guide
 #pragma once
@@ -33,11 +32,6 @@ struct serial {
   using policy = wfpg::exec::seq;
   template <class T>
   using array = std::vector<T>;
-
-  template <class Kernel>
-  static void launch(std::size_t n, const Kernel& kernel) {
-    for (std::size_t i = 0; i < n; ++i) kernel(i);
-  }
   static auto thrust() { return ::thrust::cpp::par; }
 };
 
@@ -46,13 +40,6 @@ struct tbb_threads {
   using policy = wfpg::exec::tbb;
   template <class T>
   using array = std::vector<T>;
-
-  template <class Kernel>
-  static void launch(std::size_t n, const Kernel& kernel) {
-    ::tbb::parallel_for(::tbb::blocked_range<std::size_t>(0, n, 256), [&](const auto& range) {
-      for (std::size_t i = range.begin(); i < range.end(); ++i) kernel(i);
-    });
-  }
   static auto thrust() { return ::thrust::tbb::par; }
 };
 #else
@@ -60,15 +47,15 @@ struct gpu {
   using policy = wfpg::exec::cuda;
   template <class T>
   using array = ::thrust::device_vector<T>;
-
-  /// Throws thrust::system_error where a kernel fails.
-  template <class Kernel>
-  static void launch(std::size_t n, const Kernel& kernel) {
-    ::thrust::for_each_n(::thrust::cuda::par, ::thrust::counting_iterator<std::size_t>(0), n, kernel);
-  }
   static auto thrust() { return ::thrust::cuda::par; }
 };
 #endif
+
+/// Calls kernel(i) for each i in [0, n), and waits. Throws thrust::system_error where a GPU fails.
+template <class Device, class Kernel>
+void launch(std::size_t n, const Kernel& kernel) {
+  ::thrust::for_each_n(Device::thrust(), ::thrust::counting_iterator<std::size_t>(0), n, kernel);
+}
 
 /// The address of an array's first element, for kernels.
 template <class Array>

@@ -50,10 +50,10 @@ class accelerated_geometry : public geometry<Device> {
       : accelerated_(typename Device::policy(), host, arrays) {}
 
   void trace(const ray* rays, std::size_t n, triangle_hit* hits) const override {
-    Device::launch(n, trace_rays<caster>{accelerated_.caster(), rays, hits});
+    launch<Device>(n, trace_rays<caster>{accelerated_.caster(), rays, hits});
   }
   void occluded(const ray* rays, std::size_t n, std::uint32_t* hidden) const override {
-    Device::launch(n, find_occluded<caster>{accelerated_.caster(), rays, hidden});
+    launch<Device>(n, find_occluded<caster>{accelerated_.caster(), rays, hidden});
   }
 
  private:

@@ -1,4 +1,4 @@
-// What the host hands to wfpg beside its kernels: a ray caster, options, and the guider that is made of them.
+// The host's ray caster, and the guider that is made with it.
 #pragma once
 
 #if KERNELS_GUIDE
@@ -35,7 +35,7 @@ struct guide_caster {
             wfpg::array_view<wfpg::ray_hit> hits) const {
     const wfpg::buffer<triangle_hit, Exec> found(exec, rays.size());
     traced->trace(rays.data(), rays.size(), found.data());
-    Device::launch(rays.size(), answer_guide{scene, rays, found.data(), hits});
+    launch<Device>(rays.size(), answer_guide{scene, rays, found.data(), hits});
   }
 };
 

@@ -141,7 +141,7 @@ struct ask_nothing {
 
   KERNELS_BOTH void operator()(std::size_t i) const {
     at.rays[i] = no_ray();
-    at.shadows[i] = {};
+    at.shadows[i] = spectrum(0.0f);
   }
 };
 
@@ -157,10 +157,10 @@ KERNELS_BOTH inline void ask(const wave& at, std::uint32_t id, vec3 from, const 
     if (shadow.t_max > 0.0f) shadow.direction = (light.end - from) / shadow.t_max;
   }
   const float clear = at.fog > 0.0f ? std::exp(-at.fog * shadow.t_max) : 1.0f;
-  at.shadows[id].radiance = clear * radiance;
+  at.shadows[id] = clear * radiance;
 }
 
-/// What a material's kernel works with at one vertex.
+/// State of a material's kernel at one vertex.
 template <class Bsdf>
 struct shading {
   std::uint32_t id;
@@ -215,7 +215,8 @@ struct shade {
   KERNELS_BOTH void operator()(std::size_t slot) const {
     shading<Bsdf> s(at, queue[slot]);
 #if KERNELS_GUIDE
-    if constexpr (!Bsdf::is_delta) s.mixture = guide.mixture(s.id, glossy_part_of(s));
+    const float highest = peak(s.bsdf, s.wo, s.walks);
+    if constexpr (!Bsdf::is_delta) s.mixture = guide.mixture(s.id, glossy_part_of(s, highest));
 #endif
     if constexpr (!Bsdf::is_delta) sample_light(s);
     path& p = at.paths[s.id];
@@ -224,19 +225,18 @@ struct shade {
     const float survival = survival_of(p);
     p.active = at.draw(s.id, render::dimension::roulette).x < survival;
 #if KERNELS_CHECK
-    path_numbers walks = s.walks;
     checker.scatter(s.id, at.depth, guide, s.mixture,
-                    {p.next.direction, s.drawn.pdf, s.pdf, s.bsdf.peak(s.wo, walks), std::abs(s.wo.z),
-                     mean_of(p.throughput), survival, s.drawn.is_delta, p.active});
+                    {p.next.direction, s.drawn.pdf, s.pdf, highest, std::abs(s.wo.z), mean_of(p.throughput),
+                     survival, s.drawn.is_delta, p.active});
 #endif
     p.throughput /= survival;
   }
 
  private:
 #if KERNELS_GUIDE
-  KERNELS_BOTH static wfpg::glossy_part glossy_part_of(shading<Bsdf>& s) {
+  KERNELS_BOTH static wfpg::glossy_part glossy_part_of(const shading<Bsdf>& s, float highest) {
     if constexpr (Bsdf::kind == varnish::kind) return {s.bsdf.narrow(s.wo), 0.0f};
-    return wfpg::glossy_part::unknown(s.bsdf.peak(s.wo, s.walks));
+    return wfpg::glossy_part::unknown(highest);
   }
 #endif
 
@@ -291,7 +291,7 @@ struct shade {
     p.next.direction = direction;
     // Roulette ignores that refraction compresses radiance, since paths that leave again undo it.
     if (s.wo.z * drawn.wi.z < 0.0f) {
-      const float eta = s.wo.z > 0.0f ? s.v.in.ior : 1.0f / s.v.in.ior;
+      const float eta = s.v.in.eta(s.wo);
       p.scale *= eta * eta;
     }
     return true;
@@ -337,7 +337,7 @@ struct add_light {
 #endif
 
   KERNELS_BOTH void operator()(std::size_t i) const {
-    const spectrum radiance = at.shadows[i].radiance;
+    const spectrum radiance = at.shadows[i];
     if (at.hidden[i] != 0 || !(mean_of(radiance) > 0.0f)) return;
     path& p = at.paths[i];
     p.radiance += radiance;

@@ -1,4 +1,4 @@
-// What kernels leave for each other: a path, its vertex, and its question to the shadow rays.
+// A path, its vertex, and the arrays in which kernels leave them for each other.
 #pragma once
 
 #include "bsdfs.hpp"
@@ -32,11 +32,6 @@ struct vertex {
   float offset = 0.0f;  ///< how far off the surface a ray must begin
 };
 
-/// Light that reaches the pixel where nothing lies on the ray.
-struct shadow_query {
-  spectrum radiance{0.0f};
-};
-
 /// Random numbers of one vertex of a path. Those below `of_fog` are render::dimension's.
 struct path_numbers {
   render::random_stream stream;
@@ -47,15 +42,11 @@ struct path_numbers {
   KERNELS_BOTH path_numbers(const render::random_stream& of_sample, std::uint32_t path_id,
                             std::uint32_t depth)
       : stream(of_sample), id(path_id), next(depth * per_vertex + of_walks) {}
-  /// Two numbers for one of the uses of render::dimension, at this depth.
-  KERNELS_BOTH vec2 at(std::uint32_t depth, std::uint32_t use) const {
-    return stream(id, depth * per_vertex + use);
-  }
   /// The next two numbers of a random walk.
   KERNELS_BOTH vec2 operator()() { return stream(id, next++); }
 };
 
-/// What all kernels of one depth share. Arrays have an element for each path.
+/// State that all kernels of one depth share. Arrays have an element for each path.
 struct wave {
   render::scene_view scene;
   render::light_view lights;
@@ -67,12 +58,13 @@ struct wave {
   std::uint32_t* queues = nullptr;  ///< of the paths' vertices
   ray* rays = nullptr;              ///< of paths, then of shadow queries
   triangle_hit* hits = nullptr;
-  shadow_query* shadows = nullptr;
+  spectrum* shadows = nullptr;  ///< light that reaches the pixel where nothing hides it
   std::uint32_t* hidden = nullptr;
 
   KERNELS_BOTH bool is_last() const { return depth + 1 >= max_depth; }
+  /// Two numbers for one of the uses of render::dimension, at this depth.
   KERNELS_BOTH vec2 draw(std::uint32_t id, std::uint32_t use) const {
-    return path_numbers(random, id, depth).at(depth, use);
+    return random(id, depth * path_numbers::per_vertex + use);
   }
 };
 

@@ -7,6 +7,7 @@
 #include "app/output_files.hpp"
 #include "app/progress_bar.hpp"
 #include "app/render_arguments.hpp"
+#include "app/sample_budget.hpp"
 #include "renderer.hpp"
 
 #include <wfpg/sampling/sample_combiner.hpp>
@@ -14,7 +15,6 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <map>
@@ -55,28 +55,25 @@ void add_options(CLI::App& app, arguments& given) {
                "says what is wrong in the use of the guide, and whether it pays; needs --spp of 4 or more")
       ->excludes(unguided);
   app.add_option("--device", given.where, "serial, tbb or cuda (default: tbb)")
-      ->check(CLI::IsMember({"serial", "tbb", "cuda"}));
+      ->check(CLI::IsMember(devices));
 }
 
 /// Takes samples until the budget is spent, and returns their weighted mean.
-render::image take_samples(renderer& host, const arguments& given, int width, int height) {
-  const auto begin = std::chrono::steady_clock::now();
-  std::vector<glm::dvec3> sums(std::size_t(width) * std::size_t(height), glm::dvec3(0.0));
-  double weights = 0.0, seconds = 0.0;
-  const double limit = given.options.seconds;
+render::image take_samples(renderer& host, const render::render_options& options) {
+  render::image picture = render::make_image(options.width, options.height);
+  std::vector<glm::dvec3> sums(picture.pixels.size(), glm::dvec3(0.0));
+  double weights = 0.0;
   render::progress_bar bar;
-  for (int i = 1; limit > 0.0 ? i == 1 || seconds < limit : i <= given.options.spp; ++i) {
-    using wfpg::sample_combination, wfpg::sample_weight;
-    const auto number = static_cast<std::uint32_t>(i);
-    const double weight = given.unguided ? 1.0 : sample_weight(sample_combination::pt_linear, number);
+  for (render::sample_budget budget(options, 0); !budget.is_spent();) {
+    budget.count();
+    const auto number = static_cast<std::uint32_t>(budget.samples());
+    const double weight = wfpg::sample_weight(render::combination_of(options), number);
     const std::vector<vec3> colours = host.sample();
     for (std::size_t p = 0; p < sums.size(); ++p) sums[p] += weight * glm::dvec3(colours[p]);
     weights += weight;
-    seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    bar.show({i, std::min(1.0, limit > 0.0 ? seconds / limit : double(i) / given.options.spp), seconds, 0.0});
+    bar.show(budget.progress());
   }
   bar.finish();
-  render::image picture = render::make_image(width, height);
   for (std::size_t p = 0; p < sums.size(); ++p) picture.pixels[p] = vec3(sums[p] / weights);
   return picture;
 }
@@ -97,14 +94,17 @@ void print_error(const render::image& picture, const render::image& reference, s
 }
 
 void run(arguments& given, std::ostream& out, std::ostream& log) {
+  if (given.check && (given.options.seconds > 0.0 || given.options.spp < 4))
+    throw std::invalid_argument("--check: expected --spp of 4 or more, half of which is guided");
   render::check_outputs({{"--output", given.output, ".exr"}, {"--png", given.png, ".png"}},
                         {{"--reference", given.reference, ""}});
+  // How samples add up without a guide.
+  if (given.unguided) given.options.method = render::sampling_method::pt;
   const render::scene scene = render::load_scene(given.scene, given.options, "wfpg-kernels", log);
   const render::render_options options = render::completed(scene, given.options);
   std::optional<render::image> reference;
-  if (!given.reference.empty()) reference = render::read_exr(given.reference);
-  if (reference && (reference->width != options.width || reference->height != options.height))
-    throw std::invalid_argument("--reference: " + given.reference + " has another size than the picture");
+  if (!given.reference.empty())
+    reference = render::read_reference(given.reference, options.width, options.height);
   settings wanted;
   wanted.width = options.width;
   wanted.height = options.height;
@@ -113,12 +113,10 @@ void run(arguments& given, std::ostream& out, std::ostream& log) {
   wanted.fog = given.fog;
   wanted.guided = !given.unguided;
   wanted.check = given.check;
-  if (given.check && (options.seconds > 0.0 || options.spp < 4))
-    throw std::invalid_argument("--check: expected --spp of 4 or more, half of which is guided");
-  if (given.check) wanted.unguided_samples = static_cast<std::uint32_t>(std::max(options.spp / 2, 2));
+  if (given.check) wanted.unguided_samples = static_cast<std::uint32_t>(options.spp / 2);
   wanted.seed = options.seed;
   const auto host = make_renderer(devices.at(given.where), scene, wanted);
-  const render::image picture = take_samples(*host, given, options.width, options.height);
+  const render::image picture = take_samples(*host, options);
   if (given.check) {
     const std::string faults = host->faults(), note = host->note();
     out << (faults.empty() ? "the guide is used as it should be" : faults) << '\n';

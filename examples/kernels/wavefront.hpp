@@ -47,7 +47,7 @@ class wavefront : public renderer {
 
   std::vector<vec3> sample() override {
     wave at = first_wave();
-    Device::launch(count_, start_paths{at, camera_});
+    launch<Device>(count_, start_paths{at, camera_});
 #if KERNELS_GUIDE
     guider_.begin_sample();
 #endif
@@ -58,10 +58,10 @@ class wavefront : public renderer {
     }
     ++samples_;
 #if KERNELS_CHECK
-    Device::launch(count_, write_colours{at, address(colours_), checker()});
+    launch<Device>(count_, write_colours{at, address(colours_), checker()});
     if (checker_) checker_->end_sample(guider_.recorder(), guide_caster<Device>{geometry_.get(), at.scene});
 #else
-    Device::launch(count_, write_colours{at, address(colours_)});
+    launch<Device>(count_, write_colours{at, address(colours_)});
 #endif
 #if KERNELS_GUIDE
     guider_.end_sample();
@@ -109,12 +109,12 @@ class wavefront : public renderer {
   }
 
   void find_vertices_of(const wave& at) {
-    Device::launch(count_, write_rays{at});
+    launch<Device>(count_, write_rays{at});
     geometry_->trace(at.rays, count_, at.hits);
 #if KERNELS_GUIDE
-    Device::launch(count_, find_vertices{at, guider_.recorder()});
+    launch<Device>(count_, find_vertices{at, guider_.recorder()});
 #else
-    Device::launch(count_, find_vertices{at});
+    launch<Device>(count_, find_vertices{at});
 #endif
   }
 
@@ -122,7 +122,7 @@ class wavefront : public renderer {
 #if KERNELS_GUIDE
     view_ = guider_.prepare(at.depth, guide_caster<Device>{geometry_.get(), at.scene});
 #endif
-    Device::launch(count_, ask_nothing{at});
+    launch<Device>(count_, ask_nothing{at});
     shade_queue<matte>(at);
     shade_queue<metal>(at);
     shade_queue<mirror>(at);
@@ -130,12 +130,12 @@ class wavefront : public renderer {
     shade_queue<frosted_glass>(at);
     shade_queue<varnish>(at);
     shade_queue<paint>(at);
-    Device::launch(fill_queue(fog_queue), scatter_in_fog{at, address(queue_)});
+    launch<Device>(fill_queue(fog_queue), scatter_in_fog{at, address(queue_)});
     geometry_->occluded(at.rays, count_, at.hidden);
 #if KERNELS_GUIDE
-    Device::launch(count_, add_light{at, guider_.recorder()});
+    launch<Device>(count_, add_light{at, guider_.recorder()});
 #else
-    Device::launch(count_, add_light{at});
+    launch<Device>(count_, add_light{at});
 #endif
   }
 
@@ -147,12 +147,12 @@ class wavefront : public renderer {
   void shade_queue(const wave& at) {
     const std::size_t n = fill_queue(static_cast<std::uint32_t>(Bsdf::kind));
 #if KERNELS_CHECK
-    Device::launch(
+    launch<Device>(
         n, shade<Bsdf>{at, address(queue_), wanted_.roulette_depth, view_, guider_.recorder(), checker()});
 #elif KERNELS_GUIDE
-    Device::launch(n, shade<Bsdf>{at, address(queue_), wanted_.roulette_depth, view_, guider_.recorder()});
+    launch<Device>(n, shade<Bsdf>{at, address(queue_), wanted_.roulette_depth, view_, guider_.recorder()});
 #else
-    Device::launch(n, shade<Bsdf>{at, address(queue_), wanted_.roulette_depth});
+    launch<Device>(n, shade<Bsdf>{at, address(queue_), wanted_.roulette_depth});
 #endif
   }
 
@@ -167,7 +167,7 @@ class wavefront : public renderer {
   array<std::uint32_t> queues_, queue_;
   array<ray> rays_;
   array<triangle_hit> hits_;
-  array<shadow_query> shadows_;
+  array<spectrum> shadows_;
   array<std::uint32_t> hidden_;
   array<vec3> colours_;
   std::uint32_t samples_ = 0;

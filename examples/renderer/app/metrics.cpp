@@ -140,4 +140,14 @@ image_error noise_of_halves(const image& half_a, const image& half_b) {
   return error;
 }
 
+image read_reference(const std::string& path, int width, int height) {
+  const auto size_name = [](int w, int h) { return std::to_string(w) + " x " + std::to_string(h); };
+  image reference = read_exr(path);
+  if (reference.width != width || reference.height != height)
+    throw std::invalid_argument("--reference: " + path + " has " +
+                                size_name(reference.width, reference.height) +
+                                " pixels, the picture will have " + size_name(width, height));
+  return reference;
+}
+
 }  // namespace render

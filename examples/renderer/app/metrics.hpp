@@ -4,6 +4,7 @@
 #include "app/image_io.hpp"
 
 #include <cstddef>
+#include <string>
 #include <vector>
 
 namespace render {
@@ -29,6 +30,10 @@ image_error compare(const image& test, const image& reference);
 /// mse_reinhard of each pixel, row by row. Its mean is compare()'s. Infinite if a pixel is not finite. Throws
 /// as compare() does.
 std::vector<double> reinhard_errors(const image& test, const image& reference);
+
+/// Reads the picture that one of this size is compared with, which --reference names. Throws
+/// std::invalid_argument if its size differs, and as read_exr() does.
+image read_reference(const std::string& path, int width, int height);
 
 /// The error of a reference that is the mean of two independent halves. It is the error of a half against
 /// their mean, averaged over both halves. A half has twice the mean's variance and differs from the mean by

@@ -4,6 +4,7 @@
 #include "app/guider_report.hpp"
 #include "app/render.hpp"
 #include "app/render_state.hpp"
+#include "app/sample_budget.hpp"
 #include "app/saved_guider.hpp"
 #include "casters/octree_cones.hpp"
 #include "tracer/collecting_guider.hpp"
@@ -18,56 +19,12 @@
 #include <wfpg/path_guider.hpp>
 
 #include <algorithm>
-#include <chrono>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 namespace render {
-
-/// Time since it was made.
-class stopwatch {
- public:
-  double seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
-
-/// Samples taken, and the part of the budget that they used.
-class sample_budget {
- public:
-  /// `samples`: taken already.
-  sample_budget(const render_options& options, int samples)
-      : spp_(options.spp),
-        seconds_(options.seconds),
-        least_(combination_of(options) == wfpg::sample_combination::discard_first ? 2 : 1),
-        samples_(samples),
-        begun_(options.seconds > 0.0 ? 0.0 : fraction()) {}
-
-  int samples() const { return samples_; }
-  double seconds() const { return clock_.seconds() - left_out_; }
-  bool is_spent() const { return samples_ >= least_ && fraction() >= 1.0; }
-  void count() { ++samples_; }
-  void leave_out(double seconds) { left_out_ += seconds; }
-  render_progress progress() const { return {samples_, std::min(1.0, fraction()), seconds(), begun_}; }
-
- private:
-  double fraction() const {
-    return seconds_ > 0.0 ? seconds() / seconds_ : static_cast<double>(samples_) / spp_;
-  }
-
-  stopwatch clock_;
-  int spp_;
-  double seconds_;
-  double left_out_ = 0.0;
-  int least_;  ///< the picture of fewer has no weight
-  int samples_;
-  double begun_;  ///< fraction
-};
 
 inline bool is_kept(checkpoint_times times, int samples, bool is_last) {
   const bool is_power_of_two = (samples & (samples - 1)) == 0;

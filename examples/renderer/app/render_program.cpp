@@ -27,10 +27,6 @@ namespace {
 constexpr int failure = 2;
 constexpr int interrupted = 3;
 
-std::string size_name(int width, int height) {
-  return std::to_string(width) + " x " + std::to_string(height);
-}
-
 struct arguments {
   scene_arguments scene;
   std::string output, png, stats, reference, save_guide, save_state;
@@ -127,21 +123,16 @@ bool write_all(const arguments& given, const render_result& result, const std::o
 }
 
 /// The picture that the rendering is compared with, if any. Throws std::invalid_argument if its size differs.
-std::optional<image> read_reference(const arguments& given, const scene& scene) {
+std::optional<image> reference_of(const arguments& given, const scene& scene) {
   if (given.reference.empty()) return std::nullopt;
   const render_options options = completed(scene, given.options);
-  image reference = read_exr(given.reference);
-  if (reference.width != options.width || reference.height != options.height)
-    throw std::invalid_argument("--reference: " + given.reference + " has " +
-                                size_name(reference.width, reference.height) +
-                                " pixels, the picture will have " + size_name(options.width, options.height));
-  return reference;
+  return read_reference(given.reference, options.width, options.height);
 }
 
 int render_scene(arguments& given, std::ostream& out, std::ostream& log) {
   check_files(given);
   const scene scene = load_scene(given.scene, given.options, "wfpg-render", log);
-  const std::optional<image> reference = read_reference(given, scene);
+  const std::optional<image> reference = reference_of(given, scene);
 
   given.options.keep_guide = !given.save_guide.empty();
   given.options.keep_state = !given.save_state.empty() || !given.options.resume.empty();

@@ -22,10 +22,11 @@ WFPG_HD inline float fresnel_dielectric(float cosine, float eta) {
 }
 
 /// Schlick's approximation from the reflectance at normal incidence, per channel.
-WFPG_HD inline vec3 fresnel_schlick(vec3 normal_reflectance, float cosine) {
+template <class Colour>
+WFPG_HD Colour fresnel_schlick(const Colour& normal_reflectance, float cosine) {
   const float x = glm::max(0.0f, 1.0f - cosine);
   const float x2 = x * x;
-  return normal_reflectance + (vec3(1.0f) - normal_reflectance) * (x2 * x2 * x);
+  return normal_reflectance + (Colour(1.0f) - normal_reflectance) * (x2 * x2 * x);
 }
 
 /// `w` mirrored about a unit vector.

@@ -88,7 +88,7 @@ class path_recorder_view {
   /// nothing.
   WFPG_HD std::size_t recorded() const { return recorded_; }
   /// Whether scatter() and escape() are recorded. Without it, recorded_path knows no directions.
-  WFPG_HD bool records_directions() const { return learns(); }
+  WFPG_HD bool records_directions() const { return directions_ != nullptr; }
   /// Writes the place of a path among the recorded ones. False where this sample does not record the path.
   WFPG_HD bool has_place(std::size_t path, std::uint32_t& place) const {
     return path < paths_ && recorded_ > 0 && runs_.find(path, place);
@@ -123,7 +123,7 @@ class path_recorder_view {
   /// or no_field, as for delta lobes. Ignored where directions are not recorded.
   WFPG_HD void scatter(std::size_t path, std::uint32_t depth, vec3 direction, std::uint32_t field) const {
     std::uint32_t place;
-    if (!learns() || !find(path, place)) return;
+    if (!records_directions() || !find(path, place)) return;
     if (depth >= max_depth_ || depth + 1 != length_of_surfaces(place) || !is_direction(direction))
       return drop();
     directions_[depth * recorded_ + place] = {field, pack_marked(direction)};
@@ -140,7 +140,7 @@ class path_recorder_view {
   /// directions are not recorded, and at the depth max_depth().
   WFPG_HD void escape(std::size_t path, std::uint32_t depth, path_light throughput) const {
     std::uint32_t place;
-    if (!learns() || depth == 0 || !find(path, place)) return;
+    if (!records_directions() || depth == 0 || !find(path, place)) return;
     const std::uint32_t length = length_of_surfaces(place);
     if (length == ~0u || depth < length) return drop();
     // From a medium: what the last direction finds is not known.
@@ -195,8 +195,6 @@ class path_recorder_view {
   // Indices of counters_.
   enum : std::uint32_t { counter_dropped, counter_gaps, counters };
 
-  /// Whether directions are recorded.
-  WFPG_HD bool learns() const { return directions_ != nullptr; }
   /// Whether pack_direction() can store it.
   WFPG_HD static bool is_direction(vec3 direction) { return is_finite(direction) && direction != vec3(0.0f); }
   /// Packs a direction so that it is never 0, which marks that there is none.
@@ -221,7 +219,7 @@ class path_recorder_view {
     const std::size_t slot = depth * recorded_ + place;
     places_[slot] = at;
     light_[slot] = light;
-    if (learns()) directions_[slot] = {no_field, 0};
+    if (records_directions()) directions_[slot] = {no_field, 0};
   }
   /// Adds to a recorded surface or environment. `place` is what find() wrote. Needs no atomic, since a path's
   /// calls come from one thread.
@@ -324,10 +322,10 @@ class path_recorder {
   }
 
   /// Whether scatter() and escape() are recorded.
-  bool records_directions() const { return view_.learns(); }
+  bool records_directions() const { return view_.records_directions(); }
   /// Size of the recorded part of this sample: recorded_path takes places in [0, recorded()). 0 in a sample
   /// that is not recorded. Some of these paths may have no vertices.
-  std::size_t recorded() const { return view_.recorded_; }
+  std::size_t recorded() const { return view_.recorded(); }
 
   /// Begins a sample: clears all paths and chooses by `seed` which ones are recorded, or none if `records` is
   /// false. Views made before are invalid. O(recorded()).

@@ -4,8 +4,7 @@
 //
 //   const distance_sample drawn = medium.sample(u_channel, u, distance_to_surface);
 //   throughput *= drawn.weight;
-//   if (drawn.scatters) ...                        // at drawn.distance, by the phase function; else a
-//   surface
+//   if (drawn.scatters) ...                   // at drawn.distance, by the phase function; else a surface
 //
 // Source: the exponential law of Beer and Lambert; one-sample MIS over channels as in pbrt-v4, section 14.2.
 // Cost: an exponential a channel. Memory: 8 bytes a channel.
@@ -57,8 +56,8 @@ struct basic_homogeneous_medium {
     return sum / float(channels);
   }
 
-  /// Draws where a path scatters before `limit`, which is positive and may be infinite. `u_channel` and `u`
-  /// in [0, 1). Where the limit is infinite and a channel is clear, the path may reach it: it then escapes.
+  /// Draws where a path scatters before `limit`. `u_channel` and `u` in [0, 1). `limit`: the distance to what
+  /// the ray hits, or ray::t_max, positive. It never fails.
   WFPG_HD basic_distance_sample<Spectrum> sample(float u_channel, float u, float limit) const {
     const int channel = min(static_cast<int>(u_channel * float(channels)), channels - 1);
     const float sigma = extinction()[channel];

@@ -28,7 +28,7 @@
 
 namespace wfpg {
 
-/// What a vertex between the ends of a path is.
+/// Kind of a vertex between the ends of a path.
 enum class scattering_kind : std::uint8_t {
   surface,  ///< of which a part, at least, is not delta
   delta,    ///< drew a delta lobe: it cannot be connected or merged
@@ -111,8 +111,8 @@ struct basic_path_edge {
 
 namespace detail {
 
-/// What photon beams add to the volume of merges with a camera beam, without the camera's distance. 0 where
-/// they are off, whatever the medium.
+/// Volume of merges of photon beams with a camera beam, without the camera's distance. 0 where they are off,
+/// whatever the medium.
 template <class Real>
 WFPG_HD Real beam_volume(const basic_path_techniques<Real>& t, Real sine, Real extinction, Real pdf_light) {
   if (!(t.beams > 0)) return 0;
@@ -144,9 +144,11 @@ WFPG_HD Real merge_volume(const basic_path_techniques<Real>& t, merge_technique 
 template <class Real>
 WFPG_HD Real merge_volumes(const basic_path_techniques<Real>& t, const basic_path_departure<Real>& at,
                            Real pdf_light, Real pdf_camera) {
-  if (at.kind == scattering_kind::surface) return t.surface_points;
-  if (at.kind == scattering_kind::delta) return 0;
-  return t.volume_points + (t.beam_points + beam_volume(t, at.sine, at.extinction, pdf_light)) / pdf_camera;
+  const auto volume = [&](merge_technique technique) {
+    return merge_volume(t, technique, at, pdf_light, pdf_camera);
+  };
+  return volume(merge_technique::surface_points) + volume(merge_technique::volume_points) +
+         volume(merge_technique::beam_points) + volume(merge_technique::beams);
 }
 
 }  // namespace detail

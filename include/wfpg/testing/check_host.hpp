@@ -37,7 +37,7 @@
 
 namespace wfpg::testing {
 
-/// What a host did at one vertex: the direction that it took, its densities, and its roulette.
+/// One step of a host's path: the direction that it took from a vertex, its densities, and its roulette.
 struct host_step {
   /// Direction in which the path goes on: world space, unit length.
   vec3 wi{0.0f};

@@ -150,7 +150,7 @@ class pixel_variances {
   std::vector<pixel> pixels_;
 };
 
-/// What the samples so far showed.
+/// Counts of all samples so far, and the sentences that follow from them.
 class host_findings {
  public:
   host_findings() = default;
@@ -288,7 +288,7 @@ class host_findings {
         if (vertices[depth].has(checked_vertex::is_surface)) add_directions(s, path, vertices, depth, near);
       if (path.vertices > path.surfaces)
         ++escapes_;
-      else
+      else if (!media_)  // there a ray that misses may not have left the scene
         add_ray(s, path, vertices[path.surfaces - 1], 0.1f * near, rays);
     }
     return rays;
@@ -358,9 +358,8 @@ class host_findings {
     rays.push_back(r);
   }
 
-  /// In media a ray that misses may not have left the scene.
   bool has_unheard_escapes() const {
-    return !media_ && unheard_ >= 8 && double(unheard_) > 0.1 * double(unheard_ + escapes_);
+    return unheard_ >= 8 && double(unheard_) > 0.1 * double(unheard_ + escapes_);
   }
 
   bool media_ = false;

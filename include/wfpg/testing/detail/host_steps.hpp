@@ -1,5 +1,5 @@
-// What host_checker logs in kernels, and what it reads from the recorder. Structs without padding, which
-// would be memory that nobody wrote.
+// Records of host_checker: logged in kernels, or read from the recorder. Structs have no padding, which would
+// be memory that nobody wrote.
 #pragma once
 
 #include <wfpg/base/math.hpp>
