@@ -31,7 +31,7 @@ void depositing(benchmark::State& state) {
   const Exec exec;
   guide_of_room<Exec> guide(exec, static_cast<std::uint32_t>(state.range(0)),
                             std::size_t(pixels) * path_length);
-  wfpg::path_recorder<Exec> recorder(exec, pixels, path_length, true);
+  wfpg::path_recorder<Exec> recorder(exec, wfpg::path_recorder_settings{pixels, path_length});
   std::vector<wfpg::buffer<room_point, Exec>> points;
   for (int bounces = 0; bounces < static_cast<int>(path_length); ++bounces)
     points.push_back(points_after(exec, bounces));
