@@ -79,7 +79,7 @@ std::vector<vec3> trace(const scene& scene, const setup& with, Guider guider = G
                                    {geometry.view(), lights.view(), with.nee}, accelerated.caster());
   const pinhole camera(scene.view, with.side, with.side);
   for (std::uint32_t i = 0; i < with.samples; ++i) tracer.render_sample(guider, camera, i, 1.0f);
-  return tracer.picture();
+  return tracer.film().picture();
 }
 
 /// Means of independent pictures, and the z score of the difference between two sets.

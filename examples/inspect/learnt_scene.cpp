@@ -97,8 +97,9 @@ struct learnt_scene::state {
                        accelerated.caster());
     std::visit([&](auto& g) { render::take_samples(tracer, g, camera, options, progress, rendering); },
                guider);
-    rendering.picture = {options.width, options.height, tracer.picture()};
-    std::visit([&](auto& g) { render::report_guider(g, tracer.segments(), rendering.report); }, guider);
+    rendering.picture = {options.width, options.height, tracer.film().picture()};
+    std::visit([&](auto& g) { render::report_guider(g, tracer.film().segments(), rendering.report); },
+               guider);
   }
 
   /// Looks up the fields that the next sample's camera rays will have.
@@ -224,7 +225,7 @@ incident_light learnt_scene::arriving(const render::hit_surface& at, const direc
       const int done = i + 1 + (is_second ? half : 0);
       if (progress) progress({done, double(done) / (2.0 * half), clock.seconds(), 0.0});
     }
-    *picture = {side, side, tracer.picture()};
+    *picture = {side, side, tracer.film().picture()};
   }
   return light;
 }

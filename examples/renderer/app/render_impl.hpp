@@ -33,9 +33,9 @@ inline bool is_kept(checkpoint_times times, int samples, bool is_last) {
 }
 
 /// The samples of one rendering, from those that the report has on, whatever their directions come from.
-template <class Exec, class Caster, class Guider>
-void take_samples(path_tracer<Exec, Caster>& tracer, Guider& guider, const pinhole& camera,
-                  const render_options& options, const progress_callback& progress, render_result& result) {
+template <class Tracer, class Guider>
+void take_samples(Tracer& tracer, Guider& guider, const pinhole& camera, const render_options& options,
+                  const progress_callback& progress, render_result& result) {
   sample_budget budget(options, result.report.spp);
   for (bool is_last = budget.is_spent(); !is_last;) {
     const auto sample = static_cast<std::uint32_t>(budget.samples());
@@ -48,7 +48,7 @@ void take_samples(path_tracer<Exec, Caster>& tracer, Guider& guider, const pinho
       const double seconds = budget.seconds();
       const stopwatch keeping;
       result.checkpoints.push_back(
-          {budget.samples(), seconds, {options.width, options.height, tracer.picture()}});
+          {budget.samples(), seconds, {options.width, options.height, tracer.film().picture()}});
       budget.leave_out(keeping.seconds());
     }
     if (progress) progress(budget.progress());
@@ -138,13 +138,13 @@ inline render_state begin_state(const scene& scene, const render_options& option
 }
 
 /// What a method takes its samples with. Everything lives as long as render_by runs.
-template <class Exec, class Caster>
+template <class Exec, class Caster, class Tracer = path_tracer<Exec, Caster>>
 struct sampling_job {
   const Exec& exec;
   const scene& host;
   const render_options& options;
   const progress_callback& progress;
-  path_tracer<Exec, Caster>& tracer;
+  Tracer& tracer;
   const scene_view& geometry;
   const light_distribution<Exec>& lights;
   const pinhole& camera;
@@ -160,10 +160,10 @@ void take_samples(const Job& job, Guider& guider) {
   take_samples(job.tracer, guider, job.camera, job.options, job.progress, job.result);
 }
 
-/// Builds what a rendering needs, has its samples taken, and reports. `take` does so with directions from
-/// where it likes:
-///   void operator()(const sampling_job<Exec, Caster>&) const;
-template <class Accelerated, class Exec, class Take>
+/// Builds what a rendering needs, has its samples taken by a Tracer, and reports. `take` does so with
+/// directions from where it likes:
+///   void operator()(const sampling_job<Exec, Caster, Tracer<Exec, Caster>>&) const;
+template <class Accelerated, template <class, class> class Tracer = path_tracer, class Exec, class Take>
 render_result render_by(const Exec& exec, const scene& scene, const render_options& options,
                         const progress_callback& progress, const Take& take) {
   const stopwatch total;
@@ -180,22 +180,22 @@ render_result render_by(const Exec& exec, const scene& scene, const render_optio
   const tracer_settings settings{options.width, options.height, static_cast<std::uint32_t>(options.max_depth),
                                  options.seed, static_cast<std::uint32_t>(options.roulette_depth)};
   using caster_type = decltype(accelerated->caster());
-  path_tracer<Exec, caster_type> tracer(exec, settings, {geometry.view(), lights.view(), options.nee},
-                                        accelerated->caster());
+  Tracer<Exec, caster_type> tracer(exec, settings, {geometry.view(), lights.view(), options.nee},
+                                   accelerated->caster());
   const pinhole camera(scene.view, options.width, options.height);
   const render_state before = begin_state(scene, options);
-  if (before.samples > 0) tracer.restore(before.film);
+  if (before.samples > 0) tracer.film().restore(before.film);
   report.spp = before.samples;
   result.guide = before.guide;
   const scene_view view = geometry.view();
-  take(sampling_job<Exec, caster_type>{exec, scene, options, progress, tracer, view, lights, camera, building,
-                                       result});
-  report.segments = tracer.segments();
+  take(sampling_job<Exec, caster_type, Tracer<Exec, caster_type>>{exec, scene, options, progress, tracer,
+                                                                  view, lights, camera, building, result});
+  report.segments = tracer.film().segments();
   const double paths = double(report.spp) * double(options.width) * double(options.height);
-  report.light_hits_per_path = static_cast<double>(tracer.light_hits()) / paths;
+  report.light_hits_per_path = static_cast<double>(tracer.film().light_hits()) / paths;
   if (options.keep_state)
-    result.state = state_bytes(scene, options, {report.spp, tracer.film(), result.guide});
-  result.picture = {options.width, options.height, tracer.picture()};
+    result.state = state_bytes(scene, options, {report.spp, tracer.film().state(), result.guide});
+  result.picture = {options.width, options.height, tracer.film().picture()};
   report.seconds.insert(report.seconds.begin(), tracer.seconds().begin(), tracer.seconds().end());
   report.seconds.insert(report.seconds.begin(), building.seconds().begin(), building.seconds().end());
   report.total_seconds = total.seconds();
@@ -229,7 +229,7 @@ void guide_by_samples(const sampling_job<Exec, Caster>& job, const Options& guid
   using guider_type = wfpg::path_guider<Exec, wfpg::octree_guide_for<Exec, Options>>;
   collecting_guider<Exec, guider_type> guider(job.exec, tagged(job.host, job.options, guided));
   take_samples(job, guider);
-  report_guider(guider.guider(), job.tracer.segments(), job.result.report);
+  report_guider(guider.guider(), job.tracer.film().segments(), job.result.report);
   job.result.guide = saved_guide(guider.guider(), job.options);
 }
 
@@ -254,7 +254,7 @@ void guide_by_fields(const sampling_job<Exec, Caster>& job, const Options& guide
                                                           options.through);
     take_samples(job, with_cones);
   }
-  report_guider(guider, job.tracer.segments(), report, before);
+  report_guider(guider, job.tracer.film().segments(), report, before);
   job.result.guide = saved_guide(guider, options);
 }
 
@@ -284,7 +284,7 @@ void guide_by_records(const sampling_job<Exec, Caster>& job) {
     wfpg::path_guider<Exec, wfpg::irradiance_records<Exec, smooth>> guider(
         job.exec, lit, records_options_of(job.host, job.options));
     take_samples(job, guider);
-    report_records(guider, job.tracer.segments(), job.result.report);
+    report_records(guider, job.tracer.film().segments(), job.result.report);
   } else {
     throw std::runtime_error("--device optix does not support --method records; --device cuda does");
   }

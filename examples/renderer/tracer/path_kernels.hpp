@@ -329,13 +329,4 @@ struct shade_paths {
   }
 };
 
-/// Adds a sample to the film.
-struct add_to_film {
-  wfpg::array_view<const vec3> radiance;
-  wfpg::array_view<glm::dvec3> film;
-  double weight;
-
-  WFPG_HD void operator()(std::size_t i) const { film[i] += weight * glm::dvec3(radiance[i]); }
-};
-
 }  // namespace render

@@ -1,7 +1,7 @@
 // The path tracer. One sample of all pixels is one wave that goes from vertex to vertex as a whole.
 #pragma once
 
-#include "app/render_state.hpp"
+#include "tracer/path_film.hpp"
 #include "tracer/path_kernels.hpp"
 #include "tracer/stage_clock.hpp"
 
@@ -11,8 +11,6 @@
 #include <wfpg/host/wave.hpp>
 
 #include <cstdint>
-#include <numeric>
-#include <vector>
 
 namespace render {
 
@@ -51,10 +49,8 @@ class path_tracer {
         densities_(exec, world.next_event ? count_ : 0),
         directions_(exec, count_),
         keys_(exec, count_),
-        segments_(exec, std::vector<std::uint32_t>(count_, 0)),
-        light_hits_(exec, std::vector<std::uint32_t>(count_, 0)),
         radiance_(exec, count_),
-        film_(exec, std::vector<glm::dvec3>(count_, glm::dvec3(0.0))),
+        film_(exec, count_),
         partitioner_(exec, count_),
         rays_(exec, is_inline ? 0 : count_),
         hits_(exec, is_inline ? 0 : count_),
@@ -81,37 +77,14 @@ class path_tracer {
       shade(guider, at, queue);
     }
     clock_.measure("update", [&] { guider.end_sample(); });
-    clock_.measure("film", [&] {
-      exec_.for_each(count_, add_to_film{radiance_.view(), film_.view(), static_cast<double>(weight)});
-    });
-    weight_ += static_cast<double>(weight);
+    clock_.measure("film", [&] { film_.add(radiance_.view(), weight); });
     wfpg::read_element(exec_, radiance_.data());  // waits, so that a look at the time sees the whole sample
     clock_.resolve();
   }
 
-  /// Weighted mean of the samples, row by row. Black if their weights sum to 0.
-  std::vector<vec3> picture() const {
-    std::vector<vec3> pixels;
-    pixels.reserve(count_);
-    for (const glm::dvec3& sum : film_.to_host(exec_))
-      pixels.push_back(weight_ > 0.0 ? vec3(sum / weight_) : vec3(0.0f));
-    return pixels;
-  }
-
-  /// Number of rays that extended paths, without shadow rays.
-  std::uint64_t segments() const { return sum_of(segments_, segments_before_); }
-
-  /// Number of segments that ended at a surface or environment that emits toward them.
-  std::uint64_t light_hits() const { return sum_of(light_hits_, light_hits_before_); }
-
-  /// The samples so far, and a way to continue from them. Precondition: the picture has this size.
-  film_state film() const { return {weight_, segments(), light_hits(), film_.to_host(exec_)}; }
-  void restore(const film_state& film) {
-    weight_ = film.weight;
-    segments_before_ = film.segments;
-    light_hits_before_ = film.light_hits;
-    film_ = wfpg::buffer<glm::dvec3, Exec>(exec_, film.sums);
-  }
+  /// The samples so far.
+  const path_film<Exec>& film() const { return film_; }
+  path_film<Exec>& film() { return film_; }
 
   const named_seconds& seconds() const { return clock_.seconds(); }
 
@@ -120,11 +93,6 @@ class path_tracer {
 
  private:
   static constexpr bool is_inline = wfpg::is_inline_caster_v<Caster>;
-
-  std::uint64_t sum_of(const wfpg::buffer<std::uint32_t, Exec>& counts, std::uint64_t before) const {
-    const std::vector<std::uint32_t> all = counts.to_host(exec_);
-    return std::accumulate(all.begin(), all.end(), before);
-  }
 
   template <class Guider>
   void trace(Guider& guider, const wave_position& at, const path_queue& queue) {
@@ -144,8 +112,8 @@ class path_tracer {
     auto recorder = guider.recorder();
     exec_.for_each(count_, trace_paths<Answers, decltype(recorder)>{
                                at, world_, answers, recorder, queue, paths_.view(), vertices_.view(),
-                               keys_.view(), radiance_.view(), segments_.view(), light_hits_.view(),
-                               wfpg::partitioner<Exec>::excluded});
+                               keys_.view(), radiance_.view(), film_.segment_counts(),
+                               film_.light_hit_counts(), wfpg::partitioner<Exec>::excluded});
   }
 
   path_queue sort_by_material() {
@@ -208,15 +176,13 @@ class path_tracer {
   tiled_array<light_query, Exec> queries_;
   wfpg::buffer<float, Exec> densities_;
   wfpg::buffer<wfpg::sampled_direction, Exec> directions_;
-  wfpg::buffer<std::uint32_t, Exec> keys_, segments_, light_hits_;
+  wfpg::buffer<std::uint32_t, Exec> keys_;
   wfpg::buffer<vec3, Exec> radiance_;
-  wfpg::buffer<glm::dvec3, Exec> film_;
+  path_film<Exec> film_;
   wfpg::partitioner<Exec> partitioner_;
   wfpg::buffer<wfpg::ray, Exec> rays_;  // for a batch caster
   wfpg::buffer<triangle_hit, Exec> hits_;
   wfpg::buffer<std::uint32_t, Exec> hidden_;
-  double weight_ = 0.0;
-  std::uint64_t segments_before_ = 0, light_hits_before_ = 0;  // of earlier samples in a film
   policy_clock<Exec> clock_;
 };
 
