@@ -176,10 +176,13 @@ TEST_CASE("options without effect are refused by a line that says what they need
       {"--caster-buffer 1M --device optix --method pt", "--caster-buffer", fields},
       {"--product-resolution 8", "--product-resolution", "--method wfpg-product"},
       {"--samples-per-leaf 100", "--samples-per-leaf", "--method openpgl-vmm or openpgl-dqt"},
-      {"--guide-fraction 0.5 --method pt", "--guide-fraction", "a --method other than pt"},
+      {"--guide-fraction 0.5 --method pt", "--guide-fraction", "a --method other than pt and vpt"},
       {"--guided-depths 1 --method pt", "--guided-depths", "--method wfpg, wfpg-product, sarsa or records"},
       {"--sarsa-step 4", "--sarsa-step", "--method sarsa"},
       {"--records-cones 4", "--records-cones", "--method records"},
+      {"--fog 0.1", "--fog", "--method vpt"},
+      {"--guide-fraction 0.5 --method vpt", "--guide-fraction", "a --method other than pt and vpt"},
+      {"--method vpt --device optix", "--method vpt", "a --device other than optix"},
       {"--exposure 2", "--exposure", "--png"},
       {"--method openpgl-vmm --device seq", "--method openpgl-vmm", "--device cpu"},
       {"--method records --device optix", "--method records", "a --device other than optix"}};
@@ -189,7 +192,7 @@ TEST_CASE("options without effect are refused by a line that says what they need
   for (const std::string method : {"sarsa", "records", "openpgl-dqt"})
     for (const std::string option : {"--save-state", "--resume"})
       table.push_back(
-          {"--method " + method + " " + option + " file", option, "--method pt, wfpg or wfpg-product"});
+          {"--method " + method + " " + option + " file", option, "--method pt, vpt, wfpg or wfpg-product"});
   for (const refusal& one : table)
     CHECK(said_of(one.options) ==
           "wfpg-render: " + one.option + " requires " + one.need + "; --help lists the options\n");

@@ -293,13 +293,13 @@ TEST_CASE("guides and states need a method that can save them", "[renderer][stat
       sampling_method::pt, [](render_options& o) { o.keep_guide = true; }, "method is pt, expected wfpg or");
   refused(
       sampling_method::openpgl_dqt, [](render_options& o) { o.keep_state = true; },
-      "method is openpgl-dqt, expected pt, wfpg or");
+      "method is openpgl-dqt, expected pt, vpt, wfpg or");
   refused(
       sampling_method::openpgl_vmm, [](render_options& o) { o.resume = "a"; },
-      "method is openpgl-vmm, expected pt, wfpg or");
+      "method is openpgl-vmm, expected pt, vpt, wfpg or");
   refused(
       sampling_method::sarsa, [](render_options& o) { o.keep_state = true; },
-      "method is sarsa, expected pt, wfpg or");
+      "method is sarsa, expected pt, vpt, wfpg or");
   refused(
       sampling_method::wfpg, [](render_options& o) { o.load_guide = o.resume = "a"; },
       "load_guide is a, expected none");
@@ -316,6 +316,10 @@ TEST_CASE("scenes that look different have different checksums", "[renderer][sta
       },
       [](scene& s) { s.triangle_materials[0] ^= 1; },
       [](scene& s) { s.materials[0].absorption.z = 1.0f; },
+      [](scene& s) { s.materials[0].scattering.x = 1.0f; },
+      [](scene& s) { s.materials[0].priority = -1; },
+      [](scene& s) { s.fog.absorption.y = 0.5f; },
+      [](scene& s) { s.fog.scattering.y = 0.5f; },
       [](scene& s) { s.materials[0].kind = material_kind::mirror; },
       [](scene& s) { s.materials[0].base_texture.offset.x = 0.5f; },
       [](scene& s) {

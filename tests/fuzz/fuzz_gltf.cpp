@@ -5,6 +5,7 @@
 
 #include <wfpg/base/math.hpp>
 
+#include <cmath>
 #include <cstdint>
 #include <stdexcept>
 #include <string>
@@ -33,8 +34,11 @@ void check(const render::scene& scene) {
                 is_texture(scene, m.emission_texture),
             "textures that exist");
     require(m.alpha > 0.0f && m.alpha <= 1.0f && m.ior > 0.0f, "roughness and index in their ranges");
-    require(is_finite(m.base_color) && is_finite(m.emission) && is_finite(m.absorption), "finite materials");
+    require(is_finite(m.base_color) && is_finite(m.emission) && is_finite(m.absorption) &&
+                is_finite(m.scattering) && std::fabs(m.g) < 1.0f,
+            "finite materials");
   }
+  require(is_finite(scene.fog.extinction()) && std::fabs(scene.fog.g) < 1.0f, "a finite fog");
   require(is_finite(scene.view.position) && is_finite(scene.view.forward) && is_finite(scene.view.up) &&
               scene.view.vertical_fov > 0.0f,
           "a camera that sees");

@@ -3,10 +3,11 @@
 
 namespace render {
 
-/// Sampling methods. pt is path tracing. wfpg guides by fields, wfpg_product by products of fields and BSDFs.
-/// sarsa guides by a SARSA grid, records by irradiance records. openpgl_vmm guides by Open PGL's mixtures of
-/// von Mises-Fisher lobes with parallax, openpgl_dqt by its quadtrees of directions.
-enum class sampling_method { pt, wfpg, wfpg_product, sarsa, records, openpgl_vmm, openpgl_dqt };
+/// Sampling methods. pt is path tracing, vpt that of scenes with media. wfpg guides by fields, wfpg_product
+/// by products of fields and BSDFs. sarsa guides by a SARSA grid, records by irradiance records. openpgl_vmm
+/// guides by Open PGL's mixtures of von Mises-Fisher lobes with parallax, openpgl_dqt by its quadtrees of
+/// directions.
+enum class sampling_method { pt, vpt, wfpg, wfpg_product, sarsa, records, openpgl_vmm, openpgl_dqt };
 
 /// The guide beside BSDFs: none, fields over an octree, a grid, records, or Open PGL's field.
 enum class guide_kind { none, octree, sarsa, records, openpgl };
@@ -21,6 +22,7 @@ struct method_properties {
 
 inline constexpr method_properties all_methods[] = {
     {sampling_method::pt, "pt", guide_kind::none, false, true},
+    {sampling_method::vpt, "vpt", guide_kind::none, false, true},
     {sampling_method::wfpg, "wfpg", guide_kind::octree, true, true},
     {sampling_method::wfpg_product, "wfpg-product", guide_kind::octree, true, true},
     {sampling_method::sarsa, "sarsa", guide_kind::sarsa, true, false},
@@ -34,6 +36,10 @@ constexpr const method_properties& properties_of(sampling_method method) {
   const method_properties* row = all_methods;
   while (row->method != method) ++row;
   return *row;
+}
+
+constexpr bool is_guided(sampling_method method) {
+  return properties_of(method).guide != guide_kind::none;
 }
 
 constexpr bool is_wfpg(sampling_method method) {

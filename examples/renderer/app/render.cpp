@@ -27,7 +27,7 @@ void require_guided_files(const render_options& options) {
   require(is_wfpg(options.method) || (options.load_guide.empty() && !options.keep_guide), "method", method,
           "wfpg or wfpg-product where a guide is loaded or saved");
   require(properties_of(options.method).can_be_saved || (options.resume.empty() && !options.keep_state),
-          "method", method, "pt, wfpg or wfpg-product where a rendering's state is resumed or saved");
+          "method", method, "pt, vpt, wfpg or wfpg-product where a rendering's state is resumed or saved");
   require(options.resume.empty() || options.load_guide.empty(), "load_guide", options.load_guide,
           "none where a rendering goes on, which has its own");
 }
@@ -61,6 +61,9 @@ render_options completed(const scene& scene, render_options options) {
   const int least = combination_of(options) == wfpg::sample_combination::discard_first ? 2 : 1;
   require(options.seconds > 0.0 || options.spp >= least, "spp", options.spp,
           least == 2 ? "at least 2, as the first sample is discarded" : "at least 1");
+  require(options.method == sampling_method::vpt || !needs_volume_tracing(scene), "method",
+          name_of(method_names(), options.method),
+          "vpt for a scene with fog or scattering solids; --method vpt renders it");
   require_guided_files(options);
   return options;
 }

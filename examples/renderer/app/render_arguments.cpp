@@ -135,6 +135,7 @@ const std::vector<requirement>& requirements() {
       {{"--slot-resolution", "--recast", "--learn", "--field-budget"},
        "--fields kept",
        [](options o) { return o.lifetime == fields::kept; }},
+      {{"--fog"}, "--method vpt", [](options o) { return o.method == sampling_method::vpt; }},
       {{"--product-resolution"},
        "--method wfpg-product",
        [](options o) { return o.method == sampling_method::wfpg_product; }},
@@ -147,13 +148,13 @@ const std::vector<requirement>& requirements() {
        "--cones scene, or another source than samples",
        [](options o) { return o.octree != octree_source::samples || o.through == cones::scene; }},
       {{"--guide-fraction"},
-       "a --method other than pt",
-       [](options o) { return o.method != sampling_method::pt; }},
+       "a --method other than pt and vpt",
+       [](options o) { return is_guided(o.method); }},
       {{"--guided-depths"},
        "--method wfpg, wfpg-product, sarsa or records",
-       [](options o) { return o.method != sampling_method::pt && !is_openpgl(o.method); }},
+       [](options o) { return is_guided(o.method) && !is_openpgl(o.method); }},
       {{"--save-state", "--resume"},
-       "--method pt, wfpg or wfpg-product",
+       "--method pt, vpt, wfpg or wfpg-product",
        [](options o) { return properties_of(o.method).can_be_saved; }},
       {{"--sarsa-update", "--sarsa-sampler", "--sarsa-resolution", "--sarsa-directions", "--sarsa-step",
         "--sarsa-learning-rate"},
@@ -183,7 +184,8 @@ void add_scene_options(CLI::App& app, scene_arguments& given) {
 
 void add_method_options(CLI::App& app, render_options& options) {
   add_choice<sampling_method>(app, "--method", options.method, method_names(),
-                              "path tracing; guided by fields (default), or by their products with BSDFs; by "
+                              "path tracing; that of scenes with media; guided by fields (default), or by "
+                              "their products with BSDFs; by "
                               "a grid that learns by SARSA; by irradiance records that are made before the "
                               "first path; by Open PGL's mixtures of lobes or quadtrees");
   add_choice<guiding>(app, "--guiding", options.mode,
@@ -200,7 +202,7 @@ void add_method_options(CLI::App& app, render_options& options) {
                             "first sample's hits");
   add_choice<wfpg::sample_combination>(
       app, "--combine", options.combine, combination_names(),
-      "how samples add up (default: pt-linear; constant for pt, for records and with "
+      "how samples add up (default: pt-linear; constant for pt, vpt, for records and with "
       "--load-guide)");
 }
 
@@ -306,7 +308,9 @@ void check_render_options(const CLI::App& app, const render_options& options) {
   const std::string method = "--method " + name_of(method_names(), options.method);
   if (is_openpgl(options.method) && options.where != device::cpu)
     throw CLI::RequiresError(method, "--device cpu");
-  if (options.method == sampling_method::records && options.where == device::optix)
+  const bool traces_inline =
+      options.method == sampling_method::records || options.method == sampling_method::vpt;
+  if (traces_inline && options.where == device::optix)
     throw CLI::RequiresError(method, "a --device other than optix");
 }
 

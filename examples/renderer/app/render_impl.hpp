@@ -10,6 +10,7 @@
 #include "tracer/collecting_guider.hpp"
 #include "tracer/records_scene.hpp"
 #include "tracer/unguided.hpp"
+#include "tracer/volume_tracer.hpp"
 #include "tracer/wavefront.hpp"
 
 #include <wfpg/guides/octree/transient_guide.hpp>
@@ -22,6 +23,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace render {
@@ -311,9 +313,26 @@ void take_by_method(const sampling_job<Exec, Caster>& job) {
                               ", expected one that runs on any policy");
 }
 
+/// Renders media. Throws std::runtime_error for a caster of batches: rays pass boundaries inside kernels.
+template <class Accelerated, class Exec>
+render_result render_volumes(const Exec& exec, const scene& scene, const render_options& options,
+                             const progress_callback& progress) {
+  using caster_type = decltype(std::declval<const Accelerated&>().caster());
+  if constexpr (wfpg::is_inline_caster_v<caster_type>) {
+    return render_by<Accelerated, volume_tracer>(exec, scene, options, progress, [](const auto& job) {
+      no_guide none;
+      take_samples(job, none);
+    });
+  } else {
+    throw std::runtime_error("--device optix does not support --method vpt; --device cuda does");
+  }
+}
+
 template <class Accelerated, class Exec>
 render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
                         const progress_callback& progress) {
+  if (options.method == sampling_method::vpt)
+    return render_volumes<Accelerated>(exec, scene, options, progress);
   return render_by<Accelerated>(exec, scene, options, progress, [](const auto& job) { take_by_method(job); });
 }
 

@@ -31,6 +31,7 @@ struct arguments {
   scene_arguments scene;
   std::string output, png, stats, reference, save_guide, save_state;
   float exposure = 1.0f;  ///< of the PNG
+  float fog = 0.0f;       ///< scattering per scene unit; 0: the scene's own
   render_options options;
 };
 
@@ -60,6 +61,12 @@ void add_file_options(CLI::App& app, arguments& given) {
       ->transform(file_path());
 }
 
+void add_fog_option(CLI::App& app, arguments& given) {
+  app.add_option("--fog", given.fog,
+                 "scattering per scene unit of a fog around everything, for vpt (default: the scene's)")
+      ->transform(positive_number(double(largest_coefficient)));
+}
+
 void add_state_options(CLI::App& app, arguments& given) {
   app.add_option("--save-guide", given.save_guide,
                  "where the guide of wfpg or wfpg-product goes at the end: what it has learnt")
@@ -67,9 +74,10 @@ void add_state_options(CLI::App& app, arguments& given) {
   CLI::Option* const load = app.add_option("--load-guide", given.options.load_guide,
                                            "guide for wfpg or wfpg-product to begin with, of the same scene")
                                 ->transform(file_path());
-  app.add_option("--save-state", given.save_state,
-                 "where the state of a rendering by pt, wfpg or wfpg-product goes at the end, and when it is "
-                 "interrupted")
+  app.add_option(
+         "--save-state", given.save_state,
+         "where the state of a rendering by pt, vpt, wfpg or wfpg-product goes at the end, and when it is "
+         "interrupted")
       ->transform(file_path());
   app.add_option("--resume", given.options.resume,
                  "state of the rendering to go on with; where it goes when that is interrupted")
@@ -131,7 +139,8 @@ std::optional<image> reference_of(const arguments& given, const scene& scene) {
 
 int render_scene(arguments& given, std::ostream& out, std::ostream& log) {
   check_files(given);
-  const scene scene = load_scene(given.scene, given.options, "wfpg-render", log);
+  scene scene = load_scene(given.scene, given.options, "wfpg-render", log);
+  if (given.fog > 0.0f) scene.fog = {vec3(0.0f), vec3(given.fog), 0.0f};
   const std::optional<image> reference = reference_of(given, scene);
 
   given.options.keep_guide = !given.save_guide.empty();
@@ -153,6 +162,7 @@ int run_program(int argc, const char* const* argv, std::ostream& out, std::ostre
   CLI::App app{"Renders a scene by wavefront path tracing, with or without path guiding."};
   report_in_one_line(app, "wfpg-render");
   add_scene_options(app, given.scene);
+  add_fog_option(app, given);
   add_file_options(app, given);
   add_state_options(app, given);
   add_method_options(app, given.options);

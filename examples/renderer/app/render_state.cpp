@@ -64,7 +64,7 @@ named_values values_of(const render_options& o) {
                          {"--nee", o.nee ? "on" : "off"},
                          {"--method", name_of(method_names(), o.method)},
                          {"--combine", name_of(combination_names(), combination_of(o))}};
-  if (o.method != sampling_method::pt) add_guider_values(o, values);
+  if (is_guided(o.method)) add_guider_values(o, values);
   return values;
 }
 

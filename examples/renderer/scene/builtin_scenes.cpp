@@ -306,6 +306,59 @@ scene furnace() {
   return b.finish(8);
 }
 
+punctual_light lamp_at(vec3 position, vec3 intensity) {
+  punctual_light lamp;
+  lamp.position = position;
+  lamp.intensity = intensity;
+  return lamp;
+}
+
+scene fog_lamp() {
+  scene_builder b("fog-lamp");
+  b.look({0.0f, 0.4f, 5.0f}, {0.0f, 0.0f, 0.0f}, 0.9f);
+  scene s = b.finish(8);
+  s.fog = {vec3(0.02f), {0.06f, 0.08f, 0.1f}, 0.4f};
+  s.punctual_lights = {lamp_at(vec3(0.0f), {40.0f, 36.0f, 28.0f})};
+  return s;
+}
+
+/// A box so large and deep that its sides and its bottom do not show.
+scene slab() {
+  scene_builder b("slab");
+  material inside;
+  inside.kind = material_kind::dielectric;
+  inside.base_color = vec3(1.0f);
+  inside.ior = 1.0f;
+  inside.scattering = {0.95f, 0.9f, 0.5f};
+  inside.absorption = vec3(1.0f) - inside.scattering;
+  b.box({{0.0f, -20.0f, 0.0f}, {120.0f, 40.0f, 120.0f}}, b.add(inside));
+  b.sky(vec3(1.0f));
+  b.look({0.0f, 12.0f, 24.0f}, {0.0f, 0.0f, 0.0f}, 0.9f);
+  return b.finish(256);
+}
+
+/// A closed room of 4 x 3 x 4. A screen from wall to wall has a level slit, and behind it is the lamp. The
+/// camera looks along the sheet of light.
+scene fog_spot() {
+  scene_builder b("fog-spot");
+  const auto white = b.diffuse(vec3(0.7f)), wood = b.diffuse({0.6f, 0.42f, 0.28f});
+  b.room({{-2.0f, 0.0f, -2.0f}, {2.0f, 3.0f, 2.0f}}, {white, white, white, white, white, white});
+  for (const float y : {0.0f, 2.03f})
+    b.parallelogram({-1.2f, y, -2.0f}, {0.0f, y > 0.0f ? 0.97f : 1.97f, 0.0f}, {0.0f, 0.0f, 4.0f},
+                    {{1.0f, 0.0f, 0.0f}, wood});
+  b.box({{0.6f, 0.3f, -0.6f}, {0.6f, 0.6f, 0.6f}, 0.4f}, white);
+  b.look({0.4f, 1.5f, 1.9f}, {-0.1f, 1.3f, -1.0f}, 1.1f);
+  scene s = b.finish(8);
+  punctual_light spot = lamp_at({-1.8f, 2.5f, 0.0f}, {200.0f, 180.0f, 140.0f});
+  spot.kind = punctual_kind::spot;
+  spot.direction = glm::normalize(vec3(0.6f, -0.5f, 0.0f));
+  spot.cos_inner = 0.97f;
+  spot.cos_outer = 0.92f;
+  s.punctual_lights = {spot};
+  s.fog = {vec3(0.01f), vec3(0.15f), 0.3f};
+  return s;
+}
+
 using maker = scene (*)();
 
 const std::vector<std::pair<std::string, maker>>& makers() {
@@ -319,7 +372,10 @@ const std::vector<std::pair<std::string, maker>>& makers() {
                                                                  {"many-lamps", many_lamps},
                                                                  {"materials", materials},
                                                                  {"outdoor", outdoor},
-                                                                 {"furnace", furnace}};
+                                                                 {"furnace", furnace},
+                                                                 {"fog-lamp", fog_lamp},
+                                                                 {"slab", slab},
+                                                                 {"fog-spot", fog_spot}};
   return all;
 }
 

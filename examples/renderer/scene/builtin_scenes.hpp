@@ -10,7 +10,7 @@
 namespace render {
 
 /// cornell-box, cornell-enclosed, cornell-wall, ajar, thin-wall, glossy-room, caustic-pool, many-lamps,
-/// materials, outdoor, furnace.
+/// materials, outdoor, furnace, fog-lamp, slab, fog-spot.
 std::vector<std::string> builtin_scene_names();
 
 bool is_builtin_scene(const std::string& name);
@@ -38,6 +38,12 @@ bool is_builtin_scene(const std::string& name);
 ///   are in view nearly everywhere, so guiding has little to gain. Open.
 /// - `outdoor`: a wall and spheres of five materials on a plane, under a map of the sky with a sun. Open.
 /// - `furnace`: a closed box of albedo 0.5 that emits radiance 1 everywhere; see furnace_radiance().
+/// Three need --method vpt:
+/// - `fog-lamp`: a point lamp in endless fog, and nothing else. Its light scattered once is an integral.
+/// - `slab`: a block of scattering matter below a white sky, so large that it is a half-space. Its index is
+///   that of the air. It scatters alike in all directions; its albedo is 0.95, 0.9 and 0.5. Chandrasekhar's H
+///   functions give its radiance.
+/// - `fog-spot`: a room of thin fog, in which a lamp shines through a slit. Closed.
 scene make_builtin_scene(const std::string& name);
 
 /// The exact radiance of every pixel of `furnace`, if a path has `max_depth` segments and emission counts at

@@ -56,6 +56,13 @@ WFPG_HD inline vec3 leave_surface(vec3 position, vec3 geometric_normal, vec3 dir
   return position + (glm::dot(geometric_normal, direction) < 0.0f ? -offset : offset) * geometric_normal;
 }
 
+/// Whether rays may enter what a material bounds: all that transmits and is no thin sheet.
+WFPG_HD inline bool bounds_solid(const material& m) {
+  if (m.kind == material_kind::metallic_roughness)
+    return unorm8(m.metallic) < 1.0f && unorm8(m.transmission) > 0.0f;
+  return m.kind == material_kind::dielectric || m.kind == material_kind::rough_dielectric;
+}
+
 /// scene.hpp describes the arrays.
 struct scene_view {
   wfpg::array_view<const vec3> positions, normals;
@@ -67,6 +74,8 @@ struct scene_view {
   wfpg::array_view<const texture_span> textures;
   wfpg::array_view<const vec4> texels;
   environment_view environment;
+  medium fog;
+  bool has_solids = false;  ///< whether any of them bounds one
 
   WFPG_HD const material& material_of(std::uint32_t triangle) const {
     return materials[triangle_materials[triangle]];
@@ -225,7 +234,9 @@ class device_scene {
         triangles_(exec, host.triangles),
         triangle_materials_(exec, host.triangle_materials),
         materials_(exec, host.materials),
-        environment_(host.environment) {
+        environment_(host.environment),
+        fog_(host.fog),
+        has_solids_(std::any_of(host.materials.begin(), host.materials.end(), bounds_solid)) {
     check(host);
     emitted_luminances_ = wfpg::buffer<float, Exec>(exec, emitted_luminances(host));
     std::vector<texture_span> spans;
@@ -252,6 +263,8 @@ class device_scene {
     v.textures = textures_.view();
     v.texels = texels_.view();
     v.environment = environment_;
+    v.fog = fog_;
+    v.has_solids = has_solids_;
     return v;
   }
 
@@ -281,8 +294,20 @@ class device_scene {
                [](const punctual_light& light) { return light.intensity; });
   }
 
+  static void check_medium(const medium& inside, const std::string& owner) {
+    for (int c = 0; c < 3; ++c)
+      for (const float coefficient : {inside.absorption[c], inside.scattering[c]})
+        wfpg::require(coefficient >= 0.0f && coefficient <= largest_coefficient,
+                      ("a coefficient of " + owner).c_str(), coefficient, "in [0, 1e+06]");
+    wfpg::require(std::abs(inside.g) <= largest_mean_cosine, ("g of " + owner).c_str(), inside.g,
+                  "in [-0.999, 0.999]");
+  }
+
   static void check(const scene& host) {
     check_lights(host);
+    check_medium(host.fog, "scene.fog");
+    for (std::size_t i = 0; i < host.materials.size(); ++i)
+      check_medium(interior_of(host.materials[i]), "scene.materials, element " + std::to_string(i));
     wfpg::require(host.sky.texels.size() == std::size_t(host.sky.width) * std::size_t(host.sky.height),
                   "scene.sky.texels.size()", host.sky.texels.size(), "width times height");
     using wfpg::require;
@@ -321,6 +346,8 @@ class device_scene {
   wfpg::buffer<vec3, Exec> sky_texels_;
   wfpg::buffer<alias_column, Exec> sky_table_;
   environment_view environment_;
+  medium fog_;
+  bool has_solids_;
 };
 
 }  // namespace render

@@ -354,6 +354,7 @@ class scene_reader {
     const tinygltf::Scene* chosen = chosen_scene();
     if (!chosen || !chosen->extras.IsObject()) return;
     if (chosen->extras.Has("resolution")) read_resolution(chosen->extras.Get("resolution"));
+    if (chosen->extras.Has("fog")) target_.fog = gltf::read_medium(chosen->extras.Get("fog"), "extras.fog");
     if (!chosen->extras.Has("environment")) return;
     const tinygltf::Value& environment = chosen->extras.Get("environment");
     if (environment.IsObject() && environment.Has("radiance")) read_radiance(environment.Get("radiance"));

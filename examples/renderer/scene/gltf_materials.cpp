@@ -12,10 +12,12 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 namespace render::gltf {
 namespace {
@@ -161,6 +163,67 @@ void set_transform(const tinygltf::Value& extension, texture_reference& target) 
   target.offset = {float(offset[0]), float(offset[1])};
 }
 
+/// Reads the members of a medium in `extras`, which none of glTF's own checks see. Throws std::runtime_error
+/// "PLACE.MEMBER is VALUE, expected WHAT", also for members that it does not know.
+class medium_reader {
+ public:
+  medium_reader(const tinygltf::Value& value, std::string place, const std::vector<std::string>& known)
+      : value_(value), place_(std::move(place)) {
+    if (!value.IsObject()) throw std::runtime_error(place_ + " is no object");
+    for (const std::string& key : value.Keys())
+      if (std::find(known.begin(), known.end(), key) == known.end())
+        throw std::runtime_error(place_ + " has the unknown member " + key);
+  }
+
+  /// One number for all channels, or three. 0 if it is missing.
+  vec3 coefficients(const char* member) const {
+    const char* const expected = "a number, or three, in [0, 1e+06]";
+    if (!value_.Has(member)) return vec3(0.0f);
+    const tinygltf::Value& given = value_.Get(member);
+    const bool is_list = given.IsArray();
+    if (is_list && given.ArrayLen() != 3) refuse(member, "a list of another length", expected);
+    vec3 result;
+    for (int c = 0; c < 3; ++c)
+      result[c] =
+          float(in_range(member, is_list ? given.Get(c) : given, 0.0, double(largest_coefficient), expected));
+    return result;
+  }
+  /// A number in [-most, most]. 0 if it is missing.
+  double number(const char* member, double most) const {
+    std::ostringstream expected;
+    expected << "a number in [" << -most << ", " << most << "]";
+    return value_.Has(member) ? in_range(member, value_.Get(member), -most, most, expected.str()) : 0.0;
+  }
+  double priority() const {
+    const double found = number("priority", largest_priority);
+    if (found != std::floor(found)) refuse("priority", shown(found), "a whole number");
+    return found;
+  }
+
+ private:
+  static constexpr double largest_priority = 1000.0;
+
+  static std::string shown(double number) {
+    std::ostringstream text;
+    text << number;
+    return text.str();
+  }
+  [[noreturn]] void refuse(const std::string& member, const std::string& found,
+                           const std::string& expected) const {
+    throw std::runtime_error(place_ + "." + member + " is " + found + ", expected " + expected);
+  }
+  double in_range(const char* member, const tinygltf::Value& given, double least, double most,
+                  const std::string& expected) const {
+    if (!given.IsNumber()) refuse(member, "no number", expected);
+    const double found = given.GetNumberAsDouble();
+    if (!(found >= least && found <= most)) refuse(member, shown(found), expected);
+    return found;
+  }
+
+  const tinygltf::Value& value_;
+  std::string place_;
+};
+
 class material_reader {
  public:
   material_reader(const tinygltf::Model& model, scene& target) : model_(model), target_(target) {}
@@ -227,7 +290,22 @@ class material_reader {
     if (result.kind == material_kind::metallic_roughness && result.transmission > 0.0f)
       result.ior = std::max(result.ior, least_rough_ior);
     result.alpha = std::max(result.alpha, min_alpha);
-    if (!thin && result.transmission > 0.0f && result.metallic < 1.0f) result.absorption = absorption(source);
+    const bool is_filled = !thin && result.transmission > 0.0f && result.metallic < 1.0f;
+    if (is_filled) result.absorption = absorption(source);
+    if (source.extras.IsObject() && source.extras.Has("medium"))
+      read_interior(source.extras.Get("medium"), name_of(source), is_filled, result);
+  }
+
+  // Beside the absorption of KHR_materials_volume. No extension of glTF has scattering of solids.
+  void read_interior(const tinygltf::Value& value, const std::string& name, bool is_filled,
+                     material& result) {
+    const medium_reader reader(value, name + ", extras.medium", {"scattering", "g", "priority"});
+    const vec3 scattering = reader.coefficients("scattering");
+    const double g = reader.number("g", double(largest_mean_cosine)), priority = reader.priority();
+    if (!is_filled) return warn("extras.medium of materials that are no transmitting solids has no effect");
+    result.scattering = scattering;
+    result.g = float(g);
+    result.priority = std::int32_t(priority);
   }
 
   // KHR_materials_volume: the attenuation colour is what is left after the attenuation distance.
@@ -347,6 +425,12 @@ class material_reader {
 };
 
 }  // namespace
+
+medium read_medium(const tinygltf::Value& value, const std::string& place) {
+  const medium_reader reader(value, place, {"absorption", "scattering", "g"});
+  return {reader.coefficients("absorption"), reader.coefficients("scattering"),
+          float(reader.number("g", double(largest_mean_cosine)))};
+}
 
 void add_materials(const tinygltf::Model& model, scene& target) {
   material_reader reader(model, target);

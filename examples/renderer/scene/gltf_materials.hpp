@@ -12,4 +12,8 @@ namespace render::gltf {
 /// indices out of range and for images that cannot be decoded.
 void add_materials(const tinygltf::Model& model, scene& target);
 
+/// A medium in `extras`: absorption and scattering, each a number or three, and g. Missing ones are 0. Throws
+/// std::runtime_error that names `place` and the member.
+medium read_medium(const tinygltf::Value& value, const std::string& place);
+
 }  // namespace render::gltf

@@ -79,7 +79,29 @@ struct material {
   vec3 emission{0.0f};                 ///< emitted radiance, W/(m² sr), on the counter-clockwise side
   texture_reference emission_texture;  ///< multiplies emission
   vec3 absorption{0.0f};               ///< inside of transmitting solids, 1 / scene unit
+  vec3 scattering{0.0f};               ///< likewise
+  float g = 0.0f;                      ///< mean cosine of that scattering, in (-1, 1)
+  std::int32_t priority = 0;           ///< where solids overlap, the one with the largest is there
 };
+
+/// A homogeneous medium with the phase function of Henyey and Greenstein. Coefficients are per scene unit.
+struct medium {
+  vec3 absorption{0.0f};
+  vec3 scattering{0.0f};
+  float g = 0.0f;  ///< mean cosine of scattering, in (-1, 1)
+
+  WFPG_HD vec3 extinction() const { return absorption + scattering; }
+};
+
+/// The medium inside of solids that a material bounds.
+WFPG_HD inline medium interior_of(const material& m) {
+  return {m.absorption, m.scattering, m.g};
+}
+
+/// The largest coefficient of a medium, 1 / scene unit. Products with distances and densities stay finite.
+inline constexpr float largest_coefficient = 1e6f;
+/// The largest |g|. Beyond it, floats do not resolve the lobe.
+inline constexpr float largest_mean_cosine = 0.999f;
 
 /// The largest radiance, intensity or irradiance of a light, each channel, in the units of its field below.
 /// Sums of light are floats, whose largest is 3.4e38. 1e15 leaves a factor of 3e23 for a path's other
@@ -134,11 +156,19 @@ struct scene {
   std::vector<texture> textures;
   std::vector<punctual_light> punctual_lights;
   camera view;
+  medium fog;                         ///< around all solids, and without end
   vec3 environment{0.0f};             ///< constant radiance, W/(m² sr)
   environment_map sky;                ///< replaces the constant radiance if it has texels
   int width = 512, height = 512;      ///< intended size of the picture, pixels
   int max_depth = 8;                  ///< intended number of path segments
   std::vector<std::string> warnings;  ///< features of the file that the loader does not support, once each
 };
+
+/// Whether only --method vpt renders a scene: it has fog, or solids that scatter inside.
+inline bool needs_volume_tracing(const scene& host) {
+  bool scatters = host.fog.extinction() != vec3(0.0f);
+  for (const material& m : host.materials) scatters = scatters || m.scattering != vec3(0.0f);
+  return scatters;
+}
 
 }  // namespace render

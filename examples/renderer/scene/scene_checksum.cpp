@@ -63,10 +63,16 @@ class scene_hash {
   void add(const material& m) {
     const auto& [kind, base_color, base_texture, metallic_roughness_texture, opacity, alpha_cutoff, alpha,
                  ior, metallic, specular, transmission, diffuse_transmission, transmitted_color, emission,
-                 emission_texture, absorption] = m;
+                 emission_texture, absorption, scattering, g, priority] = m;
     add_all(kind, base_color, base_texture, metallic_roughness_texture, opacity, alpha_cutoff, alpha, ior,
             metallic, specular, transmission, diffuse_transmission, transmitted_color, emission,
             emission_texture, absorption);
+    // Only where they are not the default: checksums of scenes without them stay as they were.
+    if (scattering != vec3(0.0f) || priority != 0) add_all(scattering, g, priority);
+  }
+  void add(const medium& m) {
+    const auto& [absorption, scattering, g] = m;
+    if (m.extinction() != vec3(0.0f)) add_all(absorption, scattering, g);
   }
 
   std::uint64_t hash_ = wfpg::checksum({});
@@ -75,7 +81,7 @@ class scene_hash {
 scene_hash hash_without_camera(const scene& s) {
   scene_hash hash;
   hash.add_all(s.positions, s.normals, s.uvs, s.triangles, s.triangle_materials, s.materials, s.textures,
-               s.punctual_lights, s.environment, s.sky);
+               s.punctual_lights, s.environment, s.sky, s.fog);
   return hash;
 }
 
