@@ -1,5 +1,8 @@
 // The host that docs/bidirectional.md talks about, as far as its code needs it.
+#include <wfpg/exec/seq.hpp>
+#include <wfpg/light/light_vertices.hpp>
 #include <wfpg/light/path_weights.hpp>
+#include <wfpg/light/splats.hpp>
 
 #include <vector>
 
@@ -22,9 +25,27 @@ wfpg::path_departure scatter(const vertex& from);
 wfpg::path_departure leave(const vertex& from, const vertex& to);
 wfpg::path_edge join(const vertex& light, const vertex& camera);
 
+struct trace_all {
+  wfpg::array_view<std::uint32_t> keeps;
+  void operator()(std::size_t path) const { keeps[path] = 1; }
+};
+struct store_and_splat {
+  wfpg::light_vertices_view<vertex> vertices;
+  wfpg::splat_view splats;
+  void operator()(std::size_t path) const {
+    if (vertices.has_place(path)) vertices.write(path, {});
+    splats.add(path, 0, wfpg::vec3(1.0f));
+  }
+};
+
 }  // namespace my
 
 void follow(const my::scene& scene, const wfpg::path_techniques& techniques, my::light_path& path);
 float weight(const wfpg::path_techniques& techniques, const my::vertex& light, const my::vertex& camera);
 
 #include "bidirectional-1.inc"
+#include "bidirectional-2.inc"
+
+template void follow_all(const wfpg::exec::seq&, wfpg::light_vertices<wfpg::exec::seq, my::vertex>&,
+                         wfpg::splats<wfpg::exec::seq>&, wfpg::array_view<std::uint32_t>,
+                         wfpg::array_view<wfpg::vec3>);

@@ -44,8 +44,21 @@ inline render::scene bright_room() {
   return s;
 }
 
-/// A built-in scene, the bright room, or cornell-box with a map.
+/// cornell-box with a point, a spot and a directional light in place of its lamp.
+inline render::scene lamps_without_extent() {
+  using render::punctual_kind, wfpg::vec3;
+  render::scene s = render::make_builtin_scene("cornell-box");
+  for (render::material& m : s.materials) m.emission = vec3(0.0f);
+  const vec3 down = glm::normalize(vec3(0.3f, -1.0f, 0.2f)), in = glm::normalize(vec3(0.1f, -0.2f, 1.0f));
+  s.punctual_lights = {{punctual_kind::point, {2.0f, 4.5f, 2.5f}, down, {10.0f, 8.0f, 5.0f}},
+                       {punctual_kind::spot, {3.5f, 5.0f, 3.0f}, down, {10.0f, 15.0f, 20.0f}, 0.95f, 0.8f},
+                       {punctual_kind::directional, {}, in, vec3(0.5f)}};
+  return s;
+}
+
+/// A built-in scene, the bright room, or cornell-box with other lights.
 inline render::scene make_test_scene(const std::string& name) {
+  if (name == "lamps without extent") return lamps_without_extent();
   if (name == "bright-room") return bright_room();
   if (name != "cornell-box with a map") return render::make_builtin_scene(name);
   render::scene s = render::make_builtin_scene("cornell-box");

@@ -36,6 +36,7 @@ struct rendering {
   render::cones through = render::cones::scene;
   bool warmed_up = false;  ///< after warm-up: fewer waves make fields and fewer samples are recorded
   bool precise = false;    ///< more samples, see check_precisely()
+  render::technique_set techniques = {};  ///< of bpt
 
   /// The number of independent renderings. Long ones have little noise and need fewer.
   int count() const { return precise && warmed_up ? renderings * 2 / 3 : renderings; }
@@ -44,6 +45,7 @@ struct rendering {
     if (!precise) return warmed_up ? 64 : 12;
     if (method == render::sampling_method::pt) return nee ? 96 : 192;  // rendered once for all checks
     if (warmed_up) return 64;
+    if (method == render::sampling_method::bpt) return 48;
     const bool noisy = mode == render::guiding::plain || method == render::sampling_method::records;
     if (noisy) return nee ? 64 : 128;
     return nee && method != render::sampling_method::sarsa ? 24 : 32;
@@ -81,6 +83,7 @@ struct rendering {
     options.records.octree_resolution = 32;
     options.records.record_level = 3;
     options.records.emitter_rays = 1 << 14;
+    options.techniques = techniques;
     // Quadtrees with so little data have tails of noise that break a t-test.
     if (method == render::sampling_method::openpgl_dqt) options.guide_fraction = 0.3f;
     return options;
@@ -93,6 +96,8 @@ struct rendering {
       return view + "SARSA grid, update " + render::name_of(render::sarsa_update_names(), update) +
              ", sampler " + render::name_of(render::sarsa_sampler_names(), sampler);
     if (method == render::sampling_method::records) return view + "irradiance records";
+    if (method == render::sampling_method::lt) return view + "light tracing";
+    if (method == render::sampling_method::bpt) return view + "techniques " + render::names_of(techniques);
     return view + (mode == render::guiding::plain ? "plain" : "oriented") + ", " +
            (lifetime == render::fields::kept ? "kept" : "transient") + " fields" +
            (through == render::cones::scene ? ""

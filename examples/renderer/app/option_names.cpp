@@ -1,5 +1,8 @@
 #include "app/option_names.hpp"
 
+#include <sstream>
+#include <stdexcept>
+
 namespace render {
 
 const std::map<std::string, sampling_method>& method_names() {
@@ -57,6 +60,46 @@ const std::map<std::string, wfpg::sarsa_sampler>& sarsa_sampler_names() {
                                                        {"rejection", sampler::rejection},
                                                        {"mixed", sampler::mixed_rejection}};
   return names;
+}
+
+namespace {
+
+struct technique_name {
+  const char* name;
+  bool technique_set::*is_on;
+};
+constexpr technique_name technique_names[] = {{"hits", &technique_set::light_hits},
+                                              {"nee", &technique_set::next_event},
+                                              {"connect", &technique_set::connections},
+                                              {"splat", &technique_set::splats}};
+
+}  // namespace
+
+std::string names_of(const technique_set& set) {
+  std::string names;
+  for (const technique_name& row : technique_names)
+    if (set.*row.is_on) names += (names.empty() ? "" : "+") + std::string(row.name);
+  return names;
+}
+
+technique_set techniques_of(const std::string& names) {
+  technique_set set{false, false, false, false};
+  std::istringstream rest(names + '+');
+  for (std::string name; std::getline(rest, name, '+');) {
+    if (name == "bpt") {
+      set = technique_set();
+      continue;
+    }
+    bool is_known = false;
+    for (const technique_name& row : technique_names) {
+      if (name != row.name) continue;
+      set.*row.is_on = is_known = true;
+    }
+    if (!is_known)
+      throw std::invalid_argument("expected hits, nee, connect, splat or bpt, with + between them, not " +
+                                  name);
+  }
+  return set;
 }
 
 }  // namespace render

@@ -17,6 +17,11 @@ const std::map<std::string, octree_source>& octree_names();
 const std::map<std::string, wfpg::sarsa_update>& sarsa_update_names();
 const std::map<std::string, wfpg::sarsa_sampler>& sarsa_sampler_names();
 
+/// The value of --techniques: names of all that are on, with + between them.
+std::string names_of(const technique_set& set);
+/// The set of such a value. Throws std::invalid_argument that says which name is unknown.
+technique_set techniques_of(const std::string& names);
+
 /// The name of a value. Precondition: it has one.
 template <class T>
 const std::string& name_of(const std::map<std::string, T>& names, T value) {

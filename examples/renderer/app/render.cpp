@@ -27,7 +27,8 @@ void require_guided_files(const render_options& options) {
   require(is_wfpg(options.method) || (options.load_guide.empty() && !options.keep_guide), "method", method,
           "wfpg or wfpg-product where a guide is loaded or saved");
   require(properties_of(options.method).can_be_saved || (options.resume.empty() && !options.keep_state),
-          "method", method, "pt, vpt, wfpg or wfpg-product where a rendering's state is resumed or saved");
+          "method", method,
+          "pt, vpt, bpt, lt, wfpg or wfpg-product where a rendering's state is resumed or saved");
   require(options.resume.empty() || options.load_guide.empty(), "load_guide", options.load_guide,
           "none where a rendering goes on, which has its own");
 }

@@ -4,6 +4,7 @@
 #include "app/image_io.hpp"
 #include "app/methods.hpp"
 #include "tracer/stage_clock.hpp"
+#include "tracer/technique_set.hpp"
 
 #include <wfpg/guides/octree/options.hpp>
 #include <wfpg/guides/records/options.hpp>
@@ -69,8 +70,10 @@ struct render_options {
   std::optional<float> guide_fraction;
   /// Of a path, from its first vertex on, at least 1; with next-event estimation never the last of several.
   std::uint32_t guided_depths = wfpg::sampling_options().guided_depths;
-  std::uint32_t light_groups = 32;           ///< that guided paths learn to choose lights from, in [1, 255]
-  std::uint32_t samples_per_leaf = 32000;    ///< after which Open PGL's field splits a leaf, 8 to 2^30
+  std::uint32_t light_groups = 32;  ///< that guided paths learn to choose lights from, in [1, 255]
+  technique_set techniques;         ///< of bpt; nee decides on next-event estimation, too
+  std::size_t light_memory = std::size_t(1) << 30;  ///< bytes of vertices of light paths
+  std::uint32_t samples_per_leaf = 32000;           ///< after which Open PGL's field splits a leaf, 8 to 2^30
   wfpg::sarsa_grid_options sarsa;            ///< its own; what every guide is told follows from the others
   wfpg::irradiance_records_options records;  ///< likewise
   checkpoint_times checkpoints = checkpoint_times::none;  ///< when to keep the picture so far
@@ -134,7 +137,10 @@ struct render_report {
   std::vector<bin_report> bins;  ///< by depth
   slot_report slots;
   records_report records;
-  std::size_t regions = 0;  ///< of Open PGL's field
+  std::size_t regions = 0;             ///< of Open PGL's field
+  std::size_t light_vertex_bytes = 0;  ///< memory of light paths' vertices
+  /// Vertices of light paths that had no memory. The picture lacks their light.
+  std::uint64_t dropped_light_vertices = 0;
   double cones_per_segment = 0.0;
 };
 

@@ -147,14 +147,17 @@ const std::vector<requirement>& requirements() {
       {{"--octree"},
        "--cones scene, or another source than samples",
        [](options o) { return o.octree != octree_source::samples || o.through == cones::scene; }},
-      {{"--guide-fraction"},
-       "a --method other than pt and vpt",
-       [](options o) { return is_guided(o.method); }},
+      {{"--guide-fraction"}, "a --method that guides", [](options o) { return is_guided(o.method); }},
+      {{"--techniques"}, "--method bpt", [](options o) { return o.method == sampling_method::bpt; }},
+      {{"--light-memory"}, "--method bpt", [](options o) { return o.method == sampling_method::bpt; }},
+      {{"--roulette-depth"},
+       "a --method other than bpt or lt, whose paths have no roulette",
+       [](options o) { return !is_bidirectional(o.method); }},
       {{"--guided-depths"},
        "--method wfpg, wfpg-product, sarsa or records",
        [](options o) { return is_guided(o.method) && !is_openpgl(o.method); }},
       {{"--save-state", "--resume"},
-       "--method pt, vpt, wfpg or wfpg-product",
+       "--method pt, vpt, bpt, lt, wfpg or wfpg-product",
        [](options o) { return properties_of(o.method).can_be_saved; }},
       {{"--sarsa-update", "--sarsa-sampler", "--sarsa-resolution", "--sarsa-directions", "--sarsa-step",
         "--sarsa-learning-rate"},
@@ -184,8 +187,8 @@ void add_scene_options(CLI::App& app, scene_arguments& given) {
 
 void add_method_options(CLI::App& app, render_options& options) {
   add_choice<sampling_method>(app, "--method", options.method, method_names(),
-                              "path tracing; that of scenes with media; guided by fields (default), or by "
-                              "their products with BSDFs; by "
+                              "path tracing; that of scenes with media; bidirectional path tracing; light "
+                              "tracing; guided by fields (default), or by their products with BSDFs; by "
                               "a grid that learns by SARSA; by irradiance records that are made before the "
                               "first path; by Open PGL's mixtures of lobes or quadtrees");
   add_choice<guiding>(app, "--guiding", options.mode,
@@ -204,6 +207,25 @@ void add_method_options(CLI::App& app, render_options& options) {
       app, "--combine", options.combine, combination_names(),
       "how samples add up (default: pt-linear; constant for pt, vpt, for records and with "
       "--load-guide)");
+}
+
+void add_bidirectional_options(CLI::App& app, render_options& options) {
+  const auto parse = [&options](const std::string& names) {
+    try {
+      options.techniques = techniques_of(names);
+    } catch (const std::invalid_argument& error) {
+      throw CLI::ValidationError("--techniques", error.what());
+    }
+  };
+  app.add_option_function<std::string>(
+         "--techniques", parse,
+         "how bpt finds light: hits of lights, light samples, connections of paths, or light paths that the "
+         "camera sees; names with + between them (default: " +
+             names_of(options.techniques) + ")")
+      ->type_name("NAMES");
+  app.add_option("--light-memory", options.light_memory,
+                 with_default("memory of light paths' vertices", options.light_memory))
+      ->transform(byte_count());
 }
 
 void add_device_option(CLI::App& app, render_options& options) {
@@ -308,8 +330,8 @@ void check_render_options(const CLI::App& app, const render_options& options) {
   const std::string method = "--method " + name_of(method_names(), options.method);
   if (is_openpgl(options.method) && options.where != device::cpu)
     throw CLI::RequiresError(method, "--device cpu");
-  const bool traces_inline =
-      options.method == sampling_method::records || options.method == sampling_method::vpt;
+  const bool traces_inline = options.method == sampling_method::records ||
+                             options.method == sampling_method::vpt || is_bidirectional(options.method);
   if (traces_inline && options.where == device::optix)
     throw CLI::RequiresError(method, "a --device other than optix");
 }

@@ -7,6 +7,7 @@
 #include "app/sample_budget.hpp"
 #include "app/saved_guider.hpp"
 #include "casters/octree_cones.hpp"
+#include "tracer/bidirectional.hpp"
 #include "tracer/collecting_guider.hpp"
 #include "tracer/records_scene.hpp"
 #include "tracer/unguided.hpp"
@@ -179,8 +180,13 @@ render_result render_by(const Exec& exec, const scene& scene, const render_optio
   std::unique_ptr<const Accelerated> accelerated;
   building.measure(Accelerated::name,
                    [&] { accelerated = std::make_unique<const Accelerated>(exec, scene, geometry.view()); });
-  const tracer_settings settings{options.width, options.height, static_cast<std::uint32_t>(options.max_depth),
-                                 options.seed, static_cast<std::uint32_t>(options.roulette_depth)};
+  const tracer_settings settings{options.width,
+                                 options.height,
+                                 static_cast<std::uint32_t>(options.max_depth),
+                                 options.seed,
+                                 static_cast<std::uint32_t>(options.roulette_depth),
+                                 options.method == sampling_method::lt ? light_tracing() : options.techniques,
+                                 options.light_memory};
   using caster_type = decltype(accelerated->caster());
   Tracer<Exec, caster_type> tracer(exec, settings, {geometry.view(), lights.view(), options.nee},
                                    accelerated->caster());
@@ -328,11 +334,31 @@ render_result render_volumes(const Exec& exec, const scene& scene, const render_
   }
 }
 
+/// Traces paths from both ends. Throws std::runtime_error for a caster of batches: kernels trace connections
+/// themselves.
+template <class Accelerated, class Exec>
+render_result render_from_both_ends(const Exec& exec, const scene& scene, const render_options& options,
+                                    const progress_callback& progress) {
+  using caster_type = decltype(std::declval<const Accelerated&>().caster());
+  if constexpr (wfpg::is_inline_caster_v<caster_type>) {
+    return render_by<Accelerated, bidirectional_tracer>(exec, scene, options, progress, [](const auto& job) {
+      no_guide none;
+      take_samples(job, none);
+      job.result.report.light_vertex_bytes = job.tracer.light_bytes();
+      job.result.report.dropped_light_vertices = job.tracer.dropped();
+    });
+  } else {
+    throw std::runtime_error("--device optix does not support --method bpt or lt; --device cuda does");
+  }
+}
+
 template <class Accelerated, class Exec>
 render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
                         const progress_callback& progress) {
   if (options.method == sampling_method::vpt)
     return render_volumes<Accelerated>(exec, scene, options, progress);
+  if (is_bidirectional(options.method))
+    return render_from_both_ends<Accelerated>(exec, scene, options, progress);
   return render_by<Accelerated>(exec, scene, options, progress, [](const auto& job) { take_by_method(job); });
 }
 

@@ -74,10 +74,9 @@ void add_state_options(CLI::App& app, arguments& given) {
   CLI::Option* const load = app.add_option("--load-guide", given.options.load_guide,
                                            "guide for wfpg or wfpg-product to begin with, of the same scene")
                                 ->transform(file_path());
-  app.add_option(
-         "--save-state", given.save_state,
-         "where the state of a rendering by pt, vpt, wfpg or wfpg-product goes at the end, and when it is "
-         "interrupted")
+  app.add_option("--save-state", given.save_state,
+                 "where the state of a rendering by pt, vpt, bpt, lt, wfpg or wfpg-product goes at the end, "
+                 "and when it is interrupted")
       ->transform(file_path());
   app.add_option("--resume", given.options.resume,
                  "state of the rendering to go on with; where it goes when that is interrupted")
@@ -151,6 +150,9 @@ int render_scene(arguments& given, std::ostream& out, std::ostream& log) {
   const render_result result =
       render(scene, given.options, [&bar](const render_progress& p) { bar.show(p); });
   bar.finish();
+  if (result.report.dropped_light_vertices > 0)
+    log << "wfpg-render: warning: " << result.report.dropped_light_vertices
+        << " vertices of light paths had no memory, and their light is missing; raise --light-memory\n";
   if (!write_all(given, result, reference, out, log)) return failure;
   return result.is_stopped ? interrupted : 0;
 }
@@ -166,6 +168,7 @@ int run_program(int argc, const char* const* argv, std::ostream& out, std::ostre
   add_file_options(app, given);
   add_state_options(app, given);
   add_method_options(app, given.options);
+  add_bidirectional_options(app, given.options);
   add_device_option(app, given.options);
   add_nee_option(app, given.options);
   add_budget_options(app, given.options);

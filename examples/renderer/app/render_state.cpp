@@ -64,6 +64,9 @@ named_values values_of(const render_options& o) {
                          {"--nee", o.nee ? "on" : "off"},
                          {"--method", name_of(method_names(), o.method)},
                          {"--combine", name_of(combination_names(), combination_of(o))}};
+  if (o.method == sampling_method::bpt)
+    values.insert(values.end(), {{"--techniques", names_of(o.techniques)},
+                                 {"--light-memory", std::to_string(o.light_memory)}});
   if (is_guided(o.method)) add_guider_values(o, values);
   return values;
 }

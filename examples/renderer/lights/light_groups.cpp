@@ -152,10 +152,10 @@ std::vector<piece> pieces_of(const scene& host, const std::vector<single_light>&
   return result;
 }
 
-float radius_of(const scene& host) {
+wfpg::bounds3 box_of(const scene& host) {
   wfpg::bounds3 box;
   for (const vec3& p : host.positions) box = {glm::min(box.lower, p), glm::max(box.upper, p)};
-  return box.empty() ? 0.0f : 0.5f * glm::length(box.extent());
+  return box;
 }
 
 double power_of_sky(const scene& host, float scene_radius) {
@@ -169,7 +169,11 @@ double power_of_sky(const scene& host, float scene_radius) {
 
 grouped_lights group_lights(const scene& host, std::uint32_t most) {
   grouped_lights result;
-  result.scene_radius = radius_of(host);
+  const wfpg::bounds3 box = box_of(host);
+  if (!box.empty()) {
+    result.scene_radius = 0.5f * glm::length(box.extent());
+    result.scene_centre = 0.5f * (box.lower + box.upper);
+  }
   const std::vector<single_light> lights = lights_of(host, result.scene_radius);
   const std::vector<piece> pieces = pieces_of(host, lights, result.scene_radius);
   const auto append = [&](std::uint32_t number, double power) {

@@ -26,6 +26,7 @@ struct grouped_lights {
   std::vector<std::uint8_t> triangle_groups;  ///< of every triangle of the scene; empty: there is one group
   double total_power = 0.0;
   float scene_radius = 0.0f;  ///< of a sphere around the scene
+  vec3 scene_centre{0.0f};    ///< of that sphere
 };
 
 /// Makes at most `most` groups, in [1, 255], and one more for an environment map. Flat emitters are not

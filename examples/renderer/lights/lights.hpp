@@ -8,6 +8,7 @@
 #include "tracer/rng.hpp"
 
 #include <wfpg/guides/octree/light_guide.hpp>
+#include <wfpg/light/path_weights.hpp>
 
 namespace render {
 
@@ -28,6 +29,15 @@ struct light_sample {
   bool is_delta = false;    ///< it has no extent
   bool is_distant = false;  ///< `end` has no meaning
   vec3 end{0.0f};           ///< where a ray toward it ends
+  wfpg::light_end source;   ///< the light as the end of a path that this sample ends, in one group alone
+};
+
+/// A ray of light that leaves its source.
+struct emitted_ray {
+  wfpg::ray ray;
+  /// Emitted radiance and cosine over all densities of `source`. Zero: nothing is emitted.
+  vec3 throughput{0.0f};
+  wfpg::light_end source;
 };
 
 /// Converts a density by area into one by solid angle.
@@ -44,6 +54,7 @@ struct light_view {
   wfpg::array_view<const std::uint8_t> triangle_groups;  ///< of all triangles; empty: there is one group
   float total_power = 0.0f;   ///< over pi; of an emitter, mean luminance times area
   float scene_radius = 0.0f;  ///< of a sphere around the scene
+  vec3 scene_centre{0.0f};    ///< of that sphere
 
   /// Power over pi of light that may hit a scene of that radius.
   WFPG_HD static float power_of(const punctual_light& source, float radius) {
@@ -76,6 +87,15 @@ struct light_view {
     return environment.pdf(direction) * power_of(environment, scene_radius) / total_power;
   }
 
+  /// A light as the end of a path that hits it. `cosine`: at an emitter whose mean luminance is given, of the
+  /// way back, positive.
+  WFPG_HD wfpg::light_end end_on_emitter(float luminance, float cosine) const {
+    return emitter_end(pdf(luminance), cosine);
+  }
+  WFPG_HD wfpg::light_end end_in_environment(const environment_view& environment, vec3 direction) const {
+    return distant_end(environment_pdf(environment, direction), false);
+  }
+
   /// The group of an emitting triangle, and of the environment.
   WFPG_HD std::uint32_t group_of(std::uint32_t triangle) const {
     return triangle_groups.empty() ? 0u : triangle_groups[triangle];
@@ -95,7 +115,79 @@ struct light_view {
     return light;
   }
 
+  /// Samples a ray of light from all lights as one group. draw(dimension) returns random numbers in [0,1)².
+  template <class Draw>
+  WFPG_HD emitted_ray emit(const scene_view& scene, const Draw& draw) const {
+    if (table.empty()) return {};
+    const std::uint32_t light = pick(table, draw(dimension::light_choice));
+    const std::uint32_t number = lights[light], beyond = number & ~grouped_lights::beyond_triangles;
+    const vec2 u = draw(dimension::light_point), v = draw(dimension::direction);
+    if ((number & grouped_lights::beyond_triangles) == 0)
+      return emit_from_emitter(sample_emitter(scene, light, u), v);
+    if (beyond < punctual.size()) return emit_from_punctual(punctual[beyond], u, v);
+    const vec3 toward = scene.environment.sample(draw(dimension::light_texel), v);
+    return emit_from_afar(scene.environment.radiance(toward), -toward, u,
+                          distant_end(environment_pdf(scene.environment, toward), false));
+  }
+
  private:
+  WFPG_HD static wfpg::light_end emitter_end(float pdf, float cosine) {
+    return {pdf, pdf, cosine / pi, cosine, false, false};
+  }
+  /// The end at a light infinitely far, by solid angle or with a probability. It shines from a disc.
+  WFPG_HD wfpg::light_end distant_end(float pdf, bool is_delta) const {
+    return {pdf, pdf, 1.0f / (pi * scene_radius * scene_radius), 1.0f, is_delta, true};
+  }
+  WFPG_HD wfpg::light_end punctual_end(const punctual_light& source) const {
+    const float probability = power_of(source, scene_radius) / total_power;
+    if (source.kind == punctual_kind::directional) return distant_end(probability, true);
+    return {probability, probability, 1.0f / lit_angle(source), 1.0f, true, false};
+  }
+  /// The solid angle into which a point or a spot emits.
+  WFPG_HD static float lit_angle(const punctual_light& source) {
+    return source.kind == punctual_kind::point ? 4.0f * pi : 2.0f * pi * (1.0f - source.cos_outer);
+  }
+
+  WFPG_HD static emitted_ray emit_from_emitter(const emitter_point& point, vec2 u) {
+    emitted_ray emitted;
+    const vec3 above = cosine_hemisphere(u);
+    if (!(point.pdf > 0.0f) || !(above.z > 0.0f)) return emitted;
+    emitted.ray.direction = glm::normalize(frame(point.normal).to_world(above));
+    emitted.ray.origin = leave_surface(point.position, point.normal, emitted.ray.direction, point.offset);
+    emitted.throughput = point.radiance * (pi / point.pdf);
+    emitted.source = emitter_end(point.pdf, above.z);
+    return emitted;
+  }
+
+  WFPG_HD emitted_ray emit_from_punctual(const punctual_light& source, vec2 u, vec2 v) const {
+    const wfpg::light_end end = punctual_end(source);
+    if (source.kind == punctual_kind::directional)
+      return emit_from_afar(source.intensity, source.direction, u, end);
+    const float least = source.kind == punctual_kind::point ? -1.0f : source.cos_outer;
+    const float cosine = 1.0f - v.x * (1.0f - least);
+    const float sine = std::sqrt(glm::max(0.0f, 1.0f - cosine * cosine)), angle = 2.0f * pi * v.y;
+    emitted_ray emitted;
+    emitted.ray.origin = source.position;
+    emitted.ray.direction = glm::normalize(
+        frame(source.direction).to_world({sine * std::cos(angle), sine * std::sin(angle), cosine}));
+    emitted.throughput =
+        source.intensity * (dimming(source, -emitted.ray.direction) / (end.pdf_trace * end.pdf_direction));
+    emitted.source = end;
+    return emitted;
+  }
+
+  /// Light of a radiance or irradiance, from a disc that covers the scene.
+  WFPG_HD emitted_ray emit_from_afar(vec3 light, vec3 direction, vec2 u, const wfpg::light_end& end) const {
+    emitted_ray emitted;
+    if (!(end.pdf_trace > 0.0f)) return emitted;
+    const vec2 disk = scene_radius * uniform_disk(u);
+    emitted.ray.direction = direction;
+    emitted.ray.origin = scene_centre + frame(direction).to_world({disk.x, disk.y, -scene_radius});
+    emitted.throughput = light / (end.pdf_trace * end.pdf_direction);
+    emitted.source = end;
+    return emitted;
+  }
+
   /// Samples light as if all lights were one group.
   template <class Draw>
   WFPG_HD light_sample sample_light(const scene_view& scene, vec3 from, std::uint32_t light,
@@ -112,6 +204,7 @@ struct light_view {
     sky.pdf = environment_pdf(scene.environment, direction);
     sky.radiance = scene.environment.radiance(direction);
     sky.is_distant = true;
+    sky.source = distant_end(sky.pdf, false);
     return sky;
   }
 
@@ -121,7 +214,9 @@ struct light_view {
     light_sample light;
     if (!(distance > 0.0f)) return light;
     light.direction = toward / distance;
-    light.pdf = solid_angle_pdf(point.pdf, distance, -glm::dot(point.normal, light.direction));
+    const float cosine = -glm::dot(point.normal, light.direction);
+    light.pdf = solid_angle_pdf(point.pdf, distance, cosine);
+    light.source = emitter_end(point.pdf, cosine);
     light.radiance = point.radiance;
     light.end = leave_surface(point.position, point.normal, -light.direction, point.offset);
     return light;
@@ -130,7 +225,8 @@ struct light_view {
   WFPG_HD light_sample from_punctual(const punctual_light& source, vec3 from) const {
     light_sample light;
     light.is_delta = true;
-    light.pdf = power_of(source, scene_radius) / total_power;
+    light.source = punctual_end(source);
+    light.pdf = light.source.pdf_connect;
     light.is_distant = source.kind == punctual_kind::directional;
     if (light.is_distant) {
       light.direction = -source.direction;
@@ -173,6 +269,7 @@ class light_distribution {
     v.triangle_groups = triangle_groups_.view();
     v.total_power = total_power_;
     v.scene_radius = radius_;
+    v.scene_centre = centre_;
     return v;
   }
 
@@ -186,7 +283,8 @@ class light_distribution {
         groups_(exec, grouped.groups),
         triangle_groups_(exec, grouped.triangle_groups),
         total_power_(checked(grouped.total_power)),
-        radius_(grouped.scene_radius) {
+        radius_(grouped.scene_radius),
+        centre_(grouped.scene_centre) {
     std::vector<alias_column> table;
     for (const light_group& group : grouped.groups) {
       const auto begin = grouped.powers.begin() + group.first;
@@ -212,6 +310,7 @@ class light_distribution {
   std::vector<float> shares_;
   float total_power_;
   float radius_;
+  vec3 centre_;
 };
 
 }  // namespace render

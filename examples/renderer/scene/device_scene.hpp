@@ -49,11 +49,26 @@ struct hit_surface {
   float emitted_luminance = 0.0f;  ///< its mean over the texture; lights are chosen by it
   vec3 absorption{0.0f};           ///< along the ray that ends here, 1 / scene unit
   float offset = 0.0f;             ///< as in surface_point
+  vec3 shading_normal{0.0f};       ///< as in surface_point, whoever looks
 };
 
 /// A point from which a ray toward `direction` does not hit the surface that it leaves.
 WFPG_HD inline vec3 leave_surface(vec3 position, vec3 geometric_normal, vec3 direction, float offset) {
   return position + (glm::dot(geometric_normal, direction) < 0.0f ? -offset : offset) * geometric_normal;
+}
+
+/// Gives a BSDF its normals, as seen along `outgoing`. The parameters are those of a surface_point.
+WFPG_HD inline void orient(bsdf& f, vec3 geometric_normal, vec3 normal, vec3 outgoing) {
+  constexpr float least_cosine = 1e-2f;
+  const float side = glm::dot(geometric_normal, outgoing) >= 0.0f ? 1.0f : -1.0f;
+  // An interpolated normal that faces away from the viewer is bent until it just does not.
+  vec3 facing = side * normal;
+  const float seen = glm::dot(facing, outgoing);
+  if (seen < least_cosine) facing = glm::normalize(facing + (least_cosine - seen) * outgoing);
+  // A dielectric has an inside and an outside. The other kinds reflect on both sides.
+  const float outward = f.transmits() ? side : 1.0f;
+  f.normal = outward * facing;
+  f.geometric_normal = outward * side * geometric_normal;
 }
 
 /// Whether rays may enter what a material bounds: all that transmits and is no thin sheet.
@@ -141,14 +156,10 @@ struct scene_view {
     const surface_point at = point(hit);
     const material& scatters = materials[at.material];
     const bool front = glm::dot(at.geometric_normal, outgoing) >= 0.0f;
-    const float side = front ? 1.0f : -1.0f;
-    // An interpolated normal that faces away from the viewer is bent until it just does not.
-    vec3 facing = side * at.normal;
-    const float seen = glm::dot(facing, outgoing);
-    if (seen < least_cosine) facing = glm::normalize(facing + (least_cosine - seen) * outgoing);
 
     hit_surface result;
     result.offset = at.offset;
+    result.shading_normal = at.normal;
     if (!front) {
       result.absorption = scatters.absorption;
     } else if (scatters.emission != vec3(0.0f)) {
@@ -158,10 +169,7 @@ struct scene_view {
     bsdf& f = result.surface.bsdf;
     f.kind = scatters.kind;
     set_lobes(scatters, at.uv, f);
-    // A dielectric has an inside and an outside. The other kinds reflect on both sides.
-    const float outward = f.transmits() ? side : 1.0f;
-    f.normal = outward * facing;
-    f.geometric_normal = outward * side * at.geometric_normal;
+    orient(f, at.geometric_normal, at.normal, outgoing);
     f.colour = scatters.base_color;
     if (scatters.base_texture.index >= 0) f.colour *= vec3(texel(scatters.base_texture, at.uv));
     f.ior = scatters.ior;
@@ -185,7 +193,6 @@ struct scene_view {
     f.transmitted_colour = unorm8x3(scatters.transmitted_color);
   }
 
-  static constexpr float least_cosine = 1e-2f;
   static constexpr float least_alpha = 1e-3f;
 };
 

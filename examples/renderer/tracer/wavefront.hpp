@@ -4,6 +4,7 @@
 #include "tracer/path_film.hpp"
 #include "tracer/path_kernels.hpp"
 #include "tracer/stage_clock.hpp"
+#include "tracer/technique_set.hpp"
 
 #include <wfpg/bins/partitioner.hpp>
 #include <wfpg/exec/buffer.hpp>
@@ -20,6 +21,8 @@ struct tracer_settings {
   std::uint32_t max_depth = 8;  ///< segments of a path from the camera, at least 1
   std::uint64_t seed = 0;
   std::uint32_t roulette_depth = 3;  ///< Russian roulette begins at this vertex; the camera's first hit is 0
+  technique_set techniques;          ///< of paths from both ends
+  std::size_t light_memory = std::size_t(1) << 30;  ///< bytes of light paths' vertices
 };
 
 /// Renders samples of a scene with directions from a guider.

@@ -1,0 +1,96 @@
+// The kernels of light paths: functors of an index on the data of bidirectional_state.hpp.
+#pragma once
+
+#include "tracer/bidirectional_state.hpp"
+
+namespace render {
+
+/// Random numbers of light paths begin at this use, far from those of camera paths.
+inline constexpr std::uint32_t light_path_dimensions = 0x40000000u;
+
+/// Starts a path at a light.
+template <class World>
+struct start_light_paths {
+  World world;
+  tiled_view<subpath> paths;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const auto id = static_cast<std::uint32_t>(i);
+    const emitted_ray emitted = world.lights.emit(
+        world.scene, [&](std::uint32_t use) { return world.random(id, light_path_dimensions + use); });
+    if (!(wfpg::luminance(emitted.throughput) > 0.0f)) return paths.emplace(i);
+    paths.emplace(i, emitted.ray.origin, emitted.ray.direction, emitted.throughput,
+                  wfpg::subpath_weights::from_light(world.techniques, emitted.source));
+  }
+};
+
+/// Finds the next vertex of each light path.
+template <class World>
+struct trace_light_paths {
+  World world;
+  std::uint32_t segments;  ///< of the paths, with this one
+  tiled_view<subpath> paths;
+  tiled_view<subpath_vertex> vertices;
+  wfpg::array_view<std::uint32_t> keeps;  ///< 1: the vertex can be connected
+  wfpg::array_view<std::uint32_t> segment_counts;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    keeps[i] = 0;
+    const subpath path = paths[i];
+    if (path.active == 0) return;
+    ++segment_counts[i];
+    subpath_vertex vertex;
+    hit_surface found;
+    if (!world.arrive(path, segments, vertex, found)) return paths.emplace(i);
+    vertices.emplace(i, vertex);
+    keeps[i] = found.surface.bsdf.is_delta() ? 0u : 1u;
+  }
+};
+
+/// Stores the new vertices that have a place, connects all new ones to the camera, and continues the paths.
+template <class World>
+struct extend_light_paths {
+  World world;
+  pinhole camera;
+  bool is_last;  ///< paths end here
+  tiled_view<subpath> paths;
+  tiled_view<subpath_vertex> vertices;
+  wfpg::array_view<const std::uint32_t> keeps;
+  wfpg::light_vertices_view<subpath_vertex> stored;
+  wfpg::splat_view splats;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    if (paths[i].active == 0) return;
+    const subpath_vertex vertex = vertices[i];
+    if (keeps[i] != 0) {
+      if (stored.has_place(i)) stored.write(i, vertex);
+      if (world.techniques.splats > 0.0f) splat(i, vertex);
+    }
+    const auto id = static_cast<std::uint32_t>(i);
+    const vec2 u = world.draw(id, vertex.segments, light_path_dimensions + dimension::direction);
+    subpath next;
+    if (!is_last && world.scatter(vertex, u, true, next))
+      paths.emplace(i, next);
+    else
+      paths.emplace(i);
+  }
+
+ private:
+  WFPG_HD void splat(std::size_t i, const subpath_vertex& vertex) const {
+    const vec3 way = camera.position() - vertex.at.position;
+    const float distance = glm::length(way);
+    if (!(distance > 0.0f)) return;
+    const vec3 toward = way / distance;
+    std::uint32_t pixel;
+    if (!camera.find_pixel(-toward, pixel)) return;
+    const float pdf = camera.pdf(-toward);
+    const vec3 value = vertex.throughput * vertex.scattered_flux(toward) * (pdf / (distance * distance));
+    if (!(wfpg::luminance(value) > 0.0f) || !world.sees(vertex, camera.position())) return;
+    const bsdf f = vertex.seen_from(vertex.at.outgoing);
+    wfpg::path_edge edge;
+    edge.distance = distance;
+    splats.add(i, pixel, value * vertex.weights.splat(world.techniques, vertex.leave(f, toward), pdf, edge));
+  }
+};
+
+}  // namespace render
