@@ -14,7 +14,6 @@
 
 using namespace wfpg_test;
 using render::bvh_caster;
-using render::bvh_options;
 using render::bvh_scene;
 using render::triangle_hit;
 using wfpg::ray;
@@ -52,10 +51,10 @@ constexpr float environment = 0.25f;
 
 template <class Exec>
 std::vector<answers> cast(const test_mesh& mesh, const std::vector<ray>& rays,
-                          const bvh_options& options = {}) {
+                          std::uint32_t leaf_triangles = 1) {
   const Exec exec;
   const device_mesh<Exec> triangles(exec, mesh);
-  const bvh_scene<Exec> scene(exec, triangles.view(), environment, options);
+  const bvh_scene<Exec> scene(exec, triangles.view(), environment, leaf_triangles);
   const wfpg::buffer<ray, Exec> asked(exec, rays);
   const wfpg::buffer<answers, Exec> found(exec, rays.size());
   exec.for_each(rays.size(), ask{scene.caster(), asked.view(), found.view()});
@@ -186,7 +185,7 @@ WFPG_TEST_CASE("leaves of any size give the same hits", "[renderer][bvh]") {
   const test_mesh mesh = mixed_triangles(500, 0.01f, 0.3f, 8);
   const std::vector<ray> rays = random_rays(1000, 6);
   for (const std::uint32_t size : {1u, 2u, 5u, 7u})
-    check_against_all(mesh, rays, cast<Exec>(mesh, rays, {size}));
+    check_against_all(mesh, rays, cast<Exec>(mesh, rays, size));
 }
 
 WFPG_TEST_CASE("no ray leaks out of a closed box through edges and corners", "[renderer][bvh]") {
@@ -290,11 +289,11 @@ WFPG_TEST_CASE("BVHs and hits are equal on all policies", "[renderer][bvh]") {
   CHECK(std::memcmp(found.data(), first.data(), found.size() * sizeof(answers)) == 0);
 }
 
-TEST_CASE("options and meshes out of range are refused", "[renderer][bvh]") {
+TEST_CASE("numbers of a leaf's triangles out of range are refused", "[renderer][bvh]") {
   const wfpg::exec::tbb exec;
   const device_mesh<wfpg::exec::tbb> box(exec, box_mesh());
-  CHECK_THROWS_AS(bvh_scene<wfpg::exec::tbb>(exec, box.view(), 0.0f, {0}), std::invalid_argument);
-  CHECK_THROWS_AS(bvh_scene<wfpg::exec::tbb>(exec, box.view(), 0.0f, {8}), std::invalid_argument);
+  CHECK_THROWS_AS(bvh_scene<wfpg::exec::tbb>(exec, box.view(), 0.0f, 0), std::invalid_argument);
+  CHECK_THROWS_AS(bvh_scene<wfpg::exec::tbb>(exec, box.view(), 0.0f, 8), std::invalid_argument);
 }
 
 }  // namespace

@@ -76,6 +76,13 @@ __global__ void use_path_weights(wfpg::path_techniques techniques, wfpg::path_de
            camera.next_event(techniques, to, {}, {1.0f}) + camera.light_hit(techniques, {});
 }
 
+__global__ void use_box_tree(wfpg::box_tree_view tree, wfpg::ray along, float* out) {
+  const auto add = [&](std::uint32_t index) { out[index] += 1.0f; };
+  tree.overlaps(along, add);
+  tree.overlaps(along.origin, add);
+  tree.nearest_first(along, [&](std::uint32_t place, float& t_max) { return (out[place] = t_max) > 1.0f; });
+}
+
 __global__ void use_medium(wfpg::homogeneous_medium medium, wfpg::henyey_greenstein phase, float* out) {
   const auto drawn = medium.sample(0.25f, 0.5f, 1.0f);
   const auto turned = phase.sample(wfpg::vec3(0, 0, 1), wfpg::vec2(0.5f));

@@ -1,0 +1,183 @@
+// A tree over boxes, built anew for each iteration: which boxes hold a point, overlap a box, or are crossed
+// by a ray. Photons and beams are found with it, and the renderer's triangles.
+//
+//   box_tree<Exec> tree;
+//   tree.build(exec, n, boxes);                   // boxes(i) is the box with index i, in a kernel
+//   const box_tree_view view = tree.view();       // for kernels
+//   view.overlaps(point, [&](std::uint32_t i) { ... });
+//
+// Boxes are sorted by the Morton codes of their centres and split where codes do. Each node then has its
+// range split, and the part with the largest surface, until it has four parts.
+//
+// Sources: Karras 2012, "Maximizing Parallelism in the Construction of BVHs, Octrees, and k-d Trees". Nodes
+// are those of Ylitie et al. 2017, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs".
+// Cost: a build is one sort, and O(log n) looks at boxes a node. A query is O(log n + found) where boxes
+// overlap little.
+// Memory: 4 bytes a box and 64 a node, 34 a box in all. Boxes themselves are not kept.
+#pragma once
+
+#include <wfpg/base/error.hpp>
+#include <wfpg/base/types.hpp>
+#include <wfpg/exec/buffer.hpp>
+#include <wfpg/light/detail/box_tree_nodes.hpp>
+
+#include <cstddef>
+#include <cstdint>
+
+namespace wfpg {
+
+namespace detail {
+struct box_splitter;
+}  // namespace detail
+
+/// A tree as kernels see it. Trivially copyable, 24 bytes. Valid until its owner is built again or destroyed.
+///
+/// Queries find every box that they should, once each. They also find a few others: those in one leaf with
+/// it, and those that are near. Boxes are quantised outwards, by at most 1% of their node's size. What must
+/// be exact is to be tested in f, as it mostly is anyway: the distance of a photon, the crossing of a
+/// triangle.
+///
+/// A box has an index, which the host gave it, and a place, its position in the tree's order. Boxes that are
+/// found together have places next to each other. What f reads is best stored by place.
+///
+/// No query recurses. A stack has 64 entries of 4 bytes, or of 8 for rays, and no tree needs more.
+class box_tree_view {
+ public:
+  /// A tree without boxes.
+  box_tree_view() = default;
+  /// For box_tree. Not for hosts.
+  box_tree_view(const detail::box_node* nodes, const std::uint32_t* order, std::uint32_t size)
+      : nodes_(nodes), order_(order), size_(size) {}
+
+  /// Returns the number of boxes, without skipped ones. Places are below it.
+  WFPG_HD std::uint32_t size() const { return size_; }
+  /// Returns the index of the box at a place. Precondition: place < size().
+  WFPG_HD std::uint32_t index(std::uint32_t place) const { return order_[place]; }
+
+  /// Calls f(index) for each box that holds `point`, surfaces included. None holds a point that is not
+  /// finite.
+  template <class F>
+  WFPG_HD void overlaps(vec3 point, const F& f) const {
+    overlaps(bounds3{point, point}, f);
+  }
+  /// Calls f(index) for each box that has a point in common with `box`. An empty box, or one that is not
+  /// finite, has none.
+  template <class F>
+  WFPG_HD void overlaps(const bounds3& box, const F& f) const {
+    for_each_place(box, [&](std::uint32_t place) { f(order_[place]); });
+  }
+  /// Calls f(index) for each box that a ray crosses between t_min and t_max. Rays may begin inside a box.
+  /// Nearer boxes tend to come first. Nothing is found where origin or direction is not finite.
+  template <class F>
+  WFPG_HD void overlaps(const ray& along, const F& f) const {
+    nearest_first(along, [&](std::uint32_t place, float&) {
+      f(order_[place]);
+      return false;
+    });
+  }
+
+  /// Calls f(place) for each box that has a point in common with `box`, as overlaps() does for indices.
+  template <class F>
+  WFPG_HD void for_each_place(const bounds3& box, const F& f) const {
+    if (!is_finite(box.lower) || !is_finite(box.upper) || box.empty()) return;
+    detail::box_query query{box};
+    traverse(query, [&](std::uint32_t place) {
+      f(place);
+      return false;
+    });
+  }
+  /// Calls f(place, t_max) for boxes that a ray crosses between t_min and t_max, nearer nodes first. f may
+  /// lower t_max, a float&, to the distance of what it has found: boxes beyond are then left out. The search
+  /// ends where f returns true.
+  template <class F>
+  WFPG_HD void nearest_first(const ray& along, const F& f) const {
+    // An invalid ray would cross every box.
+    if (!is_finite(along.origin) || !is_finite(along.direction)) return;
+    detail::box_ray query(along, one_);
+    traverse(query, [&](std::uint32_t place) { return f(place, query.t_max); });
+  }
+
+ private:
+  /// If fewer lanes are still descending, the lanes at leaves do not wait for them.
+  static constexpr int least_company = 24;
+
+  /// Calls f(place) for each box in a leaf that the query reaches, until f returns true.
+  template <class Query, class F>
+  WFPG_HD void traverse(Query& query, const F& f) const {
+    if (size_ == 0) return;
+    typename Query::waiting stack[detail::box_stack::size];
+    std::uint32_t depth = 0;
+    detail::box_child at = detail::box_child::node(0);
+    for (;;) {
+      if (!at.is_leaf()) {
+        do at = query.descend(detail::box_node(nodes_[at.index()]), stack, depth);
+        while (!at.is_leaf() && detail::lanes_here() >= least_company);
+        if (!at.is_leaf()) continue;
+      }
+      const std::uint32_t end = at.first() + at.count();
+      for (std::uint32_t place = at.first(); place < end; ++place)
+        if (f(place)) return;
+      do {
+        if (depth == 0) return;
+        --depth;
+      } while (!query.wants(stack[depth]));
+      at = query.child_of(stack[depth]);
+    }
+  }
+
+  const detail::box_node* nodes_ = nullptr;
+  const std::uint32_t* order_ = nullptr;
+  std::uint32_t size_ = 0;
+  std::uint32_t one_ = detail::byte_float_base;  // hides the value from compilers
+};
+
+/// Owns a tree over boxes, in a policy's memory. Movable. Equal boxes give the same tree on every policy.
+template <class Exec>
+class box_tree {
+ public:
+  /// A tree without boxes or memory.
+  box_tree() = default;
+
+  /// Builds the tree over boxes 0 to n - 1. `boxes`: a functor that kernels call, boxes(i) is a bounds3. It
+  /// is called once a box. Boxes without a point, or with coordinates that are not finite or beyond
+  /// largest_coordinate, are skipped.
+  ///
+  /// `leaf_boxes`: most boxes of a leaf, in [1, 7], which queries find together. More take less memory: 34
+  /// bytes a box with 1, 15 with 4, 11 with 7.
+  ///
+  /// Memory of the tree before is used again if it suffices. While it builds, a tree takes 133 bytes a box of
+  /// the policy's memory, which a retaining_resource keeps for the next build. Waits for the policy's work.
+  ///
+  /// Throws out_of_memory, after which the tree has no boxes. Throws std::invalid_argument for 2^28 boxes or
+  /// more, and for leaf_boxes out of range.
+  template <class Boxes>
+  void build(const Exec& exec, std::size_t n, const Boxes& boxes, std::uint32_t leaf_boxes = 1);
+  /// Builds it over boxes in the policy's memory, which are not kept.
+  void build(const Exec& exec, array_view<const bounds3> boxes, std::uint32_t leaf_boxes = 1);
+
+  /// Returns the tree for kernels. O(1).
+  box_tree_view view() const { return {nodes_.data(), order_.data(), size_}; }
+  /// Returns how many boxes the last build left out.
+  std::uint32_t skipped() const { return skipped_; }
+  /// Returns the number of nodes, 64 bytes each.
+  std::size_t node_count() const { return node_count_; }
+  /// Returns the bytes held: those of the largest tree so far.
+  std::size_t bytes() const { return nodes_.bytes() + order_.bytes(); }
+
+ private:
+  /// Sorts valid boxes into `ordered`, and returns their number.
+  template <class Boxes>
+  std::uint32_t sort(const Exec& exec, std::size_t n, const Boxes& boxes, std::uint64_t* keys,
+                     bounds3* ordered) const;
+  /// Returns false if there are more levels than the stack allows.
+  bool build_nodes(const Exec& exec, const detail::box_splitter& splitter, std::uint32_t leaf_boxes);
+
+  buffer<detail::box_node, Exec> nodes_;
+  buffer<std::uint32_t, Exec> order_;  // of places
+  std::size_t node_count_ = 0;
+  std::uint32_t size_ = 0, skipped_ = 0;
+};
+
+}  // namespace wfpg
+
+#include <wfpg/light/detail/box_tree_impl.hpp>
