@@ -33,6 +33,8 @@ struct gpu_sizes {
   // are in order.
   static constexpr std::uint32_t cast_points = 2048, cast_size = 128;
   static constexpr argument casting[][2] = {{100, 1}, {100, 0}, {1000, 1}, {1000, 0}, {0, 1}};
+
+  static constexpr argument photons[][2] = {{2000, 0}, {2000, 1}};  // thousands, whether most lie in a corner
 };
 
 /// CPUs. All iterations of a stage take about two seconds on one core.
@@ -53,6 +55,8 @@ struct cpu_sizes {
 
   static constexpr std::uint32_t cast_points = 4, cast_size = 128;
   static constexpr argument casting[][2] = {{20, 1}, {20, 0}, {0, 1}};
+
+  static constexpr argument photons[][2] = {{100, 0}, {100, 1}};
 };
 
 #if defined(__CUDACC__)

@@ -20,6 +20,8 @@ FLOORS = {
     "serving_kept": "reading surfaces, writing directions",
     "depositing": "reading the vertices",
     "casting": "OptiX, the same rays",
+    "building_boxes": "CUB's sort of as many 63-bit keys",
+    "finding_photons": "reading points and photons that are found",
 }
 MEASURES = ("mse_reinhard", "relmse_robust")
 STAGES = ("trace", "sort", "lights", "directions", "shade", "update")

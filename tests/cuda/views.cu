@@ -83,6 +83,10 @@ __global__ void use_box_tree(wfpg::box_tree_view tree, wfpg::ray along, float* o
   tree.nearest_first(along, [&](std::uint32_t place, float& t_max) { return (out[place] = t_max) > 1.0f; });
 }
 
+__global__ void use_photon_map(wfpg::photon_map_view map, wfpg::vec3 at, float* out) {
+  map.for_each_point(at, [&](std::uint32_t index) { out[index] += map.radius(); });
+}
+
 __global__ void use_medium(wfpg::homogeneous_medium medium, wfpg::henyey_greenstein phase, float* out) {
   const auto drawn = medium.sample(0.25f, 0.5f, 1.0f);
   const auto turned = phase.sample(wfpg::vec3(0, 0, 1), wfpg::vec2(0.5f));

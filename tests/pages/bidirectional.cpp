@@ -1,7 +1,10 @@
 // The host that docs/bidirectional.md talks about, as far as its code needs it.
 #include <wfpg/exec/seq.hpp>
+#include <wfpg/exec/tbb.hpp>
+#include <wfpg/light/box_tree.hpp>
 #include <wfpg/light/light_vertices.hpp>
 #include <wfpg/light/path_weights.hpp>
+#include <wfpg/light/photon_map.hpp>
 #include <wfpg/light/splats.hpp>
 
 #include <vector>
@@ -24,6 +27,9 @@ segment trace(const scene& in, const vertex& to);
 wfpg::path_departure scatter(const vertex& from);
 wfpg::path_departure leave(const vertex& from, const vertex& to);
 wfpg::path_edge join(const vertex& light, const vertex& camera);
+wfpg::vec3 position(const vertex& at);
+float contribution(const vertex& camera, std::uint32_t photon);
+bool crosses(std::uint32_t beam, const wfpg::ray& ray);
 
 struct trace_all {
   wfpg::array_view<std::uint32_t> keeps;
@@ -42,9 +48,13 @@ struct store_and_splat {
 
 void follow(const my::scene& scene, const wfpg::path_techniques& techniques, my::light_path& path);
 float weight(const wfpg::path_techniques& techniques, const my::vertex& light, const my::vertex& camera);
+float merge(const wfpg::photon_map_view& map, const my::vertex& camera);
+int beams_along(const wfpg::exec::tbb& exec, const std::vector<wfpg::bounds3>& boxes, const wfpg::ray& ray);
 
 #include "bidirectional-1.inc"
 #include "bidirectional-2.inc"
+#include "bidirectional-3.inc"
+#include "bidirectional-4.inc"
 
 template void follow_all(const wfpg::exec::seq&, wfpg::light_vertices<wfpg::exec::seq, my::vertex>&,
                          wfpg::splats<wfpg::exec::seq>&, wfpg::array_view<std::uint32_t>,

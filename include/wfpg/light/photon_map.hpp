@@ -1,0 +1,131 @@
+// Photons on surfaces, found by distance: all within one radius of a point, as vertex merging needs them. The
+// radius is that of an iteration, and the map is built anew for each.
+//
+//   photon_map<Exec> map;
+//   map.build(exec, positions, radius);           // positions[i] is that of the photon with index i
+//   const photon_map_view view = map.view();      // for kernels
+//   view.for_each_point(p, [&](std::uint32_t i) { ... });
+//
+// The map is a box_tree over the photons' spheres, with up to seven of them a leaf. Positions are stored in
+// the tree's order, so that a leaf's photons are next to each other. What a photon carries stays the host's,
+// by index.
+//
+// Sources: Moonen & Jalba 2023, "Efficient Hardware Acceleration of Robust Volumetric Light Transport
+// Simulation", section 5, which queries boxes of spheres too. The tree is that of Karras 2012, "Maximizing
+// Parallelism in the Construction of BVHs, Octrees, and k-d Trees".
+// Cost: a build is that of the tree. A query tests about twice as many photons as it finds. Clusters cost no
+// more than photons that are spread evenly.
+// Memory: 12 bytes a photon for positions, and about 11 of the tree.
+#pragma once
+
+#include <wfpg/base/error.hpp>
+#include <wfpg/base/types.hpp>
+#include <wfpg/exec/buffer.hpp>
+#include <wfpg/host/geometry.hpp>
+#include <wfpg/light/box_tree.hpp>
+
+#include <cstddef>
+#include <cstdint>
+
+namespace wfpg {
+
+namespace detail {
+
+/// The box around each photon's sphere.
+struct photon_boxes {
+  array_view<const vec3> positions;
+  float radius;
+  WFPG_HD bounds3 operator()(std::size_t i) const { return {positions[i] - radius, positions[i] + radius}; }
+};
+
+/// Copies positions into the tree's order.
+struct order_photons {
+  box_tree_view tree;
+  array_view<const vec3> positions;
+  vec3* ordered;
+  WFPG_HD void operator()(std::size_t place) const {
+    ordered[place] = positions[tree.index(static_cast<std::uint32_t>(place))];
+  }
+};
+
+}  // namespace detail
+
+/// A photon map as kernels see it. Trivially copyable, 48 bytes. Valid until its owner is built again or
+/// destroyed.
+class photon_map_view {
+ public:
+  /// A map without photons.
+  photon_map_view() = default;
+  /// For photon_map. Not for hosts.
+  photon_map_view(const box_tree_view& tree, const vec3* positions, float radius)
+      : tree_(tree), positions_(positions), radius_(radius) {}
+
+  /// Returns the number of photons, without skipped ones.
+  WFPG_HD std::uint32_t size() const { return tree_.size(); }
+  /// Returns the radius of the last build, scene units. 0 where there was none.
+  WFPG_HD float radius() const { return radius_; }
+
+  /// Calls f(index) for each photon whose distance from `p` is at most the radius, once each. The order
+  /// depends on the photons alone. Distances are rounded as floats. A point that is not finite has no photon.
+  template <class F>
+  WFPG_HD void for_each_point(vec3 p, const F& f) const {
+    tree_.for_each_place(bounds3{p, p}, [&](std::uint32_t place) {
+      const vec3 away = positions_[place] - p;
+      if (glm::dot(away, away) <= radius_ * radius_) f(tree_.index(place));
+    });
+  }
+
+ private:
+  box_tree_view tree_;
+  const vec3* positions_ = nullptr;  // by place
+  float radius_ = 0.0f;
+};
+
+/// Owns a photon map, in a policy's memory. Movable. The same photons give the same map on every policy.
+template <class Exec>
+class photon_map {
+ public:
+  /// Smallest radius, scene units. The largest is largest_coordinate. Squares of both are normal floats.
+  static constexpr float least_radius = 1.0e-15f;
+
+  /// A map without photons or memory.
+  photon_map() = default;
+
+  /// Builds the map of the photons at `positions`, in the policy's memory, which are not read later. Photons
+  /// are skipped whose positions are not finite, or whose spheres reach beyond largest_coordinate.
+  ///
+  /// Memory of the map before is used again if it suffices. Other memory is as box_tree::build() says.
+  ///
+  /// Throws out_of_memory, after which the map has no photons. Throws std::invalid_argument for a radius that
+  /// is not in [least_radius, largest_coordinate], and for 2^28 photons or more.
+  void build(const Exec& exec, array_view<const vec3> positions, float radius) {
+    require(is_finite(radius) && radius >= least_radius && radius <= largest_coordinate, "radius", radius,
+            "in [1e-15, 1e15]");
+    radius_ = 0.0f;
+    // The tree's margins, 1/1000 of the radius here, are larger than what rounding adds to a distance.
+    tree_.build(exec, positions.size(), detail::photon_boxes{positions, radius}, leaf_photons);
+    const box_tree_view tree = tree_.view();
+    if (positions_.size() < tree.size()) positions_ = buffer<vec3, Exec>(exec, tree.size());
+    exec.for_each(tree.size(), detail::order_photons{tree, positions, positions_.data()});
+    radius_ = radius;
+  }
+
+  /// Returns the map for kernels. O(1).
+  photon_map_view view() const {
+    return radius_ > 0.0f ? photon_map_view(tree_.view(), positions_.data(), radius_) : photon_map_view();
+  }
+  /// Returns how many photons the last build left out.
+  std::uint32_t skipped() const { return tree_.skipped(); }
+  /// Returns the bytes held: those of the largest map so far.
+  std::size_t bytes() const { return tree_.bytes() + positions_.bytes(); }
+
+ private:
+  // Fewer take more memory, and are not faster: nodes cost as much as the photons that they spare.
+  static constexpr std::uint32_t leaf_photons = 7;
+
+  box_tree<Exec> tree_;
+  buffer<vec3, Exec> positions_;  // by place
+  float radius_ = 0.0f;           // 0: not built
+};
+
+}  // namespace wfpg
