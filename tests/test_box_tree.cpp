@@ -487,6 +487,8 @@ WFPG_TEST_CASE("trees and the order of what is found are equal on all policies",
   CHECK((lists<Exec>(boxes, rays) == lists<reference<Exec>>(boxes, rays)));
 }
 
+static_assert(std::is_trivially_copyable_v<box_tree_view> && sizeof(box_tree_view) == 24);
+
 WFPG_TEST_CASE("a tree keeps within 40 bytes a box, and its memory is used again", "[box_tree]") {
   peak_resource resource;
   const Exec exec = Exec().with_resource(&resource);
@@ -508,6 +510,19 @@ WFPG_TEST_CASE("a tree keeps within 40 bytes a box, and its memory is used again
   std::swap(tree, other);
   CHECK(other.bytes() == bytes);
   CHECK(other.view().size() == n / 2);
+}
+
+WFPG_TEST_CASE("a second build over kept memory asks for none", "[box_tree]") {
+  failing_resource resource;
+  wfpg::retaining_resource kept(&resource);
+  const Exec exec = Exec().with_resource(&kept);
+  const wfpg::buffer<bounds3, Exec> given(exec, random_boxes(1000, 0.1f, 51));
+  box_tree<Exec> tree;
+  tree.build(exec, given.view());
+  resource.fail_at(1);
+  tree.build(exec, given.view());
+  CHECK(resource.asked() == 0);
+  CHECK(tree.view().size() == 1000);
 }
 
 WFPG_TEST_CASE("a tree whose memory runs out is empty, and can be built again", "[box_tree]") {

@@ -228,6 +228,8 @@ WFPG_TEST_CASE("photons are found in one order on all policies", "[photon_map]")
   CHECK((sums<Exec>(photons, asked) == sums<reference<Exec>>(photons, asked)));
 }
 
+static_assert(std::is_trivially_copyable_v<photon_map_view> && sizeof(photon_map_view) == 40);
+
 WFPG_TEST_CASE("a photon map takes at most 40 bytes a photon, and uses its memory again", "[photon_map]") {
   const Exec exec;
   photon_map<Exec> map;

@@ -50,13 +50,13 @@ struct order_photons {
 
 }  // namespace detail
 
-/// A photon map as kernels see it. Trivially copyable, 48 bytes. Valid until its owner is built again or
+/// A photon map as kernels see it. Trivially copyable, 40 bytes. Valid until its owner is built again or
 /// destroyed.
 class photon_map_view {
  public:
   /// A map without photons.
   photon_map_view() = default;
-  /// For photon_map. Not for hosts.
+  /// For photon_map. Not for hosts. `positions`: in the tree's order, as many as it has places.
   photon_map_view(const box_tree_view& tree, const vec3* positions, float radius)
       : tree_(tree), positions_(positions), radius_(radius) {}
 
@@ -114,7 +114,7 @@ class photon_map {
   photon_map_view view() const {
     return radius_ > 0.0f ? photon_map_view(tree_.view(), positions_.data(), radius_) : photon_map_view();
   }
-  /// Returns how many photons the last build left out.
+  /// Returns how many photons the last build left out. Their indices are not found, and others keep theirs.
   std::uint32_t skipped() const { return tree_.skipped(); }
   /// Returns the bytes held: those of the largest map so far.
   std::size_t bytes() const { return tree_.bytes() + positions_.bytes(); }
