@@ -3,6 +3,7 @@
 // gives one picture on any policy.
 #include "app/render.hpp"
 #include "casters/embree_caster.hpp"
+#include "scene/scene_builder.hpp"
 #include "support/catch.hpp"
 #include "support/policies.hpp"
 #include "support/renderings.hpp"
@@ -223,6 +224,52 @@ bool joins_nothing(const subpath_vertex& vertex) {
   return vertex.seen_from(vertex.at.outgoing).is_delta();
 }
 
+// A spot of 1 W/sr one unit above a grey plane, and a camera that sees a square below it. The spot's cone is
+// wider than all that merges reach.
+
+constexpr double half_plane = 4.0, reflectance = 0.5, half_view = 0.3;
+
+render::scene lamp_over_plane() {
+  render::scene_builder b("lamp over plane");
+  const auto grey = b.diffuse(vec3(static_cast<float>(reflectance)));
+  const auto half = static_cast<float>(half_plane);
+  b.parallelogram({-half, 0.0f, -half}, {2.0f * half, 0.0f, 0.0f}, {0.0f, 0.0f, 2.0f * half},
+                  {{0.0f, 1.0f, 0.0f}, grey});
+  render::scene s = b.finish(2);
+  render::punctual_light lamp;
+  lamp.kind = render::punctual_kind::spot;
+  lamp.position = {0.0f, 1.0f, 0.0f};
+  lamp.direction = {0.0f, -1.0f, 0.0f};
+  lamp.cos_inner = 0.75f;
+  lamp.cos_outer = 0.7f;
+  s.punctual_lights = {lamp};
+  s.view.position = {0.0f, 3.0f, 0.0f};
+  s.view.forward = {0.0f, -1.0f, 0.0f};
+  s.view.up = {0.0f, 0.0f, -1.0f};
+  s.view.vertical_fov = 2.0f * std::atan(static_cast<float>(half_view / 3.0));
+  return s;
+}
+
+/// The mean radiance of the camera's picture where irradiance is averaged over discs of that radius, by
+/// quadrature.
+double radiance_around_lamp(double radius) {
+  constexpr int places = 40, rings = 60, angles = 32;
+  const double pi = 3.14159265358979;
+  const auto irradiance = [](double x, double z) { return std::pow(1.0 + x * x + z * z, -1.5); };
+  double sum = 0.0;
+  for (int i = 0; i < places; ++i)
+    for (int j = 0; j < places; ++j) {
+      const double x = half_view * (2.0 * (i + 0.5) / places - 1.0),
+                   z = half_view * (2.0 * (j + 0.5) / places - 1.0);
+      for (int ring = 0; ring < rings; ++ring)
+        for (int angle = 0; angle < angles; ++angle) {
+          const double r = radius * std::sqrt((ring + 0.5) / rings), phi = 2.0 * pi * angle / angles;
+          sum += irradiance(x + r * std::cos(phi), z + r * std::sin(phi));
+        }
+    }
+  return reflectance / pi * sum / (places * places * rings * angles);
+}
+
 }  // namespace
 
 TEST_CASE("paths from both ends have the mean of path tracing", "[renderer][bidirectional][unbiased]") {
@@ -287,10 +334,54 @@ TEST_CASE("weights are those of the densities of the renderer's own paths", "[re
   CHECK(worst < 1e-4);
 }
 
+TEST_CASE("merging has the mean of path tracing where its radius is small",
+          "[renderer][bidirectional][unbiased]") {
+  for (const char* scene : {"cornell-box", "materials"}) check_rendering({scene, true, sampling_method::vcm});
+}
+
+TEST_CASE("merging blurs by its disc, with a bias that falls as the square of its radius",
+          "[renderer][bidirectional]") {
+  const render::scene scene = lamp_over_plane();
+  const double scene_radius = half_plane * std::sqrt(2.0);
+  std::vector<double> over_square;
+  for (const double radius : {0.4, 0.2}) {
+    // Means of independent seeds.
+    std::vector<double> means;
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      render::render_options options;
+      options.method = sampling_method::vcm;
+      options.techniques = render::techniques_of("surf");
+      options.merge_radius = static_cast<float>(radius / scene_radius);
+      options.radius_alpha = 1.0f;
+      options.width = options.height = 24;
+      options.max_depth = 2;
+      options.spp = radius > 0.3 ? 100 : 500;
+      options.where = render::device::seq;  // waves are too small to share
+      options.seed = seed;
+      const render::image picture = render::render(scene, options, {}).picture;
+      double sum = 0.0;
+      for (const vec3& pixel : picture.pixels) sum += static_cast<double>(pixel.x);
+      means.push_back(sum / static_cast<double>(picture.pixels.size()));
+    }
+    double mean = 0.0, variance = 0.0;
+    for (const double m : means) mean += m / 10.0;
+    for (const double m : means) variance += (m - mean) * (m - mean) / (9.0 * 10.0);
+    const double exact = radiance_around_lamp(0.0), expected = radiance_around_lamp(radius);
+    INFO("radius " << radius << ": " << mean << " +- " << std::sqrt(variance) << ", expected " << expected
+                   << ", without bias " << exact);
+    CHECK(std::abs(mean - expected) < 4.0 * std::sqrt(variance));
+    CHECK(std::sqrt(variance) < 0.05 * (exact - expected));
+    over_square.push_back((exact - mean) / (radius * radius));
+  }
+  // A bias that fell as the radius would have a ratio of 1/2, one that fell as its cube 2.
+  CHECK(over_square[0] / over_square[1] == Approx(1.0).margin(0.2));
+}
+
 TEST_CASE("one seed gives one picture of paths from both ends on any policy", "[renderer][bidirectional]") {
   const render::scene scene = render::make_builtin_scene("materials");
   render::render_options options;
-  options.method = sampling_method::bpt;
+  options.method = sampling_method::vcm;
+  options.merge_radius = 0.02f;
   options.width = 24;
   options.height = 16;
   options.spp = 3;
@@ -319,6 +410,7 @@ TEST_CASE("vertices of light paths beyond their memory are counted", "[renderer]
 
 TEST_CASE("names of techniques are read and written", "[renderer][bidirectional]") {
   CHECK(render::names_of(render::technique_set()) == "hits+nee+connect+splat");
+  CHECK(render::names_of(render::connection_and_merging()) == "hits+nee+connect+splat+surf");
   CHECK(render::names_of(render::techniques_of("splat+nee")) == "nee+splat");
   CHECK(render::names_of(render::techniques_of("bpt")) == "hits+nee+connect+splat");
   for (const char* wrong : {"", "hit", "nee,splat", "nee+", "+nee"})

@@ -96,6 +96,7 @@ struct rendering {
       return view + "SARSA grid, update " + render::name_of(render::sarsa_update_names(), update) +
              ", sampler " + render::name_of(render::sarsa_sampler_names(), sampler);
     if (method == render::sampling_method::records) return view + "irradiance records";
+    if (method == render::sampling_method::vcm) return view + "merging";
     if (method == render::sampling_method::lt) return view + "light tracing";
     if (method == render::sampling_method::bpt) return view + "techniques " + render::names_of(techniques);
     return view + (mode == render::guiding::plain ? "plain" : "oriented") + ", " +

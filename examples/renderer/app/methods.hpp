@@ -3,11 +3,23 @@
 
 namespace render {
 
-/// Sampling methods. pt is path tracing, vpt that of scenes with media. bpt is bidirectional path tracing, lt
-/// light tracing. wfpg guides by fields, wfpg_product by products of fields and BSDFs. sarsa guides by a
-/// SARSA grid, records by irradiance records. openpgl_vmm guides by Open PGL's mixtures of von Mises-Fisher
-/// lobes with parallax, openpgl_dqt by its quadtrees of directions.
-enum class sampling_method { pt, vpt, bpt, lt, wfpg, wfpg_product, sarsa, records, openpgl_vmm, openpgl_dqt };
+/// Sampling methods. pt is path tracing, vpt that of scenes with media. bpt is bidirectional path tracing,
+/// vcm vertex connection and merging, lt light tracing. wfpg guides by fields, wfpg_product by products of
+/// fields and BSDFs. sarsa guides by a SARSA grid, records by irradiance records. openpgl_vmm guides by Open
+/// PGL's mixtures of von Mises-Fisher lobes with parallax, openpgl_dqt by its quadtrees of directions.
+enum class sampling_method {
+  pt,
+  vpt,
+  bpt,
+  vcm,
+  lt,
+  wfpg,
+  wfpg_product,
+  sarsa,
+  records,
+  openpgl_vmm,
+  openpgl_dqt
+};
 
 /// The guide beside BSDFs: none, fields over an octree, a grid, records, or Open PGL's field.
 enum class guide_kind { none, octree, sarsa, records, openpgl };
@@ -24,6 +36,7 @@ inline constexpr method_properties all_methods[] = {
     {sampling_method::pt, "pt", guide_kind::none, false, true},
     {sampling_method::vpt, "vpt", guide_kind::none, false, true},
     {sampling_method::bpt, "bpt", guide_kind::none, false, true},
+    {sampling_method::vcm, "vcm", guide_kind::none, false, true},
     {sampling_method::lt, "lt", guide_kind::none, false, true},
     {sampling_method::wfpg, "wfpg", guide_kind::octree, true, true},
     {sampling_method::wfpg_product, "wfpg-product", guide_kind::octree, true, true},
@@ -50,7 +63,7 @@ constexpr bool is_wfpg(sampling_method method) {
 
 /// Whether paths begin at lights, too.
 constexpr bool is_bidirectional(sampling_method method) {
-  return method == sampling_method::bpt || method == sampling_method::lt;
+  return method == sampling_method::bpt || method == sampling_method::vcm || method == sampling_method::lt;
 }
 
 constexpr bool is_openpgl(sampling_method method) {

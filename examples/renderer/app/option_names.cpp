@@ -71,7 +71,8 @@ struct technique_name {
 constexpr technique_name technique_names[] = {{"hits", &technique_set::light_hits},
                                               {"nee", &technique_set::next_event},
                                               {"connect", &technique_set::connections},
-                                              {"splat", &technique_set::splats}};
+                                              {"splat", &technique_set::splats},
+                                              {"surf", &technique_set::merges}};
 
 }  // namespace
 
@@ -83,21 +84,18 @@ std::string names_of(const technique_set& set) {
 }
 
 technique_set techniques_of(const std::string& names) {
-  technique_set set{false, false, false, false};
+  technique_set set{false, false, false, false, false};
   std::istringstream rest(names + '+');
   for (std::string name; std::getline(rest, name, '+');) {
-    if (name == "bpt") {
-      set = technique_set();
-      continue;
-    }
-    bool is_known = false;
+    bool is_known = name == "bpt";
+    if (is_known) set.light_hits = set.next_event = set.connections = set.splats = true;
     for (const technique_name& row : technique_names) {
       if (name != row.name) continue;
       set.*row.is_on = is_known = true;
     }
     if (!is_known)
-      throw std::invalid_argument("expected hits, nee, connect, splat or bpt, with + between them, not " +
-                                  name);
+      throw std::invalid_argument(
+          "expected hits, nee, connect, splat, surf or bpt, with + between them, not " + name);
   }
   return set;
 }

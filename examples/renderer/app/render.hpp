@@ -71,7 +71,10 @@ struct render_options {
   /// Of a path, from its first vertex on, at least 1; with next-event estimation never the last of several.
   std::uint32_t guided_depths = wfpg::sampling_options().guided_depths;
   std::uint32_t light_groups = 32;  ///< that guided paths learn to choose lights from, in [1, 255]
-  technique_set techniques;         ///< of bpt; nee decides on next-event estimation, too
+  /// Of bpt and vcm; nee decides on next-event estimation, too. Unset: the method's own.
+  std::optional<technique_set> techniques;
+  float merge_radius = 0.003f;  ///< of the first sample's merges, over the scene's radius; above 0, at most 1
+  float radius_alpha = 0.75f;   ///< in (0, 1]: the smaller, the faster the radius shrinks; 1: not at all
   std::size_t light_memory = std::size_t(1) << 30;  ///< bytes of vertices of light paths
   std::uint32_t samples_per_leaf = 32000;           ///< after which Open PGL's field splits a leaf, 8 to 2^30
   wfpg::sarsa_grid_options sarsa;            ///< its own; what every guide is told follows from the others
@@ -143,6 +146,14 @@ struct render_report {
   std::uint64_t dropped_light_vertices = 0;
   double cones_per_segment = 0.0;
 };
+
+/// How a method of paths from both ends finds light.
+inline technique_set techniques_of(const render_options& options) {
+  if (options.method == sampling_method::lt) return light_tracing();
+  const technique_set own =
+      options.method == sampling_method::vcm ? connection_and_merging() : technique_set();
+  return options.techniques.value_or(own);
+}
 
 /// How the samples of these options are combined.
 inline wfpg::sample_combination combination_of(const render_options& options) {

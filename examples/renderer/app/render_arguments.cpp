@@ -148,16 +148,20 @@ const std::vector<requirement>& requirements() {
        "--cones scene, or another source than samples",
        [](options o) { return o.octree != octree_source::samples || o.through == cones::scene; }},
       {{"--guide-fraction"}, "a --method that guides", [](options o) { return is_guided(o.method); }},
-      {{"--techniques"}, "--method bpt", [](options o) { return o.method == sampling_method::bpt; }},
-      {{"--light-memory"}, "--method bpt", [](options o) { return o.method == sampling_method::bpt; }},
+      {{"--techniques", "--light-memory"},
+       "--method bpt or vcm",
+       [](options o) { return o.method == sampling_method::bpt || o.method == sampling_method::vcm; }},
+      {{"--radius", "--radius-alpha"},
+       "--method vcm, or bpt with surf among its --techniques",
+       [](options o) { return is_bidirectional(o.method) && techniques_of(o).merges; }},
       {{"--roulette-depth"},
-       "a --method other than bpt or lt, whose paths have no roulette",
+       "a --method other than bpt, vcm or lt, whose paths have no roulette",
        [](options o) { return !is_bidirectional(o.method); }},
       {{"--guided-depths"},
        "--method wfpg, wfpg-product, sarsa or records",
        [](options o) { return is_guided(o.method) && !is_openpgl(o.method); }},
       {{"--save-state", "--resume"},
-       "--method pt, vpt, bpt, lt, wfpg or wfpg-product",
+       "--method pt, vpt, bpt, vcm, lt, wfpg or wfpg-product",
        [](options o) { return properties_of(o.method).can_be_saved; }},
       {{"--sarsa-update", "--sarsa-sampler", "--sarsa-resolution", "--sarsa-directions", "--sarsa-step",
         "--sarsa-learning-rate"},
@@ -187,7 +191,8 @@ void add_scene_options(CLI::App& app, scene_arguments& given) {
 
 void add_method_options(CLI::App& app, render_options& options) {
   add_choice<sampling_method>(app, "--method", options.method, method_names(),
-                              "path tracing; that of scenes with media; bidirectional path tracing; light "
+                              "path tracing; that of scenes with media; bidirectional path tracing; that and "
+                              "merging of vertices; light "
                               "tracing; guided by fields (default), or by their products with BSDFs; by "
                               "a grid that learns by SARSA; by irradiance records that are made before the "
                               "first path; by Open PGL's mixtures of lobes or quadtrees");
@@ -219,13 +224,21 @@ void add_bidirectional_options(CLI::App& app, render_options& options) {
   };
   app.add_option_function<std::string>(
          "--techniques", parse,
-         "how bpt finds light: hits of lights, light samples, connections of paths, or light paths that the "
-         "camera sees; names with + between them (default: " +
-             names_of(options.techniques) + ")")
+         "how bpt and vcm find light: hits of lights, light samples, connections of paths, light paths that "
+         "the camera sees, merges; names with + between them (default: all, for bpt without surf: " +
+             names_of(connection_and_merging()) + ")")
       ->type_name("NAMES");
   app.add_option("--light-memory", options.light_memory,
                  with_default("memory of light paths' vertices", options.light_memory))
       ->transform(byte_count());
+  app.add_option("--radius", options.merge_radius,
+                 with_default("of the first sample's merges, over the scene's radius", options.merge_radius))
+      ->transform(positive_number(1.0));
+  app.add_option(
+         "--radius-alpha", options.radius_alpha,
+         with_default("radii shrink as the sample's number to the power (this - 1) / 2; 1: not at all",
+                      options.radius_alpha))
+      ->transform(positive_number(1.0));
 }
 
 void add_device_option(CLI::App& app, render_options& options) {

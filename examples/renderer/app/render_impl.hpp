@@ -185,8 +185,10 @@ render_result render_by(const Exec& exec, const scene& scene, const render_optio
                                  static_cast<std::uint32_t>(options.max_depth),
                                  options.seed,
                                  static_cast<std::uint32_t>(options.roulette_depth),
-                                 options.method == sampling_method::lt ? light_tracing() : options.techniques,
-                                 options.light_memory};
+                                 techniques_of(options),
+                                 options.light_memory,
+                                 options.merge_radius,
+                                 options.radius_alpha};
   using caster_type = decltype(accelerated->caster());
   Tracer<Exec, caster_type> tracer(exec, settings, {geometry.view(), lights.view(), options.nee},
                                    accelerated->caster());
@@ -348,7 +350,7 @@ render_result render_from_both_ends(const Exec& exec, const scene& scene, const 
       job.result.report.dropped_light_vertices = job.tracer.dropped();
     });
   } else {
-    throw std::runtime_error("--device optix does not support --method bpt or lt; --device cuda does");
+    throw std::runtime_error("--device optix does not support --method bpt, vcm or lt; --device cuda does");
   }
 }
 

@@ -74,9 +74,10 @@ void add_state_options(CLI::App& app, arguments& given) {
   CLI::Option* const load = app.add_option("--load-guide", given.options.load_guide,
                                            "guide for wfpg or wfpg-product to begin with, of the same scene")
                                 ->transform(file_path());
-  app.add_option("--save-state", given.save_state,
-                 "where the state of a rendering by pt, vpt, bpt, lt, wfpg or wfpg-product goes at the end, "
-                 "and when it is interrupted")
+  app.add_option(
+         "--save-state", given.save_state,
+         "where the state of a rendering by pt, vpt, bpt, vcm, lt, wfpg or wfpg-product goes at the end, "
+         "and when it is interrupted")
       ->transform(file_path());
   app.add_option("--resume", given.options.resume,
                  "state of the rendering to go on with; where it goes when that is interrupted")

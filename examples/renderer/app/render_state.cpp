@@ -64,9 +64,14 @@ named_values values_of(const render_options& o) {
                          {"--nee", o.nee ? "on" : "off"},
                          {"--method", name_of(method_names(), o.method)},
                          {"--combine", name_of(combination_names(), combination_of(o))}};
-  if (o.method == sampling_method::bpt)
-    values.insert(values.end(), {{"--techniques", names_of(o.techniques)},
+  if (is_bidirectional(o.method)) {
+    const technique_set techniques = techniques_of(o);
+    values.insert(values.end(), {{"--techniques", names_of(techniques)},
                                  {"--light-memory", std::to_string(o.light_memory)}});
+    if (techniques.merges)
+      values.insert(values.end(), {{"--radius", std::to_string(o.merge_radius)},
+                                   {"--radius-alpha", std::to_string(o.radius_alpha)}});
+  }
   if (is_guided(o.method)) add_guider_values(o, values);
   return values;
 }

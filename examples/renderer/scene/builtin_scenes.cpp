@@ -220,6 +220,60 @@ scene caustic_pool() {
   return b.finish(8);
 }
 
+/// Chrome and glass balls in a closed room. The lamp is in a box of glass, so all light comes through it.
+scene mirror_balls() {
+  scene_builder b("mirror-balls");
+  const auto white = b.diffuse(vec3(0.75f)), left = b.diffuse(red), right = b.diffuse(green),
+             floor = b.diffuse({0.5f, 0.45f, 0.4f});
+  const auto light = b.lamp(vec3(120.0f));
+  const auto chrome = b.glossy(material_kind::mirror, vec3(0.95f), 0.1f),
+             glass = b.glass(material_kind::dielectric);
+  b.room({{-2.0f, 0.0f, -2.0f}, {2.0f, 3.0f, 2.0f}}, {left, right, floor, white, white, white});
+  const auto place = [&](float x, float z, float radius, std::uint32_t material_index) {
+    b.sphere({x, radius + 0.001f, z}, radius, 32, material_index);
+  };
+  place(-1.1f, -1.0f, 0.6f, chrome);
+  place(0.3f, -1.2f, 0.5f, chrome);
+  place(1.3f, -0.5f, 0.4f, chrome);
+  place(-0.5f, 0.2f, 0.4f, glass);
+  place(0.6f, 0.3f, 0.35f, glass);
+  const vec3 lamp_centre(0.0f, 2.7f, -0.3f);
+  b.ceiling_lamp(lamp_centre, {0.25f, 0.25f}, light);
+  b.box({lamp_centre, {0.5f, 0.24f, 0.5f}}, glass);
+  b.look({0.0f, 1.3f, 1.95f}, {0.0f, 0.7f, -1.0f}, 1.1f);
+  return b.finish(10);
+}
+
+/// A room after Veach's of 1997. A lamp in a shade that is open above lights the ceiling. A spot in a tube
+/// lights a glass egg on a table.
+scene veach_bidir() {
+  scene_builder b("veach-bidir");
+  const auto white = b.diffuse(vec3(0.7f)), wall = b.diffuse({0.6f, 0.55f, 0.45f}),
+             wood = b.diffuse({0.45f, 0.3f, 0.2f}), metal = b.diffuse(vec3(0.3f));
+  const auto warm = b.lamp({300.0f, 240.0f, 160.0f}), bright = b.lamp(vec3(400.0f));
+  const auto glass = b.glass(material_kind::dielectric);
+  b.room({{-2.0f, 0.0f, -2.0f}, {2.0f, 2.6f, 2.0f}}, {wall, wall, wood, white, wall, wall});
+  b.box({{0.3f, 0.35f, -0.4f}, {1.4f, 0.7f, 0.9f}}, wood);
+  b.sphere({0.3f, 0.951f, -0.35f}, 0.25f, 32, glass);
+  // Four sides around a lamp that faces up or down, seen from outside and inside.
+  const auto shade = [&](vec3 centre, float half, float height) {
+    for (int side = 0; side < 4; ++side) {
+      const float turn = 1.57079633f * static_cast<float>(side);
+      const vec3 out = turned({0.0f, 0.0f, half}, turn), along = turned({2.0f * half, 0.0f, 0.0f}, turn);
+      b.parallelogram(centre + out - 0.5f * along, along, {0.0f, height, 0.0f}, {out / half, metal});
+    }
+  };
+  const vec3 floor_lamp(-1.4f, 1.6f, -1.3f), spot(0.3f, 2.25f, -0.35f);
+  b.box({{floor_lamp.x, 0.5f * floor_lamp.y - 0.01f, floor_lamp.z}, {0.05f, floor_lamp.y - 0.02f, 0.05f}},
+        metal);
+  b.parallelogram(floor_lamp - vec3(0.1f, 0.0f, 0.1f), {0.2f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.2f}, {up, warm});
+  shade(floor_lamp - vec3(0.0f, 0.05f, 0.0f), 0.15f, 0.35f);
+  b.ceiling_lamp(spot, {0.08f, 0.08f}, bright);
+  shade(spot - vec3(0.0f, 0.3f, 0.0f), 0.06f, 0.32f);
+  b.look({0.9f, 1.4f, 1.9f}, {-0.2f, 1.0f, -0.8f}, 1.1f);
+  return b.finish(8);
+}
+
 /// Spheres of metal, of plastic and of glass on a floor.
 scene materials() {
   scene_builder b("materials");
@@ -369,6 +423,8 @@ const std::vector<std::pair<std::string, maker>>& makers() {
                                                                  {"thin-wall", thin_wall},
                                                                  {"glossy-room", glossy_room},
                                                                  {"caustic-pool", caustic_pool},
+                                                                 {"mirror-balls", mirror_balls},
+                                                                 {"veach-bidir", veach_bidir},
                                                                  {"many-lamps", many_lamps},
                                                                  {"materials", materials},
                                                                  {"outdoor", outdoor},

@@ -1,8 +1,10 @@
 // The bidirectional path tracer. In one sample each pixel has a light path and a camera path. All paths go
 // from vertex to vertex as a wave. Light comes from hits of lights, from light samples, from connections of
-// the two paths, and from connections of light paths to the camera.
+// the two paths, and from connections of light paths to the camera. Vertices of camera paths can be merged
+// with those of all light paths, too.
 //
-// Source: Veach 1997, chapter 10; weights as in <wfpg/light/path_weights.hpp>.
+// Sources: Veach 1997, chapter 10; Georgiev et al. 2012, "Light Transport Simulation with Vertex Connection
+// and Merging"; weights as in <wfpg/light/path_weights.hpp>.
 #pragma once
 
 #include "tracer/connection_kernels.hpp"
@@ -13,7 +15,9 @@
 #include "tracer/wavefront.hpp"
 
 #include <wfpg/host/ray_caster.hpp>
+#include <wfpg/light/photon_map.hpp>
 
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -41,6 +45,7 @@ class bidirectional_tracer {
         keeps_(exec, count_),
         radiance_(exec, count_),
         splats_(exec, count_, count_),
+        positions_(exec, 0),
         stored_(exec, {count_, settings.light_memory, glm::max(settings.max_depth, 2u) - 1}),
         film_(exec, count_),
         clock_(exec) {}
@@ -50,7 +55,11 @@ class bidirectional_tracer {
     world_.random = {settings_.seed, sample};
     exec_.fill_bytes(radiance_.data(), 0, radiance_.bytes());
     stored_.begin(exec_);
+    const float radius = radius_of(sample);
+    if (settings_.techniques.merges)
+      world_.techniques.surface_points = static_cast<float>(count_) * pi * radius * radius;
     if (settings_.techniques.needs_light_paths()) follow_light(camera);
+    if (settings_.techniques.merges) clock_.measure("photon map", [&] { build_photon_map(radius); });
     follow_camera(camera);
     clock_.measure("film", [&] { film_.add(radiance_.view(), weight); });
     dropped_ += stored_.dropped(exec_);  // waits, so that a look at the time sees the whole sample
@@ -76,6 +85,20 @@ class bidirectional_tracer {
     counts.connections = set.connections ? 1.0f : 0.0f;
     counts.splats = set.splats ? static_cast<float>(pixels) : 0.0f;
     return counts;
+  }
+
+  /// Of a sample's merges. A scene without extent has any.
+  float radius_of(std::uint32_t sample) const {
+    const float shrinks = std::pow(static_cast<float>(sample) + 1.0f, 0.5f * (settings_.radius_alpha - 1.0f));
+    return glm::max(settings_.merge_radius * shrinks * world_.lights.scene_radius,
+                    wfpg::photon_map<Exec>::least_radius);
+  }
+
+  void build_photon_map(float radius) {
+    const std::uint32_t photons = stored_.size(exec_);
+    if (positions_.size() < photons) positions_ = wfpg::buffer<vec3, Exec>(exec_, stored_.capacity());
+    exec_.for_each(photons, copy_positions{stored_.view(), positions_.view()});
+    photons_.build(exec_, {positions_.data(), photons}, radius);
   }
 
   void follow_light(const pinhole& camera) {
@@ -112,8 +135,9 @@ class bidirectional_tracer {
       });
       if (segments == settings_.max_depth) break;
       clock_.measure("connections", [&] {
-        exec_.for_each(count_, connect_camera_paths<world_type>{world_, paths_.view(), vertices_.view(),
-                                                                stored_.view(), radiance_.view()});
+        exec_.for_each(
+            count_, connect_camera_paths<world_type>{world_, paths_.view(), vertices_.view(), photons_.view(),
+                                                     stored_.view(), radiance_.view()});
       });
     }
   }
@@ -127,7 +151,9 @@ class bidirectional_tracer {
   wfpg::buffer<std::uint32_t, Exec> keeps_;
   wfpg::buffer<vec3, Exec> radiance_;
   wfpg::splats<Exec> splats_;
+  wfpg::buffer<vec3, Exec> positions_;  // of stored vertices
   wfpg::light_vertices<Exec, subpath_vertex> stored_;
+  wfpg::photon_map<Exec> photons_;
   path_film<Exec> film_;
   policy_clock<Exec> clock_;
   std::uint64_t dropped_ = 0;

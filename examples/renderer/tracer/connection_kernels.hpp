@@ -4,6 +4,8 @@
 
 #include "tracer/bidirectional_state.hpp"
 
+#include <wfpg/light/photon_map.hpp>
+
 namespace render {
 
 /// Starts a path through each pixel.
@@ -63,12 +65,24 @@ struct trace_camera_paths {
   }
 };
 
-/// Adds what the camera paths' vertices find by light samples and by connections, and continues the paths.
+/// Copies the positions of stored vertices, for a photon map.
+struct copy_positions {
+  wfpg::light_vertices_view<subpath_vertex> stored;
+  wfpg::array_view<vec3> positions;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    positions[i] = stored[static_cast<std::uint32_t>(i)].at.position;
+  }
+};
+
+/// Adds what the camera paths' vertices find by light samples, by connections and by merges, and continues
+/// the paths.
 template <class World>
 struct connect_camera_paths {
   World world;
   tiled_view<subpath> paths;
   tiled_view<subpath_vertex> vertices;
+  wfpg::photon_map_view photons;  ///< of all stored vertices
   wfpg::light_vertices_view<subpath_vertex> stored;
   wfpg::array_view<vec3> radiance;
 
@@ -81,6 +95,7 @@ struct connect_camera_paths {
       vec3 found(0.0f);
       if (world.techniques.next_event > 0.0f) found += sample_light(id, vertex, f);
       if (world.techniques.connections > 0.0f) found += connect_all(i, vertex, f);
+      if (world.techniques.surface_points > 0.0f) found += merge_all(vertex, f);
       radiance[i] += vertex.throughput * found;
     }
     subpath next;
@@ -119,6 +134,25 @@ struct connect_camera_paths {
       if (light.segments + vertex.segments < world.max_depth) found += connect(vertex, f, light);
     }
     return found;
+  }
+
+  WFPG_HD vec3 merge_all(const subpath_vertex& vertex, const bsdf& f) const {
+    vec3 found(0.0f);
+    photons.for_each_point(vertex.at.position, [&](std::uint32_t k) {
+      const subpath_vertex& light = stored[k];
+      if (light.segments + vertex.segments <= world.max_depth) found += merge(vertex, f, light);
+    });
+    // Over the number of light paths and the disc of merges.
+    return found / world.techniques.surface_points;
+  }
+
+  WFPG_HD vec3 merge(const subpath_vertex& camera, const bsdf& f, const subpath_vertex& light) const {
+    const vec3 outgoing = camera.at.outgoing, incident = light.at.outgoing;
+    // The photon's flux is that of a surface with the geometric normal.
+    const vec3 value = f.eval_rgb(outgoing, incident) * light.throughput / camera.cosine(incident);
+    if (!(wfpg::luminance(value) > 0.0f)) return vec3(0.0f);
+    return value * light.weights.merge(world.techniques, wfpg::merge_technique::surface_points,
+                                       camera.weights, camera.leave(f, incident));
   }
 
   WFPG_HD vec3 connect(const subpath_vertex& camera, const bsdf& f, const subpath_vertex& light) const {

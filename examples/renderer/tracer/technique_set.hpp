@@ -9,13 +9,19 @@ struct technique_set {
   bool next_event = true;   ///< light samples at vertices of camera paths
   bool connections = true;  ///< vertices of light and camera paths are connected
   bool splats = true;       ///< vertices of light paths are connected to the camera
+  bool merges = false;      ///< vertices of all light paths are merged with near ones of camera paths
 
-  bool needs_light_paths() const { return connections || splats; }
+  bool needs_light_paths() const { return connections || splats || merges; }
 };
+
+/// Vertex connection and merging.
+constexpr technique_set connection_and_merging() {
+  return {true, true, true, true, true};
+}
 
 /// Light tracing: the camera sees lights, and light paths find the rest.
 constexpr technique_set light_tracing() {
-  return {false, false, false, true};
+  return {false, false, false, true, false};
 }
 
 }  // namespace render
