@@ -86,10 +86,24 @@ TEST_CASE("GPU pictures after warm-up have the means of the CPU's", "[renderer][
       }
 }
 
+TEST_CASE("GPU pictures of paths from both ends have the means of the CPU's", "[renderer][cuda]") {
+  for (const char* scene : {"cornell-box", "glossy-room", "materials", "outdoor"})
+    for (const sampling_method method : {sampling_method::bpt, sampling_method::vcm})
+      check_as_on_cpu({scene, true, method});
+  check_as_on_cpu({"cornell-box", true, sampling_method::lt});
+  check_as_on_cpu({"lamps without extent", true, sampling_method::bpt});
+}
+
+TEST_CASE("GPU pictures of paths through media have the means of the CPU's", "[renderer][cuda]") {
+  check_as_on_cpu({"caustic-pool", false, sampling_method::vpt});
+  check_as_on_cpu({"materials", true, sampling_method::vpt});
+}
+
 TEST_CASE("one seed gives one picture on a GPU", "[renderer][cuda]") {
   const render::scene world = render::make_builtin_scene("cornell-enclosed");
   for (const sampling_method method :
-       {sampling_method::pt, sampling_method::wfpg, sampling_method::wfpg_product, sampling_method::sarsa,
+       {sampling_method::pt, sampling_method::vpt, sampling_method::bpt, sampling_method::vcm,
+        sampling_method::wfpg, sampling_method::wfpg_product, sampling_method::sarsa,
         sampling_method::records})
     for (const fields lifetime : {fields::kept, fields::transient}) {
       render::render_options options;
