@@ -5,6 +5,7 @@
 #include "scene/builtin_scenes.hpp"
 #include "scene/scene_builder.hpp"
 #include "support/catch.hpp"
+#include "support/command_lines.hpp"
 #include "support/pictures.hpp"
 #include "support/renderings.hpp"
 #include "support/temporary_folder.hpp"
@@ -16,8 +17,7 @@
 
 #include <cmath>
 #include <cstdint>
-#include <fstream>
-#include <functional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -450,6 +450,19 @@ TEST_CASE("media: other methods refuse them and name vpt", "[renderer][media]") 
   broken = foggy_box();
   broken.materials.back().scattering.y = -1.0f;
   CHECK(contains(refusal(broken, sampling_method::vpt), "a coefficient of scene.materials, element"));
+}
+
+TEST_CASE("media: a command line has fog, and a warning of lights that it hides", "[renderer][media]") {
+  const temporary_folder folder;
+  const auto log_of = [&](const std::string& name) {
+    const std::string png = folder.file("a.png");
+    const outcome done =
+        run_render({name, "--method", "vpt", "--fog", "0.5", "--size", "8x8", "--spp", "1", "--png", png});
+    CHECK(done.code == 0);
+    return done.log;
+  };
+  CHECK(log_of("cornell-box").empty());
+  CHECK(contains(log_of("outdoor"), "warning: the environment and directional lights do not shine through"));
 }
 
 TEST_CASE("media: glTF materials and scenes have them in extras", "[renderer][media][gltf]") {

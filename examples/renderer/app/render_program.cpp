@@ -13,6 +13,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <optional>
@@ -137,10 +138,21 @@ std::optional<image> reference_of(const arguments& given, const scene& scene) {
   return read_reference(given.reference, options.width, options.height);
 }
 
+/// Fog without end leaves nothing of light that is infinitely far.
+void warn_of_far_lights(const scene& scene, std::ostream& log) {
+  const bool has_far_lights =
+      scene.environment != vec3(0.0f) || !scene.sky.texels.empty() ||
+      std::any_of(scene.punctual_lights.begin(), scene.punctual_lights.end(),
+                  [](const punctual_light& l) { return l.kind == punctual_kind::directional; });
+  if (has_far_lights && scene.fog.extinction() != vec3(0.0f))
+    log << "wfpg-render: warning: the environment and directional lights do not shine through fog\n";
+}
+
 int render_scene(arguments& given, std::ostream& out, std::ostream& log) {
   check_files(given);
   scene scene = load_scene(given.scene, given.options, "wfpg-render", log);
   if (given.fog > 0.0f) scene.fog = {vec3(0.0f), vec3(given.fog), 0.0f};
+  warn_of_far_lights(scene, log);
   const std::optional<image> reference = reference_of(given, scene);
 
   given.options.keep_guide = !given.save_guide.empty();
