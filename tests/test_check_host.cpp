@@ -40,6 +40,7 @@ host_checker<Exec> check(const Exec& exec, const host_run& run, const Caster& ca
   options.octree_resolution = 16;
   options.kept.budget_bytes = std::size_t(4) << 20;
   options.seed = what.seed;
+  options.silent_escapes = what.in.silent;
   const box_mesh<Exec> mesh(exec);
   wfpg::path_guider<Exec> guider(exec, mesh.view(), options);
   host_check_options checks;
@@ -56,11 +57,11 @@ host_checker<Exec> check(const Exec& exec, const host_run& run, const Caster& ca
 }
 template <class Exec>
 host_checker<Exec> check(const Exec& exec, const host_run& run) {
-  return check(exec, run, box_caster{run.what.in.open});
+  return check(exec, run, caster_of(run.what.in));
 }
 
 std::vector<room> rooms() {
-  std::vector<room> result(11);
+  std::vector<room> result(12);
   result[1].coats = true;
   result[2].coats = true;
   result[2].fog = 0.2f;
@@ -76,6 +77,8 @@ std::vector<room> rooms() {
   result[9].roulette = host_roulette::late;
   result[10].roulette = host_roulette::by_radiance;
   result[10].alpha = 0.3f;
+  result[11].floor = false;
+  result[11].silent = true;
   return result;
 }
 
@@ -106,18 +109,21 @@ struct planted_fault {
 };
 
 std::vector<planted_fault> planted_faults() {
-  room coated, foggy, glossy, open;
+  room coated, foggy, glossy, open, bottomless;
   coated.coats = true;
   foggy.fog = 0.2f;
   foggy.coats = true;
   glossy.alpha = 0.1f;
   open.open = true;
+  bottomless.floor = false;
+  bottomless.silent = true;
   return {
       {host_fault::guided_roulette, {}, {"roulette ends guided paths", "wfpg::roulette_scale()"}},
       {host_fault::guided_roulette, foggy, {"roulette ends guided paths"}},
       {host_fault::narrow_in_full, glossy, {"narrow lobes", "wfpg::glossy_part::unknown()"}},
       {host_fault::narrow_in_full, coated, {"delta lobes", "glossy_part{probability, 0}"}},
       {host_fault::silent_escapes, open, {"escapes are not told", "recorder.escape()"}},
+      {host_fault::early_scatter, bottomless, {"directions that ended paths did not take", "silent_escapes"}},
       {host_fault::lost_light, {}, {"recorded radiance", "recorder.total()"}},
       {host_fault::lost_light, foggy, {"recorded radiance"}},
       {host_fault::local_scatter, {}, {"recorder.scatter() has other directions", "world space"}},

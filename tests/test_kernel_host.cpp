@@ -3,11 +3,14 @@
 #include "support/kernel_host.hpp"
 #include "support/policies.hpp"
 
+#include <wfpg/guide_file.hpp>
 #include <wfpg/path_guider.hpp>
 #include <wfpg/testing/statistics.hpp>
 
 #include <cmath>
 #include <cstdint>
+#include <sstream>
+#include <string>
 
 using namespace wfpg_test;
 using wfpg::testing::sample_mean;
@@ -63,6 +66,36 @@ WFPG_TEST_CASE("kernel host: guiding gains where fields know all light", "[kerne
   CHECK(distance_in_errors(guided, plain) < 4.0);
   // At equal samples the variance is a third, or less.
   CHECK(guided.error() * guided.error() / 2.0 < plain.error() * plain.error() / 3.0);
+}
+
+/// What a guide has learnt in some samples of a room whose floor is a hole to the dark, as a guide file.
+template <class Exec>
+std::string learnt_over_a_hole(bool tells, bool silent_escapes) {
+  const Exec exec;
+  const box_mesh<Exec> mesh(exec);
+  room in;
+  in.floor = false;
+  in.silent = !tells;
+  wfpg::kept_guide_options options = kernel_host_options(path_count);
+  options.silent_escapes = silent_escapes;
+  wfpg::path_guider<Exec> guider(exec, mesh.view(), options);
+  for (std::uint32_t sample = 0; sample < 6; ++sample) {
+    trace_sample(exec, guider, {in, host_fault::none, path_count, 7 + sample});
+    guider.end_sample();
+  }
+  CHECK(guider.statistics().dropped_vertices == 0);
+  std::ostringstream file;
+  wfpg::save_guide(guider, file);
+  return file.str();
+}
+
+WFPG_TEST_CASE("kernel host: fields learn silent escapes as they learn those that are told",
+               "[kernel_host][silent]") {
+  const std::string told = learnt_over_a_hole<Exec>(true, false);
+  CHECK(learnt_over_a_hole<Exec>(false, true) == told);
+  CHECK(learnt_over_a_hole<Exec>(false, false) != told);
+  // Roulette ends paths after scatter() here. The option then takes them for dark.
+  CHECK(learnt_over_a_hole<Exec>(true, true) != told);
 }
 
 }  // namespace

@@ -78,12 +78,13 @@ struct learning : recording<Exec> {
   wfpg::buffer<wfpg::resident_field, Exec> spheres;
   wfpg::detail::value_queue<Exec> queue;
 
-  explicit learning(bool include_emission = true, std::uint32_t max_depth = 4)
+  explicit learning(bool include_emission = true, std::uint32_t max_depth = 4, bool silent_escapes = false)
       : recording<Exec>(1, max_depth, include_emission),
         spheres(this->scene.exec, std::vector<wfpg::resident_field>(fields)),
         queue(this->scene.exec, 100, fields * cells) {
     this->recorder =
-        wfpg::path_recorder<Exec>(this->scene.exec, {1, max_depth, include_emission, 0, /*directions=*/true});
+        wfpg::path_recorder<Exec>(this->scene.exec, {1, max_depth, include_emission, 0, /*directions=*/true,
+                                                     /*waves=*/false, silent_escapes});
   }
   void scatter(std::uint32_t depth, std::uint32_t field, vec3 direction) const {
     const wfpg::path_recorder_view paths = this->view();
@@ -95,6 +96,7 @@ struct learning : recording<Exec> {
     this->scene.exec.for_each(1, [=] WFPG_HD(std::size_t) { paths.escape(0, depth, throughput); });
   }
   void finish() {
+    this->recorder.close_paths(this->scene.exec);
     const wfpg::learnt_radiance_view learnt{const_view<wfpg::resident_field>(spheres), 2, queue.view()};
     wfpg::deposit_paths(this->scene.exec, this->recorder, this->scene.view(), learnt);
     this->scene.cache.update(this->scene.exec);
@@ -454,6 +456,74 @@ WFPG_TEST_CASE("fields learn the environment, dark or not", "[path_recorder]") {
   r.finish();
   CHECK(r.learnt(2) == values{0.0, 1});
   CHECK(r.dropped() == 0);
+}
+
+WFPG_TEST_CASE("silent escapes: a direction of which nothing is heard found no light", "[path_recorder]") {
+  for (const bool silent : {false, true}) {
+    INFO("silent " << silent);
+    learning<Exec> r(true, 3, silent);
+    const values dark{0.0, silent ? 1u : 0u}, nothing{0.0, 0};
+    write_vertices(r, 0, {vec3(1.0f), vec3(0.5f)});
+    r.radiance(0, 1, vec3(2.0f));
+    r.scatter(1, 2, up);
+    r.finish();
+    CHECK(r.learnt(2) == dark);
+    CHECK(r.leaving(1) == Approx(4.0f));
+    CHECK(r.leaving(0) == Approx(2.0f));
+    r.finish();  // nothing was recorded since
+    CHECK(r.learnt(2) == nothing);
+    write_vertices(r, 0, {vec3(1.0f)});  // the host ends it before it scatters
+    r.finish();
+    CHECK(r.learnt(2) == nothing);
+    write_vertices(r, 0, {vec3(1.0f), vec3(0.5f), vec3(0.25f)});
+    r.scatter(2, 2, up);  // beyond the last depth
+    r.finish();
+    CHECK(r.learnt(2) == nothing);
+    write_vertices(r, 0, {vec3(1.0f)});
+    r.scatter(0, 2, up);
+    r.escape(1, vec3(0.5f));
+    r.emission(0, 1, vec3(3.0f));
+    r.finish();
+    CHECK(r.learnt(2) == values{6.0, 1});
+    CHECK(r.dropped() == 0);
+    CHECK(r.scene.cache.dropped(r.scene.exec).total() == 0);
+  }
+}
+
+WFPG_TEST_CASE("silent escapes: light from beyond the last vertex is heard", "[path_recorder]") {
+  for (const bool by_total : {false, true}) {
+    INFO("by total() " << by_total);
+    learning<Exec> r(true, 4, true);
+    const auto brings = [&](float light) {
+      const wfpg::path_recorder_view paths = r.view();
+      r.scene.exec.for_each(1, [=] WFPG_HD(std::size_t) {
+        if (by_total)
+          paths.total(0, 1, light);
+        else if (light > 0.0f)
+          paths.emission(0, 1, light);
+      });
+    };
+    write_vertices(r, 0, {vec3(1.0f)});
+    r.scatter(0, 2, up);
+    brings(3.0f);  // an emitter without a vertex, or the environment
+    r.finish();
+    CHECK(r.learnt(2) == values{0.0, 0});
+    CHECK(r.leaving(0) == Approx(3.0f));
+    write_vertices(r, 0, {vec3(1.0f)});
+    r.scatter(0, 2, up);
+    brings(0.0f);
+    r.finish();
+    CHECK(r.learnt(2) == values{0.0, 1});
+    write_vertices(r, 0, {vec3(1.0f)});
+    r.scatter(0, 1, up);
+    brings(3.0f);  // a medium, and then a surface whose direction finds nothing
+    r.vertex(0, 2, place(2), up, vec3(0.5f));
+    r.scatter(2, 2, up);
+    r.finish();
+    CHECK(r.learnt(1) == values{0.0, 0});
+    CHECK(r.learnt(2) == values{0.0, 1});
+    CHECK(r.dropped() == 0);
+  }
 }
 
 /// A recorded path as numbers, and the z of the direction after its vertex 1.

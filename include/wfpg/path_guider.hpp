@@ -176,7 +176,7 @@ class path_guider {
         needs_(guide_.recording()),
         recorder_(exec_, {Guide::records_paths ? options_.max_paths : 0, options_.max_depth,
                           options_.include_emission, needs_.fraction_shift, needs_.directions,
-                          Guide::records_paths && options_.records_waves}) {
+                          Guide::records_paths && options_.records_waves, options_.silent_escapes}) {
     require(needs_.sample_stride >= 1, "sample_stride", needs_.sample_stride, "at least 1");
   }
 
@@ -266,6 +266,7 @@ void path_guider<Exec, Guide>::end_sample() {
   if (recorded_) {
     // The stage ends with this block, before the next one begins.
     const auto timed = clock_.time(stage::record);
+    recorder_.close_paths(exec_);
     guide_.learn(now(), recorder_);
   }
   const auto timed = clock_.time(stage::cache);

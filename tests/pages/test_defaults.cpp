@@ -50,6 +50,7 @@ std::vector<option_default> defaults() {
           {all, "guide_fraction", every.guide_fraction ? "" : "unset"},
           {all, "guided_depths", every.guided_depths == 0xffffffffu ? "all" : ""},
           {all, "records_waves", text_of(every.records_waves)},
+          {all, "silent_escapes", text_of(every.silent_escapes)},
           {both, "octree_resolution", text_of(octree.octree_resolution)},
           {both, "mode", octree.mode == wfpg::guiding_mode::oriented ? "`oriented`" : ""},
           {both, "binning.min_level", text_of(octree.binning.min_level)},

@@ -29,6 +29,7 @@ enum class host_fault {
   guided_roulette,     ///< roulette decides by the guided throughput
   narrow_in_full,      ///< narrow lobes are guided as the others
   silent_escapes,      ///< the recorder does not know that paths escape
+  early_scatter,       ///< the recorder gets directions before roulette, though escapes are silent
   lost_light,          ///< the recorder does not know what paths find behind their second vertex
   local_scatter,       ///< the recorder gets directions in the frame of the surface
   no_scatter,          ///< the recorder gets no directions
@@ -75,8 +76,15 @@ struct room {
   float alpha = 0.0f;       ///< positive: the walls at both ends of z are glossy, of this GGX roughness
   bool knows_alpha = true;  ///< the host tells it to the guide, or else the density at the mirrored direction
   bool open = false;        ///< there is no ceiling; light comes from the sky
+  bool floor = true;        ///< without it paths leave the room into the dark
+  bool silent = false;      ///< the recorder does not hear of escapes, and is not to
   host_roulette roulette = host_roulette::by_throughput;
 };
+
+/// The caster of a room.
+WFPG_HD inline box_caster caster_of(const room& in) {
+  return {in.open, !in.floor};
+}
 
 struct diffuse_kernel_bsdf {
   static constexpr material kind = material::diffuse;
@@ -206,16 +214,16 @@ struct find_hits {
     if (free < distance) return;
     path.position = glm::clamp(path.position, vec3(0.0f), vec3(1.0f));
     path.normal = inward_normal(path.position);
-    const bool escapes = !box_caster{at.in.open}(ray).is_hit();
+    const bool escapes = !caster_of(at.in)(ray).is_hit();
     path.hit = escapes ? material::none : material_of_wall(path.normal);
     if (!escapes)
       at.recorder.vertex(i, at.depth, path.position,
                          at.fault == host_fault::normal_as_outgoing ? path.normal : -path.direction,
                          path.normal, false, mean_of(path.throughput));
-    else if (at.fault != host_fault::silent_escapes)
+    else if (!at.in.silent && at.fault != host_fault::silent_escapes)
       at.recorder.escape(i, at.depth, mean_of(path.throughput));
     // What the camera sees directly is as noisy with and without a guide.
-    const float light = escapes ? sky_radiance : emitted(path.position);
+    const float light = escapes ? at.in.open ? sky_radiance : 0.0f : emitted(path.position);
     if (at.depth > 0) path.radiance += mean_of(path.throughput) * light;
     if (at.fault != host_fault::lost_light || at.depth < 2) at.recorder.total(i, at.depth, path.radiance);
     at.checker.radiance(i, path.radiance);
@@ -272,9 +280,6 @@ struct shade {
     path.throughput *= drawn.value / pdf;
     path.roulette_scale *= wfpg::roulette_scale(drawn.pdf, pdf);
     path.direction = drawn.wi;
-    if (at.fault != host_fault::no_scatter)
-      at.recorder.scatter(i, at.depth, at.fault == host_fault::local_scatter ? local : drawn.wi,
-                          drawn.is_delta ? wfpg::no_field : mixture.number);
     wfpg::testing::host_step step;
     step.wi = at.fault == host_fault::local_step ? local : drawn.wi;
     step.bsdf_pdf = drawn.pdf;
@@ -286,6 +291,10 @@ struct shade {
     step.survival = at.in.roulette == host_roulette::by_radiance ? 1.0f : survival;
     step.is_delta = drawn.is_delta;
     step.goes_on = at.draw(i, 4).x < survival;
+    const bool tells = step.goes_on || !at.in.silent || at.fault == host_fault::early_scatter;
+    if (tells && at.fault != host_fault::no_scatter)
+      at.recorder.scatter(i, at.depth, at.fault == host_fault::local_scatter ? local : drawn.wi,
+                          drawn.is_delta ? wfpg::no_field : mixture.number);
     at.checker.scatter(i, at.depth, guide, mixture, step);
     // Next-event estimation would weight a ray to the lamp with this density.
     const vec3 lamp = glm::normalize(vec3(0.8f, 1.0f, 0.8f) - path.position);
@@ -336,7 +345,7 @@ wfpg::buffer<host_path, Exec> trace_sample(const Exec& exec, wfpg::path_guider<E
     const wave_state at{paths.view(), guider.recorder(), checker, guider.guide().cache(),
                         depth,        what.seed,         what.in, what.fault};
     exec.for_each(what.paths, find_hits{at});
-    const wfpg::guide_view guide = guider.prepare(depth, box_caster{what.in.open});
+    const wfpg::guide_view guide = guider.prepare(depth, caster_of(what.in));
     exec.for_each(what.paths, shade<diffuse_kernel_bsdf>{at, guide});
     exec.for_each(what.paths, shade<coated_kernel_bsdf>{at, guide});
     exec.for_each(what.paths, shade<glossy_kernel_bsdf>{at, guide});

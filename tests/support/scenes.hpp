@@ -135,11 +135,12 @@ struct box_mesh {
 /// Inline caster: returns the face that a ray from inside the unit box hits. With `open_top`, rays leave
 /// through y = 1 and see an environment of radiance 5.
 struct box_caster {
-  bool open_top = false;
+  bool open_top = false;     ///< to a bright sky
+  bool open_bottom = false;  ///< to the dark
 
   WFPG_HD wfpg::ray_hit operator()(const wfpg::ray& r) const {
     float nearest = r.t_max;
-    bool hits = false, leaves = false;
+    bool hits = false, leaves = false, falls = false;
     for (int axis = 0; axis < 3; ++axis) {
       if (r.direction[axis] == 0.0f) continue;
       const float face = r.direction[axis] > 0.0f ? 1.0f : 0.0f;
@@ -148,8 +149,10 @@ struct box_caster {
       nearest = t;
       hits = true;
       leaves = open_top && axis == 1 && face == 1.0f;
+      falls = open_bottom && axis == 1 && face == 0.0f;
     }
     if (leaves) return {-1.0f, 5.0f};
+    if (falls) return {-1.0f, 0.0f};
     return {hits ? nearest : -1.0f, 0.0f};
   }
 };

@@ -29,6 +29,8 @@ namespace wfpg {
 
 namespace detail {
 
+struct close_path;
+
 /// Position of a vertex. 16 bytes, so that a thread writes it with one store.
 struct alignas(16) recorded_place {
   vec3 position;           ///< world space
@@ -89,6 +91,8 @@ class path_recorder_view {
   WFPG_HD std::size_t recorded() const { return recorded_; }
   /// Whether scatter() and escape() are recorded. Without it, recorded_path knows no directions.
   WFPG_HD bool records_directions() const { return directions_ != nullptr; }
+  /// Whether a direction of which nothing more is heard has found no light: path_recorder::close_paths().
+  WFPG_HD bool silent_escapes() const { return silent_escapes_; }
   /// Writes the place of a path among the recorded ones. False where this sample does not record the path.
   WFPG_HD bool has_place(std::size_t path, std::uint32_t& place) const {
     return path < paths_ && recorded_ > 0 && runs_.find(path, place);
@@ -135,7 +139,8 @@ class path_recorder_view {
   }
 
   /// Records that the path left the scene: the environment becomes its vertex `depth`, the last one. Call it
-  /// for dark environments too, so that guides learn that no light comes from there. `throughput` is the
+  /// for dark environments too, so that guides learn that no light comes from there. A host without such an
+  /// event sets sampling_options::silent_escapes instead. `throughput` is the
   /// path's as it leaves the scene. Report the environment's radiance with emission(). Ignored where
   /// directions are not recorded, and at the depth max_depth().
   WFPG_HD void escape(std::size_t path, std::uint32_t depth, path_light throughput) const {
@@ -167,8 +172,10 @@ class path_recorder_view {
     vec3 known(0.0f);
     const std::uint32_t length = lengths_[place] & length_mask;
     for (std::uint32_t i = 0; i < length; ++i) known += light_[i * recorded_ + place].contribution;
+    const vec3 found = glm::max(sum.rgb - known, vec3(0.0f));
+    if (depth >= length && found != vec3(0.0f)) hear(place);
     // Light of a medium counts for the surface before.
-    if (length > 0) add(place, min(depth, length - 1u), glm::max(sum.rgb - known, vec3(0.0f)));
+    if (length > 0) add(place, min(depth, length - 1u), found);
   }
 
   /// Adds the radiance of an emitter that the path hit as vertex `depth`. Also that of the environment, where
@@ -181,6 +188,7 @@ class path_recorder_view {
     if (!find(path, place)) return;
     const std::uint32_t length = lengths_[place] & length_mask;
     if (include_emission_ && depth < length) return add(place, depth, contribution.rgb);
+    if (depth >= length) hear(place);
     const std::uint32_t before = min(depth, length);
     if (before > 0) add(place, before - 1, contribution.rgb);
   }
@@ -189,9 +197,12 @@ class path_recorder_view {
   template <class Exec>
   friend class path_recorder;
   friend class recorded_path;
+  friend struct detail::close_path;
 
-  // Flags in a path's length: its last vertex is the environment; some of its vertices are gaps.
-  static constexpr std::uint32_t escaped = 0x80000000u, gaps = 0x40000000u, length_mask = gaps - 1u;
+  // Flags in a path's length: its last vertex is the environment; some of its vertices are gaps; light came
+  // from beyond its last vertex.
+  static constexpr std::uint32_t escaped = 0x80000000u, gaps = 0x40000000u, heard = 0x20000000u,
+                                 length_mask = heard - 1u;
   // Indices of counters_.
   enum : std::uint32_t { counter_dropped, counter_gaps, counters };
 
@@ -213,6 +224,15 @@ class path_recorder_view {
   WFPG_HD std::uint32_t length_of_surfaces(std::uint32_t place) const {
     return lengths_[place] & escaped ? ~0u : lengths_[place] & length_mask;
   }
+  /// Lets a path escape into the dark, if nothing was heard of its last direction. There is no throughput
+  /// beyond, since nothing is to be attenuated.
+  WFPG_HD void close(std::uint32_t place) const {
+    const std::uint32_t flags = lengths_[place], length = flags & length_mask;
+    if ((flags & (escaped | heard)) != 0 || length == 0 || length >= max_depth_) return;
+    if (directions_[(length - 1) * recorded_ + place].direction == 0) return;
+    light_[length * recorded_ + place] = {vec3(0.0f), vec3(0.0f)};
+    lengths_[place] = (length + 1) | escaped | (flags & gaps);
+  }
   /// Writes one vertex, without a direction yet.
   WFPG_HD void write_vertex(std::uint32_t place, std::uint32_t depth, const detail::recorded_place& at,
                             const detail::recorded_light& light) const {
@@ -220,6 +240,10 @@ class path_recorder_view {
     places_[slot] = at;
     light_[slot] = light;
     if (records_directions()) directions_[slot] = {no_field, 0};
+  }
+  /// Notes that the last direction has found something. Only silent escapes ask for it.
+  WFPG_HD void hear(std::uint32_t place) const {
+    if (silent_escapes_) lengths_[place] |= heard;
   }
   /// Adds to a recorded surface or environment. `place` is what find() wrote. Needs no atomic, since a path's
   /// calls come from one thread.
@@ -233,6 +257,7 @@ class path_recorder_view {
   detail::recorded_runs runs_;
   std::uint32_t max_depth_ = 0;
   bool include_emission_ = true;
+  bool silent_escapes_ = false;
   // A length for each recorded path: its number of vertices, with the flags above.
   std::uint32_t* lengths_ = nullptr;
   // Vertices, at depth * recorded_ + place: neighbouring threads write neighbouring elements.
@@ -281,7 +306,18 @@ struct path_recorder_settings {
   std::uint32_t fraction_shift = 0;  ///< one path in 2^fraction_shift is recorded
   bool directions = false;           ///< scatter() and escape() are recorded, for guides that learn from them
   bool waves = false;                ///< the last vertex of every path is recorded too, recorded or not
+  bool silent_escapes = false;       ///< close_paths() lets paths escape of which nothing more was heard
 };
+
+namespace detail {
+
+/// Kernel: lets a path escape if nothing was heard of its last direction.
+struct close_path {
+  path_recorder_view paths;
+  WFPG_HD void operator()(std::size_t place) const { paths.close(static_cast<std::uint32_t>(place)); }
+};
+
+}  // namespace detail
 
 /// Owns the memory of recorded paths. Movable, not copyable; the policy's memory must outlive it.
 template <class Exec>
@@ -303,6 +339,7 @@ class path_recorder {
     view_.runs_.shift = settings.fraction_shift;
     view_.max_depth_ = settings.max_depth;
     view_.include_emission_ = settings.include_emission;
+    view_.silent_escapes_ = settings.silent_escapes;
     view_.lengths_ = lengths_.data();
     view_.places_ = places_.data();
     view_.light_ = light_.data();
@@ -338,6 +375,13 @@ class path_recorder {
   /// Clears the recorded paths: each has no vertices then. Writes 4 bytes a path.
   void clear(const Exec& exec) {
     exec.fill_bytes(lengths_.data(), 0, view_.recorded_ * sizeof(std::uint32_t));
+  }
+
+  /// Ends the paths of hosts that do not call escape(). Where nothing was heard after the last scatter(), the
+  /// path left the scene and found no light. Does nothing without path_recorder_settings::silent_escapes, or
+  /// without directions. Call it after the sample's waves, before a guide reads the paths. O(recorded()).
+  void close_paths(const Exec& exec) {
+    if (view_.silent_escapes() && records_directions()) exec.for_each(recorded(), detail::close_path{view_});
   }
 
   /// Number of dropped calls since construction, modulo 2^32; path_recorder_view lists the cases. Waits for

@@ -37,6 +37,13 @@ struct sampling_options {
   /// path of max_paths.
   /// Each wave then has max_paths rays, so leave max_rays unset.
   bool records_waves = false;
+  /// The host does not call path_recorder_view::escape(). A direction of which nothing more is heard has
+  /// found no light. For hosts without environment, or with a dark one.
+  ///
+  /// Tell scatter() only of rays that are traced. So call it after roulette, and not where a path may end in
+  /// a medium. Each hit must be told to vertex(), or its light to emission() or total(). Directions of paths
+  /// that end for other reasons would be learnt as dark.
+  bool silent_escapes = false;
   /// Most rays of a wave, less than 2^32 - 1. Larger waves throw std::invalid_argument. Unset: max_paths.
   std::optional<std::size_t> max_rays;
 };

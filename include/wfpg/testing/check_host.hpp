@@ -139,7 +139,8 @@ class host_checker_view {
 ///                compared with others of their depth and of their throughput without a guide
 ///   narrow       a BSDF with a narrow lobe, or with a delta lobe of a quarter of its samples or more, does
 ///                not get the guide's full fraction
-///   escapes      where the next ray of a path misses, the recorder knows that the path escaped
+///   escapes      where the next ray of a path misses, the recorder knows that the path escaped. With
+///                sampling_options::silent_escapes, scatter() is told of no direction of a path that ended
 ///   radiance     a path's recorded contributions add up to what it brought to its pixel
 ///   directions   scatter(), `outgoing` of vertex() and host_step::wi are the directions between vertices
 ///   densities    the host's densities, of directions and of queries, are those of the mixture

@@ -67,9 +67,10 @@ void host_checker<Exec>::end_sample(const path_recorder_view& recorder, const Ca
   exec_.fill_bytes(vertices.data(), 0, vertices.bytes());
   exec_.for_each(recorder.paths(), read_recorded_path{recorder, paths.view(), vertices.view()});
 
-  const std::vector<ray> rays = findings_.add(
-      {steps_.to_host(exec_), queries_.to_host(exec_), lights_.to_host(exec_), paths.to_host(exec_),
-       vertices.to_host(exec_), recorder.max_depth(), recorder.records_directions()});
+  const std::vector<ray> rays =
+      findings_.add({steps_.to_host(exec_), queries_.to_host(exec_), lights_.to_host(exec_),
+                     paths.to_host(exec_), vertices.to_host(exec_), recorder.max_depth(),
+                     recorder.records_directions(), recorder.silent_escapes()});
   if (!rays.empty()) {
     const buffer<ray, Exec> device(exec_, rays);
     const buffer<ray_hit, Exec> hits(exec_, rays.size());

@@ -166,6 +166,7 @@ class host_findings {
     std::vector<checked_vertex> vertices;  ///< those of one place side by side
     std::uint32_t recorder_depth = 0;
     bool has_directions = false;
+    bool silent_escapes = false;  ///< the host need not tell of escapes
 
     const logged_step& step(std::size_t path, std::size_t depth) const {
       return steps[depth * lights.size() + path];
@@ -222,6 +223,9 @@ class host_findings {
     if (silent_.are_many(exceptions_))
       add(sentence("directions are not told at ", silent_,
                    " recorded vertices; call recorder.scatter() wherever a path goes on"));
+    if (untraced_.are_many(exceptions_))
+      add(sentence("recorder.scatter() is told of directions that ended paths did not take at ", untraced_,
+                   " vertices; with silent_escapes, call it after roulette"));
     if (outgoing_.are_many(exceptions_))
       add(sentence(
           "recorder.vertex() has an outgoing direction that does not point to the previous vertex at ",
@@ -288,7 +292,7 @@ class host_findings {
         if (vertices[depth].has(checked_vertex::is_surface)) add_directions(s, path, vertices, depth, near);
       if (path.vertices > path.surfaces)
         ++escapes_;
-      else if (!media_)  // there a ray that misses may not have left the scene
+      else if (!media_ && !s.silent_escapes)  // in media a ray that misses may not have left the scene
         add_ray(s, path, vertices[path.surfaces - 1], 0.1f * near, rays);
     }
     return rays;
@@ -328,6 +332,9 @@ class host_findings {
     const logged_step& step = depth < s.depths() ? s.step(path.path, depth) : none;
     const bool scattered = here.has(checked_vertex::has_scattered);
     if (step.has(logged_step::goes_on)) silent_.add(!scattered);
+    // Of directions that were not traced nothing is heard, and the guide would take them for dark.
+    else if (s.silent_escapes && step.has(logged_step::is_logged) && depth + 1 < s.recorder_depth)
+      untraced_.add(scattered);
 
     // The way to the next vertex is what the path took. A gap between the two hides it.
     if (depth + 1 >= path.surfaces || !vertices[depth + 1].has(checked_vertex::is_surface)) return;
@@ -366,7 +373,8 @@ class host_findings {
   float tolerance_ = 0.0f;
   double exceptions_ = 0.0;
   roulette_groups roulette_;
-  counted_faults narrow_, deltas_, radiance_, scatters_, silent_, outgoing_, steps_, densities_, queries_;
+  counted_faults narrow_, deltas_, radiance_, scatters_, silent_, untraced_, outgoing_, steps_, densities_,
+      queries_;
   double recorded_sum_ = 0.0, told_sum_ = 0.0;  // of the paths whose sums differ
   std::size_t unheard_ = 0, escapes_ = 0;
   pixel_variances pixels_;
