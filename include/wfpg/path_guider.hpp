@@ -68,7 +68,7 @@ class path_guider {
 
   /// Makes a guider over another scene that the guide's constructor takes. The octree's guides take
   /// voxel_fragments<Exec>: those of geometry that is not triangles, or of hit points
-  /// (fragments_from_samples). irradiance_records takes a lit_scene. Throws as the constructor over
+  /// (fragments_from_hits). irradiance_records takes a lit_scene. Throws as the constructor over
   /// triangles.
   template <class Scene, class = std::enable_if_t<std::is_constructible_v<Guide, const Exec&, const Exec&,
                                                                           Scene, const options_type&>>>

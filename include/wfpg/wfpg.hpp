@@ -63,6 +63,7 @@
 #include <wfpg/octree/bottom_up.hpp>
 #include <wfpg/octree/exitance_cache.hpp>
 #include <wfpg/octree/fragments_from_caster.hpp>
+#include <wfpg/octree/fragments_from_hits.hpp>
 #include <wfpg/octree/sparse_voxel_octree.hpp>
 #include <wfpg/octree/statistics.hpp>
 #include <wfpg/octree/surface_collector.hpp>

@@ -1,7 +1,10 @@
 // The host that docs/hosts.md talks about, and its kernel as it stands there.
 #include <wfpg/base/types.hpp>
 #include <wfpg/exec/tbb.hpp>
+#include <wfpg/guide/path_recorder.hpp>
+#include <wfpg/guides/octree/deposit_paths.hpp>
 #include <wfpg/octree/fragments_from_caster.hpp>
+#include <wfpg/octree/fragments_from_hits.hpp>
 #include <wfpg/octree/surface_collector.hpp>
 #include <wfpg/octree/svo_ray_caster.hpp>
 #include <wfpg/path_guider.hpp>
@@ -60,7 +63,7 @@ void shade(const scene&, std::vector<path>&, std::uint32_t depth, const wfpg::gu
            const wfpg::path_recorder_view&);
 
 struct tracer {
-  void render_unguided_sample(const wfpg::surface_collector_view& hits);
+  void render_unguided_sample(const wfpg::surface_collector_view& hits, const wfpg::path_recorder_view&);
   template <class Guider, class Caster>
   void trace_sample(Guider&, const Caster&, const wfpg::testing::host_checker_view&) {}
 };

@@ -4,9 +4,13 @@
 
 #include "tracer/unguided.hpp"
 
+#include <wfpg/guide/path_recorder.hpp>
+#include <wfpg/guides/octree/deposit_paths.hpp>
+#include <wfpg/octree/fragments_from_hits.hpp>
 #include <wfpg/octree/surface_collector.hpp>
-#include <wfpg/octree/voxelizer.hpp>
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
@@ -35,7 +39,11 @@ class collecting_guider {
       : exec_(exec),
         options_(options),
         unguided_(exec),
-        hits_(std::in_place, exec, options.max_paths * options.max_depth) {}
+        hits_(std::in_place, exec, options.max_paths * options.max_depth),
+        first_(exec, first_settings(options)) {
+    // The first sample has no octree, whatever the options say.
+    options_.unguided_samples = std::max(options.unguided_samples, 1u);
+  }
 
   /// The guider. Precondition: a sample has ended.
   Guider& guider() { return *guider_; }
@@ -47,15 +55,12 @@ class collecting_guider {
     if (guider_) return guider_->end_sample();
     const auto samples = hits_->samples(exec_);
     const wfpg::bounds3 box = wfpg::bounds_of_samples(exec_, samples.view());
-    guider_.emplace(exec_,
-                    wfpg::fragments_from_samples(exec_, samples.view(), options_.octree_resolution, box),
+    guider_.emplace(exec_, wfpg::fragments_from_hits(exec_, samples.view(), options_.octree_resolution, box),
                     options_);
     hits_.reset();
+    learn_first_sample();
   }
-  auto recorder() const {
-    using recorder_type = decltype(guider_->recorder());
-    return guider_ ? guider_->recorder() : recorder_type();
-  }
+  auto recorder() const { return guider_ ? guider_->recorder() : first_.view(); }
   auto lights() const { return guider_ ? guider_->lights() : wfpg::light_guide_view(); }
 
   template <class Wave, class Caster, class... Queries>
@@ -68,10 +73,29 @@ class collecting_guider {
   }
 
  private:
+  /// The guider's first sample is the one that was traced without it.
+  void learn_first_sample() {
+    guider_->begin_sample();
+    // A deposit beyond the guider's own would be dropped, on several threads at random.
+    if (first_.recorded() <= guider_->recorder().recorded())
+      wfpg::deposit_paths(exec_, first_, guider_->guide().cache());
+    guider_->end_sample();
+    first_ = {};
+  }
+
+  /// A recorder of about 2^18 vertices.
+  static wfpg::path_recorder_settings first_settings(const options_type& options) {
+    wfpg::path_recorder_settings settings{options.max_paths, options.max_depth, options.include_emission};
+    while (options.max_paths * options.max_depth >> settings.fraction_shift > 1u << 18)
+      ++settings.fraction_shift;
+    return settings;
+  }
+
   Exec exec_;
   options_type options_;
   unguided<Exec> unguided_;
   std::optional<wfpg::surface_collector<Exec>> hits_;  // until the first sample ends
+  wfpg::path_recorder<Exec> first_;                    // of the first sample's paths
   std::optional<Guider> guider_;                       // from then on
 };
 

@@ -1,12 +1,12 @@
 // Collects the surfaces that a host's paths hit, for hosts that have neither triangles in hand nor rays to
-// spare. The host's kernels write the hits of its first, unguided sample. fragments_from_samples() then makes
+// spare. The host's kernels write the hits of its first, unguided sample. fragments_from_hits() then makes
 // the octree's fragments from them:
 //
 //   surface_collector<Exec> hits(exec, pixels * max_depth);
 //   ...                                           kernels call hits.view().add(slot, position, normal)
 //   const auto samples = hits.samples(exec);
 //   const auto box = bounds_of_samples(exec, samples.view());
-//   path_guider<Exec> guider(exec, fragments_from_samples(exec, samples.view(), resolution, box), options);
+//   path_guider<Exec> guider(exec, fragments_from_hits(exec, samples.view(), resolution, box), options);
 //
 // Source: none.
 // Cost: a call writes 28 bytes. Memory: 28 bytes a slot, and 28 a hit of samples().
@@ -36,7 +36,7 @@ class surface_collector_view {
   WFPG_HD std::size_t capacity() const { return slots_.size(); }
   /// Writes a hit into a slot, such as path + depth * paths. A later call for the slot replaces an earlier
   /// one. `position` is in world space; `normal` has unit length, and may point to either side. A slot from
-  /// capacity() on is dropped and counted. Values that are not finite stay, and fragments_from_samples()
+  /// capacity() on is dropped and counted. Values that are not finite stay, and fragments_from_hits()
   /// counts them.
   ///
   /// Precondition: one thread at a time writes a slot.
@@ -75,12 +75,12 @@ class surface_collector {
   buffer<std::uint32_t, Exec> dropped_;   // a single counter
 };
 
-/// Returns the box around most samples, for fragments_from_samples(). It leaves out what is far away, so that
+/// Returns the box around most samples, for fragments_from_hits(). It leaves out what is far away, so that
 /// an instance on the horizon does not make all other voxels too large.
 ///
 /// On each axis a part `outliers` of the samples is set aside at either end. The box around the others grows
 /// by its longest side in all directions. The result is the box around all samples in it. Samples outside
-/// the result are dropped by fragments_from_samples(), and counted as `out_of_range`.
+/// the result are dropped by fragments_from_hits(), and counted as `out_of_range`.
 ///
 /// `outliers`: in [0, 0.5); with 0 the box holds all samples. Positions that are not valid are left out.
 /// Without a valid one the result is empty. O(samples · log samples) time, 4 bytes a sample. Throws

@@ -41,7 +41,7 @@ class kept_guide : public octree_scene<Exec> {
              const kept_guide_options& options)
       : kept_guide(exec, working, scene::fragments_of(exec, mesh, checked(options)), options) {}
   /// Builds the guide over fragments: of geometry that is not triangles, or of hit points
-  /// (fragments_from_samples). Throws as the other constructor does.
+  /// (fragments_from_hits). Throws as the other constructor does.
   kept_guide(const Exec& exec, const Exec& working, voxel_fragments<Exec> fragments,
              const kept_guide_options& options)
       : scene(exec, working, std::move(fragments), checked(options)),

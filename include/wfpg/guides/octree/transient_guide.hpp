@@ -58,7 +58,7 @@ class transient_guide : public octree_scene<Exec> {
                   const transient_guide_options& options)
       : transient_guide(exec, working, scene::fragments_of(exec, mesh, checked(options)), options) {}
   /// Builds the guide over fragments: of geometry that is not triangles, or of hit points
-  /// (fragments_from_samples). Throws as the other constructor does.
+  /// (fragments_from_hits). Throws as the other constructor does.
   transient_guide(const Exec& exec, const Exec& working, voxel_fragments<Exec> fragments,
                   const transient_guide_options& options)
       : scene(exec, working, std::move(fragments), checked(options)),

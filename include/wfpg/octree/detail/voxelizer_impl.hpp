@@ -254,6 +254,12 @@ struct sample_bounds {
   }
 };
 
+/// Whether a sample's normal and area are those of a surface.
+WFPG_HD inline bool is_surface_sample(const surface_fragment& s) {
+  const float length = is_finite(s.normal) ? glm::length(s.normal) : 0.0f;
+  return is_finite(s.area) && s.area > 0.0f && fabsf(length - 1.0f) < 1.0e-2f;
+}
+
 /// Flags the samples that are used (1) and counts the others by reason.
 struct check_samples {
   array_view<const surface_fragment> samples;
@@ -263,19 +269,23 @@ struct check_samples {
 
   WFPG_HD void operator()(std::size_t i) const {
     const surface_fragment s = samples[i];
-    const float length = is_finite(s.normal) ? glm::length(s.normal) : 0.0f;
     uvec3 voxel;
     used[i] = 0;
     if (!is_valid_position(s.position))
       atomic_add(counters + counter_non_finite, 1);
     else if (!grid.voxel_of(s.position, voxel))
       atomic_add(counters + counter_out_of_range, 1);
-    else if (!is_finite(s.area) || s.area <= 0.0f || !(fabsf(length - 1.0f) < 1.0e-2f))
+    else if (!is_surface_sample(s))
       atomic_add(counters + counter_degenerate, 1);
     else
       used[i] = 1;
   }
 };
+
+/// Voxel of a position that was found to be in the grid. Another kernel may round it differently.
+WFPG_HD inline uvec3 clamped_voxel(const voxel_grid& grid, vec3 p) {
+  return uvec3(glm::clamp(grid.to_grid(p), 0.0f, static_cast<float>(grid.resolution - 1)));
+}
 
 /// Writes the fragments of the samples that are used, in the samples' order.
 struct emit_samples {
@@ -288,9 +298,7 @@ struct emit_samples {
   WFPG_HD void operator()(std::size_t i) const {
     const std::uint64_t at = i ? used_prefix[i - 1] : 0;
     if (used_prefix[i] == at) return;
-    const vec3 g =
-        glm::clamp(grid.to_grid(samples[i].position), 0.0f, static_cast<float>(grid.resolution - 1));
-    codes[at] = morton_encode(uvec3(g));
+    codes[at] = morton_encode(clamped_voxel(grid, samples[i].position));
     surfaces[at] = {pack_direction(glm::normalize(samples[i].normal)), samples[i].area};
   }
 };
