@@ -145,14 +145,14 @@ TEST_CASE("light vertices' options have ranges", "[light_vertices]") {
   CHECK_THROWS_AS(stored.reserve(exec, too_few.view()), std::invalid_argument);
 }
 
-TEST_CASE("light vertices free what they have where memory runs out", "[light_vertices]") {
+WFPG_TEST_CASE("light vertices free what they have where memory runs out", "[light_vertices]") {
   failing_resource resource;
-  const wfpg::exec::seq exec(&resource);
+  const Exec exec = Exec().with_resource(&resource);
   std::size_t failures = 0;
   for (std::size_t k = 1;; ++k) {
     resource.fail_at(k);
     const bool out = runs_out(resource, [&] {
-      wfpg::light_vertices<wfpg::exec::seq, test_vertex> vertices(exec, {50, 1 << 20, 2});
+      wfpg::light_vertices<Exec, test_vertex> vertices(exec, {50, 1 << 20, 2});
       store_all(exec, vertices, random_paths{1}, 2);
     });
     CHECK(resource.live() == 0);
