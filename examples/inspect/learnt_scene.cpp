@@ -28,11 +28,6 @@ const render::render_options& checked(const render::render_options& options) {
   return options;
 }
 
-render::tracer_settings settings_of(const render::render_options& options) {
-  return {options.width, options.height, static_cast<std::uint32_t>(options.max_depth), options.seed,
-          static_cast<std::uint32_t>(options.roulette_depth)};
-}
-
 /// The surfaces of a wave with a ray for each pixel.
 struct hit_surfaces {
   const render::hit_surface* hits;
@@ -93,8 +88,8 @@ struct learnt_scene::state {
   }
 
   void learn(const render::progress_callback& progress) {
-    tracer_type tracer(exec, settings_of(options), {geometry.view(), lights.view(), options.nee},
-                       accelerated.caster());
+    tracer_type tracer(exec, render::tracer_settings_of(options),
+                       {geometry.view(), lights.view(), options.nee}, accelerated.caster());
     std::visit([&](auto& g) { render::take_samples(tracer, g, camera, options, progress, rendering); },
                guider);
     rendering.picture = {options.width, options.height, tracer.film().picture()};
@@ -213,7 +208,7 @@ incident_light learnt_scene::arriving(const render::hit_surface& at, const direc
   incident_light light;
   for (render::image* picture : {&light.first, &light.second}) {
     const bool is_second = picture == &light.second;
-    render::tracer_settings settings = settings_of(s.options);
+    render::tracer_settings settings = render::tracer_settings_of(s.options);
     settings.width = settings.height = side;
     --settings.max_depth;
     settings.seed += reference_seed + (is_second ? 1 : 0);

@@ -66,6 +66,19 @@ inline std::uint32_t guided_depths(const render_options& options) {
   return options.nee ? std::min(options.guided_depths, all_but_last) : options.guided_depths;
 }
 
+/// What every tracer is told.
+inline tracer_settings tracer_settings_of(const render_options& options) {
+  return {options.width,
+          options.height,
+          static_cast<std::uint32_t>(options.max_depth),
+          options.seed,
+          static_cast<std::uint32_t>(options.roulette_depth),
+          techniques_of(options),
+          options.light_memory,
+          options.merge_radius,
+          options.radius_alpha};
+}
+
 /// What every guide is told.
 inline wfpg::sampling_options sampling_options_of(const render_options& options) {
   wfpg::sampling_options guided;
@@ -180,18 +193,9 @@ render_result render_by(const Exec& exec, const scene& scene, const render_optio
   std::unique_ptr<const Accelerated> accelerated;
   building.measure(Accelerated::name,
                    [&] { accelerated = std::make_unique<const Accelerated>(exec, scene, geometry.view()); });
-  const tracer_settings settings{options.width,
-                                 options.height,
-                                 static_cast<std::uint32_t>(options.max_depth),
-                                 options.seed,
-                                 static_cast<std::uint32_t>(options.roulette_depth),
-                                 techniques_of(options),
-                                 options.light_memory,
-                                 options.merge_radius,
-                                 options.radius_alpha};
   using caster_type = decltype(accelerated->caster());
-  Tracer<Exec, caster_type> tracer(exec, settings, {geometry.view(), lights.view(), options.nee},
-                                   accelerated->caster());
+  Tracer<Exec, caster_type> tracer(exec, tracer_settings_of(options),
+                                   {geometry.view(), lights.view(), options.nee}, accelerated->caster());
   const pinhole camera(scene.view, options.width, options.height);
   const render_state before = begin_state(scene, options);
   if (before.samples > 0) tracer.film().restore(before.film);
