@@ -289,6 +289,7 @@ TEST_CASE("each technique that can find all light has the mean of path tracing",
   check_rendering(with("cornell-box", "nee+connect"));
   check_rendering(with("cornell-box", "connect+splat"));
   check_rendering(with("glossy-room", "splat"));
+  check_rendering(with("caustic-pool", "hits+splat"));  // its camera is in the water
   check_rendering({"cornell-box", true, sampling_method::lt});
 }
 

@@ -58,8 +58,11 @@
 #include <wfpg/host/ray_caster.hpp>
 #include <wfpg/host/wave.hpp>
 #include <wfpg/light/box_tree.hpp>
+#include <wfpg/light/light_vertices.hpp>
 #include <wfpg/light/path_weights.hpp>
+#include <wfpg/light/photon_estimators.hpp>
 #include <wfpg/light/photon_map.hpp>
+#include <wfpg/light/splats.hpp>
 #include <wfpg/octree/bottom_up.hpp>
 #include <wfpg/octree/exitance_cache.hpp>
 #include <wfpg/octree/fragments_from_caster.hpp>

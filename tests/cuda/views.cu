@@ -87,6 +87,19 @@ __global__ void use_photon_map(wfpg::photon_map_view map, wfpg::vec3 at, float* 
   map.for_each_point(at, [&](std::uint32_t index) { out[index] += map.radius(); });
 }
 
+__global__ void use_light_paths(wfpg::light_vertices_view<float> vertices, wfpg::splat_view splats) {
+  if (vertices.has_place(0)) vertices.write(0, 1.0f);
+  splats.add(0, vertices.last(0), wfpg::vec3(vertices[vertices.previous(0)]));
+  splats.skip(1);
+}
+
+__global__ void use_photon_estimators(wfpg::path_beam camera, wfpg::path_beam light, float* out) {
+  constexpr auto kernel = wfpg::merge_kernel::epanechnikov;
+  out[0] = wfpg::beam_beam_merge(kernel, camera, light, 1.0f).kernel +
+           wfpg::beam_point_merge(kernel, camera, light.origin, 1.0f).kernel +
+           wfpg::point_merge<3>(kernel, camera.origin, light.origin, wfpg::radius_schedule{1.0f}(2)).kernel;
+}
+
 __global__ void use_medium(wfpg::homogeneous_medium medium, wfpg::henyey_greenstein phase, float* out) {
   const auto drawn = medium.sample(0.25f, 0.5f, 1.0f);
   const auto turned = phase.sample(wfpg::vec3(0, 0, 1), wfpg::vec2(0.5f));

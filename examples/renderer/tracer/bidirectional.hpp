@@ -15,9 +15,9 @@
 #include "tracer/wavefront.hpp"
 
 #include <wfpg/host/ray_caster.hpp>
+#include <wfpg/light/photon_estimators.hpp>
 #include <wfpg/light/photon_map.hpp>
 
-#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -89,9 +89,9 @@ class bidirectional_tracer {
 
   /// Of a sample's merges. A scene without extent has any.
   float radius_of(std::uint32_t sample) const {
-    const float shrinks = std::pow(static_cast<float>(sample) + 1.0f, 0.5f * (settings_.radius_alpha - 1.0f));
-    return glm::max(settings_.merge_radius * shrinks * world_.lights.scene_radius,
-                    wfpg::photon_map<Exec>::least_radius);
+    const wfpg::radius_schedule radius{settings_.merge_radius * world_.lights.scene_radius,
+                                       settings_.radius_alpha, 2};
+    return glm::max(radius(sample + 1), wfpg::photon_map<Exec>::least_radius);
   }
 
   void build_photon_map(float radius) {
