@@ -57,6 +57,7 @@
 #include <wfpg/host/phase.hpp>
 #include <wfpg/host/ray_caster.hpp>
 #include <wfpg/host/wave.hpp>
+#include <wfpg/light/beam_map.hpp>
 #include <wfpg/light/box_tree.hpp>
 #include <wfpg/light/light_vertices.hpp>
 #include <wfpg/light/path_weights.hpp>

@@ -87,6 +87,13 @@ __global__ void use_photon_map(wfpg::photon_map_view map, wfpg::vec3 at, float* 
   map.for_each_point(at, [&](std::uint32_t index) { out[index] += map.radius(); });
 }
 
+__global__ void use_beam_map(wfpg::beam_map_view beams, wfpg::photon_map_view points, wfpg::path_beam camera,
+                             float* out) {
+  const auto add = [&](std::uint32_t index, const wfpg::merge_geometry& at) { out[index] += at.kernel; };
+  beams.for_each_beam_along(camera, wfpg::merge_kernel::constant, add);
+  points.for_each_point_along(camera, wfpg::merge_kernel::constant, add);
+}
+
 __global__ void use_light_paths(wfpg::light_vertices_view<float> vertices, wfpg::splat_view splats) {
   if (vertices.has_place(0)) vertices.write(0, 1.0f);
   splats.add(0, vertices.last(0), wfpg::vec3(vertices[vertices.previous(0)]));

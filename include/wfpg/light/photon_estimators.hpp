@@ -77,6 +77,15 @@ struct path_beam {
 
   /// Whether a distance from the origin lies in the interval.
   WFPG_HD bool holds(float t) const { return t >= begin && t < end; }
+  /// Returns the interval as a ray, for queries of trees.
+  WFPG_HD ray as_ray() const {
+    ray along;
+    along.origin = origin;
+    along.direction = direction;
+    along.t_min = begin;
+    along.t_max = end;
+    return along;
+  }
 };
 
 /// A photon at a distance from a camera beam. The distance is that to the beam's line, and the photon merges

@@ -1,10 +1,11 @@
-// Photons on surfaces, found by distance: all within one radius of a point, as vertex merging needs them. The
+// Photons on surfaces or in media, found by distance: all within one radius of a point or of a beam. The
 // radius is that of an iteration, and the map is built anew for each.
 //
 //   photon_map<Exec> map;
 //   map.build(exec, positions, radius);           // positions[i] is that of the photon with index i
 //   const photon_map_view view = map.view();      // for kernels
 //   view.for_each_point(p, [&](std::uint32_t i) { ... });
+//   view.for_each_point_along(camera, kernel, [&](std::uint32_t i, const merge_geometry& at) { ... });
 //
 // The map is a box_tree over the photons' spheres, with up to seven of them a leaf. Positions are stored in
 // the tree's order, so that a leaf's photons are next to each other. What a photon carries stays the host's,
@@ -23,6 +24,7 @@
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/host/geometry.hpp>
 #include <wfpg/light/box_tree.hpp>
+#include <wfpg/light/photon_estimators.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -31,7 +33,7 @@ namespace wfpg {
 
 namespace detail {
 
-/// The box around each photon's sphere.
+/// Returns the box around each photon's sphere.
 struct photon_boxes {
   array_view<const vec3> positions;
   float radius;
@@ -72,6 +74,20 @@ class photon_map_view {
     tree_.for_each_place(bounds3{p, p}, [&](std::uint32_t place) {
       const vec3 away = positions_[place] - p;
       if (glm::dot(away, away) <= radius_ * radius_) f(tree_.index(place));
+    });
+  }
+
+  /// Calls f(index, merge_geometry) for each photon that merges with a camera beam, once each: whose kernel
+  /// is not 0. The order depends on the photons and the beam's direction. A beam that is not finite merges
+  /// with none.
+  /// `camera`: an interval of a ray in one medium, begin at least 0.
+  /// `shape`: of the kernel, which merge_geometry has the value of.
+  template <class F>
+  WFPG_HD void for_each_point_along(const path_beam& camera, merge_kernel shape, const F& f) const {
+    tree_.nearest_first(camera.as_ray(), [&](std::uint32_t place, float&) {
+      const merge_geometry found = beam_point_merge(shape, camera, positions_[place], radius_);
+      if (found.kernel > 0.0f) f(tree_.index(place), found);
+      return false;
     });
   }
 

@@ -4,6 +4,7 @@
 
 #include <wfpg/base/octahedral_map.hpp>
 #include <wfpg/base/prefix_search.hpp>
+#include <wfpg/exec/support/sum_prefix.hpp>
 #include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/octree/fragments_from_hits.hpp>
 
@@ -133,7 +134,7 @@ voxel_fragments<Exec> fragments_from_hits(const Exec& exec, array_view<const sur
     exec.for_each(hits.size(),
                   detail::find_reaches{hits, own.grid, sorted.view(), reaches.view(), counts.view()});
   }
-  const std::uint64_t around = detail::sum_prefix(exec, counts);
+  const std::uint64_t around = sum_prefix(exec, counts);
   if (around == 0) return own;
   detail::require_fragment_count(own.size() + around);
   voxel_fragments<Exec> result(exec, own.size() + around);

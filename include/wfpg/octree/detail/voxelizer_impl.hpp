@@ -6,6 +6,7 @@
 #include <wfpg/base/error.hpp>
 #include <wfpg/base/octahedral_map.hpp>
 #include <wfpg/exec/support/atomic.hpp>
+#include <wfpg/exec/support/sum_prefix.hpp>
 #include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/octree/triangle_voxel.hpp>
 #include <wfpg/octree/voxelizer.hpp>
@@ -210,14 +211,6 @@ struct measure_fragments {
   }
 };
 
-/// Replaces counts by their inclusive sums. Returns the last sum, which is read back to the host.
-template <class Exec>
-std::uint64_t sum_prefix(const Exec& exec, buffer<std::uint64_t, Exec>& counts) {
-  if (counts.size() == 0) return 0;
-  ::thrust::inclusive_scan(exec.thrust(), counts.data(), counts.data() + counts.size(), counts.data());
-  return read_element(exec, counts.data() + counts.size() - 1);
-}
-
 /// Reads the counters back to the host.
 template <class Exec>
 build_report read_report(const Exec& exec, const buffer<std::uint32_t, Exec>& counters) {
@@ -317,7 +310,7 @@ voxel_fragments<Exec> voxelize(const Exec& exec, triangle_mesh_view mesh, std::u
   const buffer<detail::column_box, Exec> boxes(exec, n);
   buffer<std::uint64_t, Exec> items(exec, n);
   exec.for_each(n, detail::count_items{reader, boxes.view(), items.view(), counters.data()});
-  const std::uint64_t item_count = detail::sum_prefix(exec, items);
+  const std::uint64_t item_count = sum_prefix(exec, items);
   const buffer<std::uint32_t, Exec> triangles(exec, item_count);
   ::thrust::fill_n(exec.thrust(), triangles.data(), item_count, 0u);
   exec.for_each(n, detail::mark_first_items{items.view(), triangles.data()});
@@ -328,7 +321,7 @@ voxel_fragments<Exec> voxelize(const Exec& exec, triangle_mesh_view mesh, std::u
   const detail::item_columns columns{boxes.view(), items.view(), triangles.view(), runs.data()};
   buffer<std::uint64_t, Exec> counts(exec, item_count);
   exec.for_each(item_count, detail::find_runs{reader, columns, counts.view()});
-  const std::uint64_t fragment_count = detail::sum_prefix(exec, counts);
+  const std::uint64_t fragment_count = sum_prefix(exec, counts);
   detail::require_fragment_count(fragment_count);
 
   voxel_fragments<Exec> result(exec, fragment_count);
@@ -354,7 +347,7 @@ voxel_fragments<Exec> fragments_from_samples(const Exec& exec, array_view<const 
   const buffer<std::uint32_t, Exec> counters(exec, std::vector<std::uint32_t>(detail::counters, 0));
   buffer<std::uint64_t, Exec> used(exec, n);
   exec.for_each(n, detail::check_samples{samples, grid, used.view(), counters.data()});
-  voxel_fragments<Exec> result(exec, detail::sum_prefix(exec, used));
+  voxel_fragments<Exec> result(exec, sum_prefix(exec, used));
   exec.for_each(
       n, detail::emit_samples{samples, grid, used.view(), result.codes.view(), result.surfaces.view()});
   result.grid = grid;

@@ -1,6 +1,7 @@
 // Implementation of irradiance_records.hpp.
 #pragma once
 
+#include <wfpg/exec/support/sum_prefix.hpp>
 #include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/guides/records/irradiance_records.hpp>
 
@@ -223,7 +224,7 @@ detail::emitter_set irradiance_records<Exec, Smooth>::weigh(const Exec& exec,
   detail::emitter_set result;
   if (!(greatest > 0.0f)) return result;
   exec.for_each(emitters_.size(), detail::weigh_emitters{power, greatest, weights.data()});
-  result.total = detail::sum_prefix(exec, weights);
+  result.total = sum_prefix(exec, weights);
   result.emitters = emitters_;
   result.weights_prefix = weights.view();
   result.power_of_weight = greatest * 0x1p-24f;
