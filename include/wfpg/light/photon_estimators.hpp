@@ -36,13 +36,13 @@ enum class merge_kernel : std::uint8_t {
 
 /// Value of a kernel at a distance, whose square is given. `dimension`: 1 for distances between lines, 2 in a
 /// plane, 3 in space. Its integral over the ball of that dimension is 1. Unit: scene units to the power of
-/// minus `dimension`. 0 beyond the radius, and where the distance is NaN. Precondition: the radius is
+/// minus `dimension`. 0 beyond the radius, and where the distance is not finite. Precondition: the radius is
 /// positive.
 template <int dimension>
 WFPG_HD float merge_kernel_value(merge_kernel shape, float square, float radius) {
   static_assert(dimension >= 1 && dimension <= 3);
   const float limit = radius * radius;
-  if (!(square <= limit)) return 0.0f;
+  if (!is_finite(square) || square > limit) return 0.0f;
   const float ball = dimension == 1   ? 2.0f * radius
                      : dimension == 2 ? 3.14159265f * limit
                                       : 4.18879020f * limit * radius;
