@@ -21,7 +21,7 @@ struct tracer_settings {
   std::uint32_t max_depth = 8;  ///< segments of a path from the camera, at least 1
   std::uint64_t seed = 0;
   std::uint32_t roulette_depth = 3;  ///< Russian roulette begins at this vertex; the camera's first hit is 0
-  technique_set techniques;          ///< of paths from both ends
+  technique_set techniques = {};     ///< of paths from both ends
   std::size_t light_memory = std::size_t(1) << 30;  ///< bytes of light paths' vertices
   float merge_radius = 0.003f;                      ///< of the first sample's merges, over the scene's radius
   float radius_alpha = 0.75f;  ///< the radius shrinks as the sample's number to the power (this - 1) / 2
