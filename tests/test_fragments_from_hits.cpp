@@ -1,5 +1,6 @@
 // Octrees from few hits: no holes between hits, none added where hits are dense, normals of the hits, bad
 // hits, and the same bits on all policies.
+#include "support/fragments.hpp"
 #include "support/policies.hpp"
 
 #include <wfpg/base/octahedral_map.hpp>
@@ -64,14 +65,6 @@ template <class Exec>
 wfpg::voxel_fragments<Exec> from_samples(const Exec& exec, const std::vector<surface_fragment>& hits) {
   const wfpg::buffer<surface_fragment, Exec> device(exec, hits);
   return wfpg::fragments_from_samples(exec, const_view(device), resolution, box);
-}
-
-template <class Exec>
-std::vector<wfpg::morton_code> voxels_of(const Exec& exec, const wfpg::voxel_fragments<Exec>& fragments) {
-  std::vector<wfpg::morton_code> codes = fragments.codes.to_host(exec);
-  std::sort(codes.begin(), codes.end());
-  codes.erase(std::unique(codes.begin(), codes.end()), codes.end());
-  return codes;
 }
 
 /// Part of other hits, on one side of x = 0, that lie in the fragments' voxels.

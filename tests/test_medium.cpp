@@ -2,11 +2,11 @@
 // formulas say. A planted fault of 1% shows in each mean.
 #include "support/policies.hpp"
 #include "support/reports.hpp"
+#include "support/sample_means.hpp"
 
 #include <wfpg/host/medium.hpp>
 #include <wfpg/host/phase.hpp>
 #include <wfpg/testing/check_bsdf.hpp>
-#include <wfpg/testing/statistics.hpp>
 
 #include <glm/vec4.hpp>
 
@@ -20,17 +20,6 @@ using wfpg::homogeneous_medium;
 using wfpg::testing::sample_mean;
 
 namespace {
-
-/// Whether a mean is an expected value: within 4 standard errors, and so precise that 1% of it shows.
-bool has_mean(const sample_mean& found, double expected) {
-  const auto distance = [&](double factor) {
-    return std::fabs(factor * found.mean() - expected) / found.error();
-  };
-  INFO(found.mean() << " +- " << found.error() << ", expected " << expected);
-  CHECK(distance(1.0) < 4.0);
-  CHECK(distance(1.01) > 4.0);
-  return distance(1.0) < 4.0 && distance(1.01) > 4.0;
-}
 
 WFPG_TEST_CASE("phase: samples, densities and values of Henyey-Greenstein agree", "[medium]") {
   for (const float g : {-0.9f, -0.3f, 0.0f, 1.0e-6f, 0.5f, 0.9f}) {

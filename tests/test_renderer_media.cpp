@@ -8,12 +8,12 @@
 #include "support/command_lines.hpp"
 #include "support/pictures.hpp"
 #include "support/renderings.hpp"
+#include "support/sample_means.hpp"
 #include "support/temporary_folder.hpp"
 #include "support/tiny_gltf.hpp"
 #include "tracer/volume_tracer.hpp"
 
 #include <wfpg/exec/seq.hpp>
-#include <wfpg/testing/statistics.hpp>
 
 #include <cmath>
 #include <cstdint>
@@ -26,19 +26,9 @@ namespace {
 using namespace render;
 using namespace render_test;
 using wfpg::testing::sample_mean;
+using wfpg_test::has_mean;
 
 constexpr double pi_of_doubles = 3.14159265358979323846;
-
-/// Whether a mean is an expected value: within 4 standard errors, and so precise that 1% of it shows.
-bool has_mean(const sample_mean& found, double expected) {
-  const auto distance = [&](double factor) {
-    return std::fabs(factor * found.mean() - expected) / found.error();
-  };
-  INFO(found.mean() << " +- " << found.error() << ", expected " << expected);
-  CHECK(distance(1.0) < 4.0);
-  CHECK(distance(1.01) > 4.0);
-  return distance(1.0) < 4.0 && distance(1.01) > 4.0;
-}
 
 render_options volume_options(int side, int spp, int max_depth) {
   render_options options;

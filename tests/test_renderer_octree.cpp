@@ -6,6 +6,7 @@
 #include "scene/builtin_scenes.hpp"
 #include "scene/camera.hpp"
 #include "scene/device_scene.hpp"
+#include "support/fragments.hpp"
 #include "support/policies.hpp"
 #include "support/temporary_folder.hpp"
 
@@ -73,15 +74,6 @@ wfpg::buffer<surface_fragment, Exec> hits_of_paths(const Exec& exec, const rende
   exec.for_each(pixels, walk_paths{caster, view, camera, collector.view(), seed});
   CHECK(collector.dropped(exec) == 0);
   return collector.samples(exec);
-}
-
-/// Morton codes of fragments, sorted.
-template <class Exec>
-std::vector<wfpg::morton_code> voxels_of(const Exec& exec, const wfpg::voxel_fragments<Exec>& fragments) {
-  std::vector<wfpg::morton_code> codes = fragments.codes.to_host(exec);
-  std::sort(codes.begin(), codes.end());
-  codes.erase(std::unique(codes.begin(), codes.end()), codes.end());
-  return codes;
 }
 
 WFPG_TEST_CASE("a caster's octree has the leaves that paths see, in built-in scenes", "[renderer][octree]") {
