@@ -352,8 +352,8 @@ TEST_CASE("merging blurs by its disc, with a bias that falls as the square of it
       render::render_options options;
       options.method = sampling_method::vcm;
       options.techniques = render::techniques_of("surf");
-      options.merge_radius = static_cast<float>(radius / scene_radius);
-      options.radius_alpha = 1.0f;
+      options.light.merge_radius = static_cast<float>(radius / scene_radius);
+      options.light.radius_alpha = 1.0f;
       options.width = options.height = 24;
       options.max_depth = 2;
       options.spp = radius > 0.3 ? 100 : 500;
@@ -382,7 +382,7 @@ TEST_CASE("one seed gives one picture of paths from both ends on any policy", "[
   const render::scene scene = render::make_builtin_scene("materials");
   render::render_options options;
   options.method = sampling_method::vcm;
-  options.merge_radius = 0.02f;
+  options.light.merge_radius = 0.02f;
   options.width = 24;
   options.height = 16;
   options.spp = 3;
@@ -403,7 +403,7 @@ TEST_CASE("vertices of light paths beyond their memory are counted", "[renderer]
   options.spp = 2;
   const render::render_report enough = render::render(scene, options, {}).report;
   CHECK(enough.dropped_light_vertices == 0);
-  options.light_memory = 100 * (sizeof(subpath_vertex) + sizeof(std::uint32_t));
+  options.light.memory = 100 * (sizeof(subpath_vertex) + sizeof(std::uint32_t));
   const render::render_report little = render::render(scene, options, {}).report;
   CHECK(little.dropped_light_vertices > 100);
   CHECK(little.light_vertex_bytes < enough.light_vertex_bytes);

@@ -30,20 +30,21 @@ struct method_properties {
   guide_kind guide;
   bool learns;        ///< from its samples: later ones have less noise
   bool can_be_saved;  ///< a rendering's state can be saved and resumed
+  bool asks_inline;   ///< its kernels trace rays, so that casters of batches cannot be used
 };
 
 inline constexpr method_properties all_methods[] = {
-    {sampling_method::pt, "pt", guide_kind::none, false, true},
-    {sampling_method::vpt, "vpt", guide_kind::none, false, true},
-    {sampling_method::bpt, "bpt", guide_kind::none, false, true},
-    {sampling_method::vcm, "vcm", guide_kind::none, false, true},
-    {sampling_method::lt, "lt", guide_kind::none, false, true},
-    {sampling_method::wfpg, "wfpg", guide_kind::octree, true, true},
-    {sampling_method::wfpg_product, "wfpg-product", guide_kind::octree, true, true},
-    {sampling_method::sarsa, "sarsa", guide_kind::sarsa, true, false},
-    {sampling_method::records, "records", guide_kind::records, false, false},
-    {sampling_method::openpgl_vmm, "openpgl-vmm", guide_kind::openpgl, true, false},
-    {sampling_method::openpgl_dqt, "openpgl-dqt", guide_kind::openpgl, true, false},
+    {sampling_method::pt, "pt", guide_kind::none, false, true, false},
+    {sampling_method::vpt, "vpt", guide_kind::none, false, true, true},
+    {sampling_method::bpt, "bpt", guide_kind::none, false, true, true},
+    {sampling_method::vcm, "vcm", guide_kind::none, false, true, true},
+    {sampling_method::lt, "lt", guide_kind::none, false, true, true},
+    {sampling_method::wfpg, "wfpg", guide_kind::octree, true, true, false},
+    {sampling_method::wfpg_product, "wfpg-product", guide_kind::octree, true, true, false},
+    {sampling_method::sarsa, "sarsa", guide_kind::sarsa, true, false, false},
+    {sampling_method::records, "records", guide_kind::records, false, false, true},
+    {sampling_method::openpgl_vmm, "openpgl-vmm", guide_kind::openpgl, true, false, false},
+    {sampling_method::openpgl_dqt, "openpgl-dqt", guide_kind::openpgl, true, false, false},
 };
 
 /// The row of a method. Precondition: `method` is one of the enumerators.

@@ -2,6 +2,7 @@
 
 #include <sstream>
 #include <stdexcept>
+#include <vector>
 
 namespace render {
 
@@ -60,6 +61,15 @@ const std::map<std::string, wfpg::sarsa_sampler>& sarsa_sampler_names() {
                                                        {"rejection", sampler::rejection},
                                                        {"mixed", sampler::mixed_rejection}};
   return names;
+}
+
+std::string names_of_saved_methods() {
+  std::vector<std::string> names;
+  for (const method_properties& row : all_methods)
+    if (row.can_be_saved) names.push_back(row.name);
+  std::string text = names.front();
+  for (std::size_t i = 1; i < names.size(); ++i) text += (i + 1 < names.size() ? ", " : " or ") + names[i];
+  return text;
 }
 
 namespace {

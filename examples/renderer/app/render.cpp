@@ -28,7 +28,7 @@ void require_guided_files(const render_options& options) {
           "wfpg or wfpg-product where a guide is loaded or saved");
   require(properties_of(options.method).can_be_saved || (options.resume.empty() && !options.keep_state),
           "method", method,
-          "pt, vpt, bpt, vcm, lt, wfpg or wfpg-product where a rendering's state is resumed or saved");
+          (names_of_saved_methods() + " where a rendering's state is resumed or saved").c_str());
   require(options.resume.empty() || options.load_guide.empty(), "load_guide", options.load_guide,
           "none where a rendering goes on, which has its own");
 }
@@ -65,10 +65,10 @@ render_options completed(const scene& scene, render_options options) {
   require(options.method == sampling_method::vpt || !needs_volume_tracing(scene), "method",
           name_of(method_names(), options.method),
           "vpt for a scene with fog or scattering solids; --method vpt renders it");
-  require(options.merge_radius > 0.0f && options.merge_radius <= 1.0f, "merge_radius", options.merge_radius,
-          "above 0, at most 1");
-  require(options.radius_alpha > 0.0f && options.radius_alpha <= 1.0f, "radius_alpha", options.radius_alpha,
-          "above 0, at most 1");
+  require(options.light.merge_radius > 0.0f && options.light.merge_radius <= 1.0f, "merge_radius",
+          options.light.merge_radius, "above 0, at most 1");
+  require(options.light.radius_alpha > 0.0f && options.light.radius_alpha <= 1.0f, "radius_alpha",
+          options.light.radius_alpha, "above 0, at most 1");
   require_guided_files(options);
   return options;
 }

@@ -73,10 +73,8 @@ struct render_options {
   std::uint32_t light_groups = 32;  ///< that guided paths learn to choose lights from, in [1, 255]
   /// Of bpt and vcm; nee decides on next-event estimation, too. Unset: the method's own.
   std::optional<technique_set> techniques;
-  float merge_radius = 0.003f;  ///< of the first sample's merges, over the scene's radius; above 0, at most 1
-  float radius_alpha = 0.75f;   ///< in (0, 1]: the smaller, the faster the radius shrinks; 1: not at all
-  std::size_t light_memory = std::size_t(1) << 30;  ///< bytes of vertices of light paths
-  std::uint32_t samples_per_leaf = 32000;           ///< after which Open PGL's field splits a leaf, 8 to 2^30
+  light_path_options light;                  ///< of paths from both ends
+  std::uint32_t samples_per_leaf = 32000;    ///< after which Open PGL's field splits a leaf, 8 to 2^30
   wfpg::sarsa_grid_options sarsa;            ///< its own; what every guide is told follows from the others
   wfpg::irradiance_records_options records;  ///< likewise
   checkpoint_times checkpoints = checkpoint_times::none;  ///< when to keep the picture so far

@@ -117,7 +117,7 @@ void add_records_options(CLI::App& app, wfpg::irradiance_records_options& option
 /// Options that have an effect only where others are chosen so.
 struct requirement {
   std::vector<const char*> options;
-  const char* what;
+  std::string what;
   bool (*holds)(const render_options&);
 };
 
@@ -161,7 +161,7 @@ const std::vector<requirement>& requirements() {
        "--method wfpg, wfpg-product, sarsa or records",
        [](options o) { return is_guided(o.method) && !is_openpgl(o.method); }},
       {{"--save-state", "--resume"},
-       "--method pt, vpt, bpt, vcm, lt, wfpg or wfpg-product",
+       "--method " + names_of_saved_methods(),
        [](options o) { return properties_of(o.method).can_be_saved; }},
       {{"--sarsa-update", "--sarsa-sampler", "--sarsa-resolution", "--sarsa-directions", "--sarsa-step",
         "--sarsa-learning-rate"},
@@ -210,7 +210,7 @@ void add_method_options(CLI::App& app, render_options& options) {
                             "first sample's hits");
   add_choice<wfpg::sample_combination>(
       app, "--combine", options.combine, combination_names(),
-      "how samples add up (default: pt-linear; constant for pt, vpt, for records and with "
+      "how samples add up (default: pt-linear; constant for methods that do not learn, and with "
       "--load-guide)");
 }
 
@@ -228,16 +228,17 @@ void add_bidirectional_options(CLI::App& app, render_options& options) {
          "the camera sees, merges; names with + between them (default: all, for bpt without surf: " +
              names_of(connection_and_merging()) + ")")
       ->type_name("NAMES");
-  app.add_option("--light-memory", options.light_memory,
-                 with_default("memory of light paths' vertices", options.light_memory))
+  app.add_option("--light-memory", options.light.memory,
+                 with_default("memory of light paths' vertices", options.light.memory))
       ->transform(byte_count());
-  app.add_option("--radius", options.merge_radius,
-                 with_default("of the first sample's merges, over the scene's radius", options.merge_radius))
+  app.add_option(
+         "--radius", options.light.merge_radius,
+         with_default("of the first sample's merges, over the scene's radius", options.light.merge_radius))
       ->transform(positive_number(1.0));
   app.add_option(
-         "--radius-alpha", options.radius_alpha,
+         "--radius-alpha", options.light.radius_alpha,
          with_default("radii shrink as the sample's number to the power (this - 1) / 2; 1: not at all",
-                      options.radius_alpha))
+                      options.light.radius_alpha))
       ->transform(positive_number(1.0));
 }
 
@@ -343,9 +344,7 @@ void check_render_options(const CLI::App& app, const render_options& options) {
   const std::string method = "--method " + name_of(method_names(), options.method);
   if (is_openpgl(options.method) && options.where != device::cpu)
     throw CLI::RequiresError(method, "--device cpu");
-  const bool traces_inline = options.method == sampling_method::records ||
-                             options.method == sampling_method::vpt || is_bidirectional(options.method);
-  if (traces_inline && options.where == device::optix)
+  if (properties_of(options.method).asks_inline && options.where == device::optix)
     throw CLI::RequiresError(method, "a --device other than optix");
 }
 

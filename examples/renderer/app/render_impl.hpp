@@ -74,9 +74,7 @@ inline tracer_settings tracer_settings_of(const render_options& options) {
           options.seed,
           static_cast<std::uint32_t>(options.roulette_depth),
           techniques_of(options),
-          options.light_memory,
-          options.merge_radius,
-          options.radius_alpha};
+          options.light};
 }
 
 /// What every guide is told.
@@ -287,6 +285,12 @@ void guide_by_sarsa(const sampling_job<Exec, Caster>& job) {
   report_any_guider(guider, job.result.report);
 }
 
+/// Throws for a method whose kernels trace rays themselves, where the caster is one of batches.
+[[noreturn]] inline void refuse_batches(sampling_method method) {
+  throw std::runtime_error(std::string("--device optix does not support --method ") +
+                           properties_of(method).name + "; --device cuda does");
+}
+
 /// Throws std::runtime_error for a caster of batches: records ask the tracer's caster in kernels what is
 /// smooth.
 template <class Exec, class Caster>
@@ -300,7 +304,7 @@ void guide_by_records(const sampling_job<Exec, Caster>& job) {
     take_samples(job, guider);
     report_records(guider, job.tracer.film().segments(), job.result.report);
   } else {
-    throw std::runtime_error("--device optix does not support --method records; --device cuda does");
+    refuse_batches(job.options.method);
   }
 }
 
@@ -325,46 +329,38 @@ void take_by_method(const sampling_job<Exec, Caster>& job) {
                               ", expected one that runs on any policy");
 }
 
-/// Renders media. Throws std::runtime_error for a caster of batches: rays pass boundaries inside kernels.
-template <class Accelerated, class Exec>
-render_result render_volumes(const Exec& exec, const scene& scene, const render_options& options,
-                             const progress_callback& progress) {
-  using caster_type = decltype(std::declval<const Accelerated&>().caster());
-  if constexpr (wfpg::is_inline_caster_v<caster_type>) {
-    return render_by<Accelerated, volume_tracer>(exec, scene, options, progress, [](const auto& job) {
-      no_guide none;
-      take_samples(job, none);
-    });
-  } else {
-    throw std::runtime_error("--device optix does not support --method vpt; --device cuda does");
-  }
+/// What a tracer reports beside its film.
+template <class Tracer>
+void report_tracer(const Tracer&, render_report&) {}
+template <class Exec, class Caster>
+void report_tracer(const bidirectional_tracer<Exec, Caster>& tracer, render_report& report) {
+  report.light_vertex_bytes = tracer.light_bytes();
+  report.dropped_light_vertices = tracer.dropped();
 }
 
-/// Traces paths from both ends. Throws std::runtime_error for a caster of batches: kernels trace connections
-/// themselves.
-template <class Accelerated, class Exec>
-render_result render_from_both_ends(const Exec& exec, const scene& scene, const render_options& options,
-                                    const progress_callback& progress) {
+/// Renders by a tracer that has no guide. Its kernels trace all rays. Throws std::runtime_error for a caster
+/// of batches.
+template <class Accelerated, template <class, class> class Tracer, class Exec>
+render_result render_in_kernels(const Exec& exec, const scene& scene, const render_options& options,
+                                const progress_callback& progress) {
   using caster_type = decltype(std::declval<const Accelerated&>().caster());
-  if constexpr (wfpg::is_inline_caster_v<caster_type>) {
-    return render_by<Accelerated, bidirectional_tracer>(exec, scene, options, progress, [](const auto& job) {
+  if constexpr (wfpg::is_inline_caster_v<caster_type>)
+    return render_by<Accelerated, Tracer>(exec, scene, options, progress, [](const auto& job) {
       no_guide none;
       take_samples(job, none);
-      job.result.report.light_vertex_bytes = job.tracer.light_bytes();
-      job.result.report.dropped_light_vertices = job.tracer.dropped();
+      report_tracer(job.tracer, job.result.report);
     });
-  } else {
-    throw std::runtime_error("--device optix does not support --method bpt, vcm or lt; --device cuda does");
-  }
+  else
+    refuse_batches(options.method);
 }
 
 template <class Accelerated, class Exec>
 render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
                         const progress_callback& progress) {
   if (options.method == sampling_method::vpt)
-    return render_volumes<Accelerated>(exec, scene, options, progress);
+    return render_in_kernels<Accelerated, volume_tracer>(exec, scene, options, progress);
   if (is_bidirectional(options.method))
-    return render_from_both_ends<Accelerated>(exec, scene, options, progress);
+    return render_in_kernels<Accelerated, bidirectional_tracer>(exec, scene, options, progress);
   return render_by<Accelerated>(exec, scene, options, progress, [](const auto& job) { take_by_method(job); });
 }
 

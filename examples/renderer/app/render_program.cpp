@@ -3,6 +3,7 @@
 
 #include "app/interruption.hpp"
 #include "app/number_options.hpp"
+#include "app/option_names.hpp"
 #include "app/output_files.hpp"
 #include "app/progress_bar.hpp"
 #include "app/render.hpp"
@@ -75,10 +76,9 @@ void add_state_options(CLI::App& app, arguments& given) {
   CLI::Option* const load = app.add_option("--load-guide", given.options.load_guide,
                                            "guide for wfpg or wfpg-product to begin with, of the same scene")
                                 ->transform(file_path());
-  app.add_option(
-         "--save-state", given.save_state,
-         "where the state of a rendering by pt, vpt, bpt, vcm, lt, wfpg or wfpg-product goes at the end, "
-         "and when it is interrupted")
+  app.add_option("--save-state", given.save_state,
+                 "where the state of a rendering by " + names_of_saved_methods() +
+                     " goes at the end, and when it is interrupted")
       ->transform(file_path());
   app.add_option("--resume", given.options.resume,
                  "state of the rendering to go on with; where it goes when that is interrupted")

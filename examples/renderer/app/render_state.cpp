@@ -67,10 +67,10 @@ named_values values_of(const render_options& o) {
   if (is_bidirectional(o.method)) {
     const technique_set techniques = techniques_of(o);
     values.insert(values.end(), {{"--techniques", names_of(techniques)},
-                                 {"--light-memory", std::to_string(o.light_memory)}});
+                                 {"--light-memory", std::to_string(o.light.memory)}});
     if (techniques.merges)
-      values.insert(values.end(), {{"--radius", std::to_string(o.merge_radius)},
-                                   {"--radius-alpha", std::to_string(o.radius_alpha)}});
+      values.insert(values.end(), {{"--radius", std::to_string(o.light.merge_radius)},
+                                   {"--radius-alpha", std::to_string(o.light.radius_alpha)}});
   }
   if (is_guided(o.method)) add_guider_values(o, values);
   return values;

@@ -32,6 +32,11 @@ struct light_sample {
   wfpg::light_end source;   ///< the light as the end of a path that this sample ends, in one group alone
 };
 
+/// The ray from a point to a light sample. Its t_max is 0 where nothing can be between them.
+WFPG_HD inline wfpg::ray ray_toward(vec3 from, const light_sample& light) {
+  return light.is_distant ? ray_along(from, light.direction) : ray_between(from, light.end);
+}
+
 /// A ray of light that leaves its source.
 struct emitted_ray {
   wfpg::ray ray;

@@ -11,7 +11,7 @@
 #include "tracer/light_kernels.hpp"
 #include "tracer/path_film.hpp"
 #include "tracer/stage_clock.hpp"
-#include "tracer/volume_tracer.hpp"
+#include "tracer/unguided.hpp"
 #include "tracer/wavefront.hpp"
 
 #include <wfpg/host/ray_caster.hpp>
@@ -36,7 +36,7 @@ class bidirectional_tracer {
                        const Caster& caster)
       : exec_(exec),
         settings_(settings),
-        count_(static_cast<std::size_t>(settings.width) * static_cast<std::size_t>(settings.height)),
+        count_(settings.pixels()),
         world_{world.scene, world.lights,
                caster,      counts_of(settings.techniques, world.next_event, count_),
                {},          settings.max_depth},
@@ -46,7 +46,8 @@ class bidirectional_tracer {
         radiance_(exec, count_),
         splats_(exec, count_, count_),
         positions_(exec, 0),
-        stored_(exec, {count_, settings.light_memory, glm::max(settings.max_depth, 2u) - 1}),
+        stored_(exec, {settings.techniques.needs_light_vertices() ? count_ : 0, settings.light.memory,
+                       glm::max(settings.max_depth, 2u) - 1}),
         film_(exec, count_),
         clock_(exec) {}
 
@@ -89,8 +90,8 @@ class bidirectional_tracer {
 
   /// Of a sample's merges. A scene without extent has any.
   float radius_of(std::uint32_t sample) const {
-    const wfpg::radius_schedule radius{settings_.merge_radius * world_.lights.scene_radius,
-                                       settings_.radius_alpha, 2};
+    const wfpg::radius_schedule radius{settings_.light.merge_radius * world_.lights.scene_radius,
+                                       settings_.light.radius_alpha, 2};
     return glm::max(radius(sample + 1), wfpg::photon_map<Exec>::least_radius);
   }
 
@@ -110,7 +111,7 @@ class bidirectional_tracer {
         exec_.for_each(count_,
                        trace_light_paths<world_type>{world_, segments, paths_.view(), vertices_.view(),
                                                      keeps_.view(), film_.segment_counts()});
-        stored_.reserve(exec_, keeps_.view());
+        if (settings_.techniques.needs_light_vertices()) stored_.reserve(exec_, keeps_.view());
         const bool is_last = segments + 1 == settings_.max_depth;
         exec_.for_each(
             count_, extend_light_paths<world_type>{world_, camera, is_last, paths_.view(), vertices_.view(),

@@ -25,12 +25,7 @@ struct subpath {
   WFPG_HD subpath(vec3 from, vec3 toward, vec3 carries, const wfpg::subpath_weights& begun)
       : origin(from), active(1), direction(toward), throughput(carries), weights(begun) {}
 
-  WFPG_HD wfpg::ray ray() const {
-    wfpg::ray next;
-    next.origin = origin;
-    next.direction = direction;
-    return next;
-  }
+  WFPG_HD wfpg::ray ray() const { return ray_along(origin, direction); }
 };
 
 static_assert(sizeof(subpath) == 64, "tiles have pieces of 16 bytes");
@@ -110,14 +105,10 @@ struct bidirectional_world {
 
   /// Whether nothing lies between a vertex and a point that is `end` off its own surface.
   WFPG_HD bool sees(const subpath_vertex& from, vec3 end) const {
-    wfpg::ray ray;
-    ray.origin = from.leave_along(end - from.at.position);
-    const float distance = glm::length(end - ray.origin);
-    if (!(distance > 0.0f)) return true;
-    ray.direction = (end - ray.origin) / distance;
-    ray.t_max = distance;
-    return !caster.occluded(ray);
+    return is_clear(ray_between(from.leave_along(end - from.at.position), end));
   }
+  /// Whether nothing lies on a ray. Its t_max may be 0.
+  WFPG_HD bool is_clear(const wfpg::ray& ray) const { return !(ray.t_max > 0.0f) || !caster.occluded(ray); }
 
   WFPG_HD vec2 draw(std::uint32_t path, std::uint32_t segments, std::uint32_t use) const {
     return random(path, segments * dimension::per_vertex + use);

@@ -120,11 +120,8 @@ struct connect_camera_paths {
   }
 
   WFPG_HD bool is_hidden(const subpath_vertex& vertex, const light_sample& light) const {
-    if (!light.is_distant) return !world.sees(vertex, light.end);
-    wfpg::ray ray;
-    ray.origin = vertex.leave_along(light.direction);
-    ray.direction = light.direction;
-    return world.caster.occluded(ray);
+    const vec3 way = light.is_distant ? light.direction : light.end - vertex.at.position;
+    return !world.is_clear(ray_toward(vertex.leave_along(way), light));
   }
 
   WFPG_HD vec3 connect_all(std::size_t i, const subpath_vertex& vertex, const bsdf& f) const {

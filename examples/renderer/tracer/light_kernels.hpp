@@ -56,14 +56,14 @@ struct extend_light_paths {
   tiled_view<subpath> paths;
   tiled_view<subpath_vertex> vertices;
   wfpg::array_view<const std::uint32_t> keeps;
-  wfpg::light_vertices_view<subpath_vertex> stored;
+  wfpg::light_vertices_view<subpath_vertex> stored;  ///< of no paths, where nothing reads vertices
   wfpg::splat_view splats;
 
   WFPG_HD void operator()(std::size_t i) const {
     if (paths[i].active == 0) return;
     const subpath_vertex vertex = vertices[i];
     if (keeps[i] != 0) {
-      if (stored.has_place(i)) stored.write(i, vertex);
+      if (stored.paths() > 0 && stored.has_place(i)) stored.write(i, vertex);
       if (world.techniques.splats > 0.0f) splat(i, vertex);
     }
     const auto id = static_cast<std::uint32_t>(i);

@@ -233,15 +233,9 @@ struct query_lights {
   }
 
   WFPG_HD bool is_hidden(std::size_t slot, const path_vertex& vertex, const light_sample& light) const {
-    wfpg::ray ray;
-    ray.origin = leave_surface(vertex.position, vertex.geometric_normal, light.direction, vertex.offset);
-    ray.direction = light.direction;
-    if (!light.is_distant) {
-      ray.t_max = glm::length(light.end - ray.origin);
-      if (!(ray.t_max > 0.0f)) return false;
-      ray.direction = (light.end - ray.origin) / ray.t_max;
-    }
-    return answers.is_hidden(slot, ray);
+    const wfpg::ray ray = ray_toward(
+        leave_surface(vertex.position, vertex.geometric_normal, light.direction, vertex.offset), light);
+    return ray.t_max > 0.0f && answers.is_hidden(slot, ray);
   }
 
   // Every density is negligible beside this one, since hits never find a light without extent.

@@ -23,12 +23,7 @@ struct path_state {
   WFPG_HD explicit path_state(const wfpg::ray& camera_ray)
       : origin(camera_ray.origin), direction(camera_ray.direction) {}
 
-  WFPG_HD wfpg::ray ray() const {
-    wfpg::ray next;
-    next.origin = origin;
-    next.direction = direction;
-    return next;
-  }
+  WFPG_HD wfpg::ray ray() const { return ray_along(origin, direction); }
 };
 
 /// A path's last hit: its surface without redundant members. Nothing is initialised, since vertices are made

@@ -1,5 +1,10 @@
-// Ways of bidirectional methods to find light.
+// Ways of bidirectional methods to find light, and their options.
 #pragma once
+
+#include <wfpg/light/light_vertices.hpp>
+#include <wfpg/light/photon_estimators.hpp>
+
+#include <cstddef>
 
 namespace render {
 
@@ -11,7 +16,16 @@ struct technique_set {
   bool splats = true;       ///< vertices of light paths are connected to the camera
   bool merges = false;      ///< vertices of all light paths are merged with near ones of camera paths
 
-  bool needs_light_paths() const { return connections || splats || merges; }
+  /// Whether camera paths read vertices of light paths.
+  bool needs_light_vertices() const { return connections || merges; }
+  bool needs_light_paths() const { return needs_light_vertices() || splats; }
+};
+
+/// Options of light paths and of merges.
+struct light_path_options {
+  std::size_t memory = wfpg::light_vertices_options().budget_bytes;  ///< bytes of vertices
+  float merge_radius = 0.003f;  ///< of the first sample, over the scene's radius; above 0, at most 1
+  float radius_alpha = wfpg::radius_schedule().alpha;  ///< as in radius_schedule
 };
 
 /// Vertex connection and merging.

@@ -10,6 +10,9 @@
 
 namespace render {
 
+/// What a tracer whose directions come from no guide is given in place of one.
+struct no_guide {};
+
 /// A guider that does not guide. Each ray samples its BSDF, in the same pass as a guider's unguided waves.
 template <class Exec>
 class unguided {

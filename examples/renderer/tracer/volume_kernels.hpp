@@ -279,15 +279,8 @@ struct add_volume_light {
   }
 
   WFPG_HD vec3 clear(vec3 from, const light_sample& light, const solid_stack& solids) const {
-    wfpg::ray ray;
-    ray.origin = from;
-    ray.direction = light.direction;
-    if (!light.is_distant) {
-      ray.t_max = glm::length(light.end - from);
-      if (!(ray.t_max > 0.0f)) return vec3(1.0f);
-      ray.direction = (light.end - from) / ray.t_max;
-    }
-    return clear_part<Caster>{world.scene, caster}(ray, solids);
+    const wfpg::ray ray = ray_toward(from, light);
+    return ray.t_max > 0.0f ? clear_part<Caster>{world.scene, caster}(ray, solids) : vec3(1.0f);
   }
 };
 

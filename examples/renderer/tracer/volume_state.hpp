@@ -21,12 +21,7 @@ struct volume_path {
   WFPG_HD volume_path(const wfpg::ray& camera_ray, const solid_stack& around_camera)
       : origin(camera_ray.origin), direction(camera_ray.direction), solids(around_camera) {}
 
-  WFPG_HD wfpg::ray ray() const {
-    wfpg::ray next;
-    next.origin = origin;
-    next.direction = direction;
-    return next;
-  }
+  WFPG_HD wfpg::ray ray() const { return ray_along(origin, direction); }
 };
 
 static_assert(sizeof(volume_path) == 64, "every kernel of a wave reads it");

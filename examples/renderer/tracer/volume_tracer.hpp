@@ -3,6 +3,7 @@
 
 #include "tracer/path_film.hpp"
 #include "tracer/stage_clock.hpp"
+#include "tracer/unguided.hpp"
 #include "tracer/volume_kernels.hpp"
 #include "tracer/wavefront.hpp"
 
@@ -13,9 +14,6 @@
 #include <vector>
 
 namespace render {
-
-/// What a tracer whose directions come from no guide is given in place of one.
-struct no_guide {};
 
 /// Renders samples of a scene with media. A Caster is an inline one, as path_tracer has it. Vertices in media
 /// count as those on surfaces. Boundaries that light passes unbent are no vertices.
@@ -28,7 +26,7 @@ class volume_tracer {
         settings_(settings),
         world_(world),
         caster_(caster),
-        count_(static_cast<std::size_t>(settings.width) * static_cast<std::size_t>(settings.height)),
+        count_(settings.pixels()),
         around_camera_(exec, std::vector<solid_stack>(1)),
         paths_(exec, count_),
         vertices_(exec, count_),

@@ -22,9 +22,9 @@ struct tracer_settings {
   std::uint64_t seed = 0;
   std::uint32_t roulette_depth = 3;  ///< Russian roulette begins at this vertex; the camera's first hit is 0
   technique_set techniques = {};     ///< of paths from both ends
-  std::size_t light_memory = std::size_t(1) << 30;  ///< bytes of light paths' vertices
-  float merge_radius = 0.003f;                      ///< of the first sample's merges, over the scene's radius
-  float radius_alpha = 0.75f;  ///< the radius shrinks as the sample's number to the power (this - 1) / 2
+  light_path_options light = {};     ///< likewise
+
+  std::size_t pixels() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
 };
 
 /// Renders samples of a scene with directions from a guider.
@@ -47,7 +47,7 @@ class path_tracer {
         settings_(settings),
         world_(world),
         caster_(caster),
-        count_(static_cast<std::size_t>(settings.width) * static_cast<std::size_t>(settings.height)),
+        count_(settings.pixels()),
         paths_(exec, count_),
         vertices_(exec, count_),
         queries_(exec, world.next_event ? count_ : 0),

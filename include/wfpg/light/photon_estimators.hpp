@@ -51,7 +51,7 @@ WFPG_HD float merge_kernel_value(merge_kernel shape, float square, float radius)
   return 0.5f * static_cast<float>(dimension + 2) * (1.0f - square / limit) / ball;
 }
 
-/// What a merge takes from geometry.
+/// Value of the kernel, and where on both beams a merge is.
 struct merge_geometry {
   float kernel = 0.0f;    ///< 0: no merge
   float t_camera = 0.0f;  ///< where it is on the camera's beam, scene units from its origin
