@@ -3,7 +3,7 @@
 
 namespace render {
 
-/// Sampling methods. pt is path tracing, vpt that of scenes with media. bpt is bidirectional path tracing,
+/// Sampling methods. pt is path tracing, vpt path tracing through media. bpt is bidirectional path tracing,
 /// vcm vertex connection and merging, lt light tracing. wfpg guides by fields, wfpg_product by products of
 /// fields and BSDFs. sarsa guides by a SARSA grid, records by irradiance records. openpgl_vmm guides by Open
 /// PGL's mixtures of von Mises-Fisher lobes with parallax, openpgl_dqt by its quadtrees of directions.
@@ -31,20 +31,21 @@ struct method_properties {
   bool learns;        ///< from its samples: later ones have less noise
   bool can_be_saved;  ///< a rendering's state can be saved and resumed
   bool asks_inline;   ///< its kernels trace rays, so that casters of batches cannot be used
+  bool has_media;     ///< it renders fog, and solids that scatter inside
 };
 
 inline constexpr method_properties all_methods[] = {
-    {sampling_method::pt, "pt", guide_kind::none, false, true, false},
-    {sampling_method::vpt, "vpt", guide_kind::none, false, true, true},
-    {sampling_method::bpt, "bpt", guide_kind::none, false, true, true},
-    {sampling_method::vcm, "vcm", guide_kind::none, false, true, true},
-    {sampling_method::lt, "lt", guide_kind::none, false, true, true},
-    {sampling_method::wfpg, "wfpg", guide_kind::octree, true, true, false},
-    {sampling_method::wfpg_product, "wfpg-product", guide_kind::octree, true, true, false},
-    {sampling_method::sarsa, "sarsa", guide_kind::sarsa, true, false, false},
-    {sampling_method::records, "records", guide_kind::records, false, false, true},
-    {sampling_method::openpgl_vmm, "openpgl-vmm", guide_kind::openpgl, true, false, false},
-    {sampling_method::openpgl_dqt, "openpgl-dqt", guide_kind::openpgl, true, false, false},
+    {sampling_method::pt, "pt", guide_kind::none, false, true, false, false},
+    {sampling_method::vpt, "vpt", guide_kind::none, false, true, true, true},
+    {sampling_method::bpt, "bpt", guide_kind::none, false, true, true, true},
+    {sampling_method::vcm, "vcm", guide_kind::none, false, true, true, true},
+    {sampling_method::lt, "lt", guide_kind::none, false, true, true, true},
+    {sampling_method::wfpg, "wfpg", guide_kind::octree, true, true, false, false},
+    {sampling_method::wfpg_product, "wfpg-product", guide_kind::octree, true, true, false, false},
+    {sampling_method::sarsa, "sarsa", guide_kind::sarsa, true, false, false, false},
+    {sampling_method::records, "records", guide_kind::records, false, false, true, false},
+    {sampling_method::openpgl_vmm, "openpgl-vmm", guide_kind::openpgl, true, false, false, false},
+    {sampling_method::openpgl_dqt, "openpgl-dqt", guide_kind::openpgl, true, false, false, false},
 };
 
 /// The row of a method. Precondition: `method` is one of the enumerators.

@@ -63,10 +63,10 @@ const std::map<std::string, wfpg::sarsa_sampler>& sarsa_sampler_names() {
   return names;
 }
 
-std::string names_of_saved_methods() {
+std::string names_of_methods(bool method_properties::*has) {
   std::vector<std::string> names;
   for (const method_properties& row : all_methods)
-    if (row.can_be_saved) names.push_back(row.name);
+    if (row.*has) names.push_back(row.name);
   std::string text = names.front();
   for (std::size_t i = 1; i < names.size(); ++i) text += (i + 1 < names.size() ? ", " : " or ") + names[i];
   return text;

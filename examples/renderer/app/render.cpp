@@ -26,9 +26,11 @@ void require_guided_files(const render_options& options) {
   const std::string& method = name_of(method_names(), options.method);
   require(is_wfpg(options.method) || (options.load_guide.empty() && !options.keep_guide), "method", method,
           "wfpg or wfpg-product where a guide is loaded or saved");
-  require(properties_of(options.method).can_be_saved || (options.resume.empty() && !options.keep_state),
-          "method", method,
-          (names_of_saved_methods() + " where a rendering's state is resumed or saved").c_str());
+  require(
+      properties_of(options.method).can_be_saved || (options.resume.empty() && !options.keep_state), "method",
+      method,
+      (names_of_methods(&method_properties::can_be_saved) + " where a rendering's state is resumed or saved")
+          .c_str());
   require(options.resume.empty() || options.load_guide.empty(), "load_guide", options.load_guide,
           "none where a rendering goes on, which has its own");
 }
@@ -62,9 +64,10 @@ render_options completed(const scene& scene, render_options options) {
   const int least = combination_of(options) == wfpg::sample_combination::discard_first ? 2 : 1;
   require(options.seconds > 0.0 || options.spp >= least, "spp", options.spp,
           least == 2 ? "at least 2, as the first sample is discarded" : "at least 1");
-  require(options.method == sampling_method::vpt || !needs_volume_tracing(scene), "method",
+  require(properties_of(options.method).has_media || !needs_volume_tracing(scene), "method",
           name_of(method_names(), options.method),
-          "vpt for a scene with fog or scattering solids; --method vpt renders it");
+          (names_of_methods(&method_properties::has_media) + " for a scene with fog or scattering solids")
+              .c_str());
   require(options.light.merge_radius > 0.0f && options.light.merge_radius <= 1.0f, "merge_radius",
           options.light.merge_radius, "above 0, at most 1");
   require(options.light.radius_alpha > 0.0f && options.light.radius_alpha <= 1.0f, "radius_alpha",

@@ -65,7 +65,7 @@ void add_file_options(CLI::App& app, arguments& given) {
 
 void add_fog_option(CLI::App& app, arguments& given) {
   app.add_option("--fog", given.fog,
-                 "scattering per scene unit of a fog around everything, for vpt (default: the scene's)")
+                 "scattering per scene unit of a fog around everything (default: the scene's)")
       ->transform(positive_number(double(largest_coefficient)));
 }
 
@@ -77,7 +77,7 @@ void add_state_options(CLI::App& app, arguments& given) {
                                            "guide for wfpg or wfpg-product to begin with, of the same scene")
                                 ->transform(file_path());
   app.add_option("--save-state", given.save_state,
-                 "where the state of a rendering by " + names_of_saved_methods() +
+                 "where the state of a rendering by " + names_of_methods(&method_properties::can_be_saved) +
                      " goes at the end, and when it is interrupted")
       ->transform(file_path());
   app.add_option("--resume", given.options.resume,

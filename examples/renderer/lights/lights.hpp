@@ -43,6 +43,7 @@ struct emitted_ray {
   /// Emitted radiance and cosine over all densities of `source`. Zero: nothing is emitted.
   vec3 throughput{0.0f};
   wfpg::light_end source;
+  std::uint32_t light = 0;  ///< its column of the table
 };
 
 /// Converts a density by area into one by solid angle.
@@ -60,6 +61,7 @@ struct light_view {
   float total_power = 0.0f;   ///< over pi; of an emitter, mean luminance times area
   float scene_radius = 0.0f;  ///< of a sphere around the scene
   vec3 scene_centre{0.0f};    ///< of that sphere
+  bool has_fog = false;       ///< no light paths come from infinitely far
 
   /// Power over pi of light that may hit a scene of that radius.
   WFPG_HD static float power_of(const punctual_light& source, float radius) {
@@ -125,6 +127,27 @@ struct light_view {
   WFPG_HD emitted_ray emit(const scene_view& scene, const Draw& draw) const {
     if (table.empty()) return {};
     const std::uint32_t light = pick(table, draw(dimension::light_choice));
+    emitted_ray emitted = emit_from(scene, light, draw);
+    emitted.light = light;
+    return emitted;
+  }
+
+  /// Writes where a light is: the middle of an emitter, on the side that emits. False for distant lights.
+  WFPG_HD bool find_place(const scene_view& scene, std::uint32_t light, vec3& place) const {
+    const std::uint32_t number = lights[light], beyond = number & ~grouped_lights::beyond_triangles;
+    if ((number & grouped_lights::beyond_triangles) == 0) {
+      const surface_point at = scene.point({number, 1.0f / 3.0f, 1.0f / 3.0f});
+      place = leave_surface(at.position, at.geometric_normal, at.geometric_normal, at.offset);
+      return true;
+    }
+    if (!(beyond < punctual.size()) || punctual[beyond].kind == punctual_kind::directional) return false;
+    place = punctual[beyond].position;
+    return true;
+  }
+
+ private:
+  template <class Draw>
+  WFPG_HD emitted_ray emit_from(const scene_view& scene, std::uint32_t light, const Draw& draw) const {
     const std::uint32_t number = lights[light], beyond = number & ~grouped_lights::beyond_triangles;
     const vec2 u = draw(dimension::light_point), v = draw(dimension::direction);
     if ((number & grouped_lights::beyond_triangles) == 0)
@@ -135,13 +158,13 @@ struct light_view {
                           distant_end(environment_pdf(scene.environment, toward), false));
   }
 
- private:
   WFPG_HD static wfpg::light_end emitter_end(float pdf, float cosine) {
     return {pdf, pdf, cosine / pi, cosine, false, false};
   }
-  /// The end at a light infinitely far, by solid angle or with a probability. It shines from a disc.
+  /// The end at a light infinitely far, by solid angle or with a probability. It shines from a disc, but not
+  /// through fog without end.
   WFPG_HD wfpg::light_end distant_end(float pdf, bool is_delta) const {
-    return {pdf, pdf, 1.0f / (pi * scene_radius * scene_radius), 1.0f, is_delta, true};
+    return {has_fog ? 0.0f : pdf, pdf, 1.0f / (pi * scene_radius * scene_radius), 1.0f, is_delta, true};
   }
   WFPG_HD wfpg::light_end punctual_end(const punctual_light& source) const {
     const float probability = power_of(source, scene_radius) / total_power;
@@ -275,6 +298,7 @@ class light_distribution {
     v.total_power = total_power_;
     v.scene_radius = radius_;
     v.scene_centre = centre_;
+    v.has_fog = has_fog_;
     return v;
   }
 
@@ -289,7 +313,8 @@ class light_distribution {
         triangle_groups_(exec, grouped.triangle_groups),
         total_power_(checked(grouped.total_power)),
         radius_(grouped.scene_radius),
-        centre_(grouped.scene_centre) {
+        centre_(grouped.scene_centre),
+        has_fog_(host.fog.extinction() != vec3(0.0f)) {
     std::vector<alias_column> table;
     for (const light_group& group : grouped.groups) {
       const auto begin = grouped.powers.begin() + group.first;
@@ -316,6 +341,7 @@ class light_distribution {
   float total_power_;
   float radius_;
   vec3 centre_;
+  bool has_fog_;
 };
 
 }  // namespace render

@@ -38,7 +38,7 @@ bool is_builtin_scene(const std::string& name);
 ///   are in view nearly everywhere, so guiding has little to gain. Open.
 /// - `outdoor`: a wall and spheres of five materials on a plane, under a map of the sky with a sun. Open.
 /// - `furnace`: a closed box of albedo 0.5 that emits radiance 1 everywhere; see furnace_radiance().
-/// Three need --method vpt:
+/// Three have media, for --method vpt, bpt, vcm or lt:
 /// - `fog-lamp`: a point lamp in endless fog, and nothing else. Its light scattered once is an integral.
 /// - `slab`: a block of scattering matter below a white sky, so large that it is a half-space. Its index is
 ///   that of the air. It scatters alike in all directions; its albedo is 0.95, 0.9 and 0.5. Chandrasekhar's H

@@ -164,7 +164,7 @@ struct scene {
   std::vector<std::string> warnings;  ///< features of the file that the loader does not support, once each
 };
 
-/// Whether only --method vpt renders a scene: it has fog, or solids that scatter inside.
+/// Whether a scene is for methods that trace paths through media: it has fog, or solids that scatter inside.
 inline bool needs_volume_tracing(const scene& host) {
   bool scatters = host.fog.extinction() != vec3(0.0f);
   for (const material& m : host.materials) scatters = scatters || m.scattering != vec3(0.0f);

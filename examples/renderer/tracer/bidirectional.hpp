@@ -23,7 +23,7 @@
 
 namespace render {
 
-/// Renders samples of a scene. Caster: an inline caster as path_tracer's. The paths have no roulette.
+/// Renders samples of a scene. Caster: an inline caster as path_tracer's.
 ///
 /// One seed gives one picture on any number of threads: splats are added in the order of light paths.
 template <class Exec, class Caster>
@@ -37,9 +37,13 @@ class bidirectional_tracer {
       : exec_(exec),
         settings_(settings),
         count_(settings.pixels()),
-        world_{world.scene, world.lights,
-               caster,      counts_of(settings.techniques, world.next_event, count_),
-               {},          settings.max_depth},
+        world_{world.scene,
+               world.lights,
+               caster,
+               counts_of(settings.techniques, world.next_event, count_),
+               {},
+               settings.max_depth,
+               settings.roulette_depth},
         paths_(exec, count_),
         vertices_(exec, count_),
         keeps_(exec, count_),
@@ -48,8 +52,13 @@ class bidirectional_tracer {
         positions_(exec, 0),
         stored_(exec, {settings.techniques.needs_light_vertices() ? count_ : 0, settings.light.memory,
                        glm::max(settings.max_depth, 2u) - 1}),
+        around_camera_(exec, std::vector<solid_stack>(1)),
+        around_lights_(exec,
+                       std::vector<solid_stack>(world.scene.has_solids ? world.lights.lights.size() : 0)),
         film_(exec, count_),
-        clock_(exec) {}
+        clock_(exec) {
+    exec_.for_each(around_lights_.size(), find_light_solids<world_type>{world_, around_lights_.view()});
+  }
 
   /// Renders sample number `sample` (from 0) of each pixel with `weight` >= 0 in the picture, and waits.
   void render_sample(no_guide, const pinhole& camera, std::uint32_t sample, float weight) {
@@ -104,7 +113,7 @@ class bidirectional_tracer {
 
   void follow_light(const pinhole& camera) {
     clock_.measure("light paths", [&] {
-      exec_.for_each(count_, start_light_paths<world_type>{world_, paths_.view()});
+      exec_.for_each(count_, start_light_paths<world_type>{world_, around_lights_.view(), paths_.view()});
     });
     for (std::uint32_t segments = 1; segments < settings_.max_depth; ++segments) {
       clock_.measure("light paths", [&] {
@@ -126,7 +135,11 @@ class bidirectional_tracer {
 
   void follow_camera(const pinhole& camera) {
     clock_.measure("camera", [&] {
-      exec_.for_each(count_, start_camera_paths<world_type>{world_, camera, paths_.view()});
+      if (world_.scene.has_solids)
+        exec_.for_each(1, find_camera_solids<Caster, pinhole>{world_.scene, world_.caster, camera,
+                                                              around_camera_.view()});
+      exec_.for_each(count_,
+                     start_camera_paths<world_type>{world_, camera, around_camera_.view(), paths_.view()});
     });
     for (std::uint32_t segments = 1; segments <= settings_.max_depth; ++segments) {
       clock_.measure("trace", [&] {
@@ -155,6 +168,8 @@ class bidirectional_tracer {
   wfpg::buffer<vec3, Exec> positions_;  // of stored vertices
   wfpg::light_vertices<Exec, subpath_vertex> stored_;
   wfpg::photon_map<Exec> photons_;
+  wfpg::buffer<solid_stack, Exec> around_camera_;
+  wfpg::buffer<solid_stack, Exec> around_lights_;  // by the lights' columns; empty where there are no solids
   path_film<Exec> film_;
   policy_clock<Exec> clock_;
   std::uint64_t dropped_ = 0;

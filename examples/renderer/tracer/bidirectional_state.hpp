@@ -4,8 +4,10 @@
 
 #include "lights/lights.hpp"
 #include "scene/camera.hpp"
+#include "tracer/media_ways.hpp"
 #include "tracer/path_state.hpp"
 
+#include <wfpg/host/phase.hpp>
 #include <wfpg/light/light_vertices.hpp>
 #include <wfpg/light/path_weights.hpp>
 #include <wfpg/light/splats.hpp>
@@ -14,68 +16,166 @@ namespace render {
 
 /// A light or camera path between two vertices.
 struct subpath {
-  vec3 origin{0.0f};         ///< of the next segment
-  std::uint32_t active = 0;  ///< 0: it has ended
+  /// Where a path comes from: it has ended, it scattered in a medium, or it left a surface, a light or the
+  /// camera.
+  enum class origin_kind : std::uint32_t { ended, medium, other };
+
+  vec3 origin{0.0f};  ///< of the next segment
+  origin_kind from = origin_kind::ended;
   vec3 direction{0.0f, 0.0f, 1.0f};
-  float unused = 0.0f;
-  vec3 throughput{1.0f};
+  float begun_luminance = 1.0f;  ///< of the throughput when the path began
+  vec3 throughput{1.0f};         ///< with roulette
   wfpg::subpath_weights weights;
+  solid_stack solids;  ///< around the segment's begin
 
   subpath() = default;
-  WFPG_HD subpath(vec3 from, vec3 toward, vec3 carries, const wfpg::subpath_weights& begun)
-      : origin(from), active(1), direction(toward), throughput(carries), weights(begun) {}
+  WFPG_HD subpath(const wfpg::ray& begun, vec3 carries, const wfpg::subpath_weights& begun_weights,
+                  const solid_stack& around)
+      : origin(begun.origin),
+        from(origin_kind::other),
+        direction(begun.direction),
+        begun_luminance(wfpg::luminance(carries)),
+        throughput(carries),
+        weights(begun_weights),
+        solids(around) {}
 
+  WFPG_HD bool is_active() const { return from != origin_kind::ended; }
   WFPG_HD wfpg::ray ray() const { return ray_along(origin, direction); }
 };
 
-static_assert(sizeof(subpath) == 64, "tiles have pieces of 16 bytes");
+static_assert(sizeof(subpath) == 80, "tiles have pieces of 16 bytes");
+
+/// How a vertex scatters, by a BSDF or by a phase function, as a path sees it. Directions are a BSDF's.
+struct scatterer {
+  bsdf surface;
+  wfpg::henyey_greenstein phase;
+  bool in_medium = false;
+
+  WFPG_HD bool is_delta() const { return !in_medium && surface.is_delta(); }
+  WFPG_HD vec3 eval_rgb(vec3 outgoing, vec3 incident) const {
+    return in_medium ? vec3(phase.eval(outgoing, incident)) : surface.eval_rgb(outgoing, incident);
+  }
+  WFPG_HD float pdf(vec3 outgoing, vec3 incident) const {
+    return in_medium ? phase.pdf(outgoing, incident) : surface.pdf(outgoing, incident);
+  }
+  WFPG_HD wfpg::bsdf_sample sample(vec3 outgoing, vec2 u) const {
+    return in_medium ? phase.sample(outgoing, u) : surface.sample(outgoing, u);
+  }
+};
 
 /// A vertex of a light or camera path. Nothing is initialised, since vertices are made from a hit or copied.
 struct subpath_vertex {
-  path_vertex at;  ///< its `normal` is the shading normal on the side of geometric_normal, whoever looks
-  vec3 throughput;
+  /// On surfaces. Its `normal` is the shading normal on the side of geometric_normal, whoever looks. In a
+  /// medium it has a position and `outgoing` alone.
+  path_vertex at;
+  vec3 throughput;         ///< of the path that arrives; in a medium with scattering
   std::uint32_t segments;  ///< of its path so far, at least 1
   wfpg::vertex_weights weights;
-  std::uint32_t unused[3];
+  solid_stack solids;      ///< around it, on a surface on the side of at.outgoing
+  std::uint32_t material;  ///< of the surface, or of the solid whose medium it is in
+  float extinction;        ///< of that medium, mean of its channels; 0 on surfaces
+  float g;                 ///< of that medium
 
   subpath_vertex() = default;
-  WFPG_HD subpath_vertex(const hit_surface& hit, vec3 carries, std::uint32_t from_end,
-                         const wfpg::vertex_weights& arrived)
-      : at(hit), throughput(carries), segments(from_end), weights(arrived), unused{} {
+  WFPG_HD subpath_vertex(const hit_surface& hit, const path_segment& arrived, std::uint32_t from_end,
+                         const wfpg::vertex_weights& arrived_weights)
+      : at(hit),
+        throughput(arrived.throughput),
+        segments(from_end),
+        weights(arrived_weights),
+        solids(arrived.solids),
+        material(arrived.material),
+        extinction(0.0f),
+        g(0.0f) {
     const vec3 normal = hit.shading_normal;
     at.normal = glm::dot(normal, at.geometric_normal) < 0.0f ? -normal : normal;
   }
+  /// In a medium.
+  WFPG_HD subpath_vertex(vec3 position, vec3 outgoing, const medium& around, std::uint32_t solid,
+                         const path_segment& arrived, std::uint32_t from_end,
+                         const wfpg::vertex_weights& arrived_weights)
+      : at(hit_surface()),
+        throughput(arrived.throughput),
+        segments(from_end),
+        weights(arrived_weights),
+        solids(arrived.solids),
+        material(solid),
+        extinction(mean_extinction(around)),
+        g(around.g) {
+    at.position = position;
+    at.outgoing = outgoing;
+  }
 
-  /// The BSDF as a path sees it that leaves in that direction, or comes from there.
-  WFPG_HD bsdf seen_from(vec3 direction) const {
-    bsdf f = at.bsdf();
-    orient(f, at.geometric_normal, at.normal, direction);
+  WFPG_HD bool in_medium() const { return extinction > 0.0f; }
+  /// Of a medium that scatters, at least 1e-30, so that it tells a vertex in a medium.
+  WFPG_HD static float mean_extinction(const medium& around) {
+    const vec3 sigma = around.extinction();
+    return glm::max((sigma.x + sigma.y + sigma.z) / 3.0f, 1e-30f);
+  }
+
+  /// How it scatters for a path that leaves in that direction, or comes from there.
+  WFPG_HD scatterer seen_from(vec3 direction) const {
+    scatterer f;
+    f.in_medium = in_medium();
+    if (f.in_medium) {
+      f.phase.g = g;
+    } else {
+      f.surface = at.bsdf();
+      orient(f.surface, at.geometric_normal, at.normal, direction);
+    }
     return f;
   }
-  /// |cos| between the geometric normal and a direction, kept off 0, since densities are divided by it.
+  /// |cos| between the geometric normal and a direction, kept off 0, since densities are divided by it. 1 in
+  /// media.
   WFPG_HD float cosine(vec3 direction) const {
-    return glm::max(std::abs(glm::dot(at.geometric_normal, direction)), 1e-6f);
+    return in_medium() ? 1.0f : glm::max(std::abs(glm::dot(at.geometric_normal, direction)), 1e-6f);
   }
   /// Flux that arrived from at.outgoing and is scattered in a direction, per steradian. Light comes the other
-  /// way than in bsdf::eval_rgb(). Source: Veach 1997, section 5.3, for the cosines of shading normals.
+  /// way than in scatterer::eval_rgb(). Source: Veach 1997, section 5.3, for the cosines of shading normals.
   WFPG_HD vec3 scattered_flux(vec3 direction) const {
     return seen_from(direction).eval_rgb(direction, at.outgoing) * (cosine(direction) / cosine(at.outgoing));
   }
   /// How a path that sees `f` leaves in a direction.
-  WFPG_HD wfpg::path_departure leave(const bsdf& f, vec3 direction) const {
+  WFPG_HD wfpg::path_departure leave(const scatterer& f, vec3 direction) const {
     wfpg::path_departure to;
     to.pdf = f.pdf(at.outgoing, direction);
     to.pdf_back = seen_from(direction).pdf(direction, at.outgoing);
     to.cosine = cosine(direction);
+    if (!f.in_medium) return to;
+    to.kind = wfpg::scattering_kind::medium;
+    to.sine = glm::max(glm::length(glm::cross(at.outgoing, direction)), 1e-6f);
+    to.extinction = extinction;
     return to;
   }
   /// Where a ray begins that leaves in a direction, which need not have unit length.
   WFPG_HD vec3 leave_along(vec3 direction) const {
-    return leave_surface(at.position, at.geometric_normal, direction, at.offset);
+    return in_medium() ? at.position : leave_surface(at.position, at.geometric_normal, direction, at.offset);
+  }
+  /// The solids around a ray that leaves in a direction.
+  WFPG_HD solid_stack solids_along(const scene_view& scene, vec3 direction) const {
+    if (in_medium() || !scene.has_solids) return solids;
+    return solids_beyond(scene, solids, material, at.geometric_normal, at.outgoing, direction);
   }
 };
 
-static_assert(sizeof(subpath_vertex) == 128, "tiles have pieces of 16 bytes");
+static_assert(sizeof(subpath_vertex) == 144, "tiles have pieces of 16 bytes");
+
+/// Random numbers of light paths begin at this use, and those of distances in media at another. Both are far
+/// from those of camera paths' vertices.
+inline constexpr std::uint32_t light_path_dimensions = 0x40000000u;
+inline constexpr std::uint32_t distance_dimensions = 0x20000000u;
+
+/// A visitor of follow_segment() that looks at nothing on the way.
+struct passer {
+  random_stream random;
+  std::uint32_t path;
+  std::uint32_t first_dimension;  ///< of the segment's distances
+
+  WFPG_HD vec2 draw(std::uint32_t piece) const { return random(path, first_dimension + piece); }
+  WFPG_HD void cross(const path_segment&, const medium&, float, float, float) const {}
+  WFPG_HD void meet(const path_segment&, const hit_surface&) const {}
+  WFPG_HD void leave(const path_segment&) const {}
+};
 
 /// The scene and its lights for bidirectional kernels, with an inline caster.
 template <class Caster>
@@ -85,52 +185,101 @@ struct bidirectional_world {
   Caster caster;
   wfpg::path_techniques techniques;
   random_stream random;
-  std::uint32_t max_depth = 1;  ///< most segments of a whole path
+  std::uint32_t max_depth = 1;       ///< most segments of a whole path
+  std::uint32_t roulette_depth = 3;  ///< roulette begins at this vertex, from 0
 
-  /// Moves a path along its ray. Writes the vertex where it arrives. False where it leaves the scene.
-  WFPG_HD bool arrive(const subpath& path, std::uint32_t segments, subpath_vertex& vertex,
-                      hit_surface& found) const {
-    const triangle_hit hit = caster.intersect(path.ray());
-    if (!hit.is_hit()) return false;
-    found = scene.surface(hit, -path.direction);
-    const float distance = glm::max(glm::length(found.surface.position - path.origin), 1e-12f);
-    vec3 throughput = path.throughput;
-    if (found.absorption != vec3(0.0f)) throughput *= glm::exp(-found.absorption * distance);
+  /// The weights of a path that has come as far as `s`, on a surface with that cosine or in a medium.
+  WFPG_HD static wfpg::vertex_weights weights_at(const subpath& path, const path_segment& s, float cosine) {
     wfpg::path_arrival arrival;
-    arrival.distance = distance;
-    arrival.cosine = glm::max(std::abs(glm::dot(found.surface.geometric_normal, path.direction)), 1e-6f);
-    vertex = subpath_vertex(found, throughput, segments, path.weights.arrive(arrival));
-    return true;
+    arrival.distance = glm::max(s.distance, 1e-12f);
+    arrival.cosine = cosine;
+    arrival.pdf_distance = s.pdf.there;
+    arrival.pdf_distance_back = s.pdf.back;
+    return path.weights.arrive(arrival);
+  }
+  /// Of a path and a surface that it meets.
+  WFPG_HD static float arrival_cosine(const subpath& path, const hit_surface& met) {
+    return glm::max(std::abs(glm::dot(met.surface.geometric_normal, path.direction)), 1e-6f);
   }
 
-  /// Whether nothing lies between a vertex and a point that is `end` off its own surface.
-  WFPG_HD bool sees(const subpath_vertex& from, vec3 end) const {
-    return is_clear(ray_between(from.leave_along(end - from.at.position), end));
+  /// What a path with this number meets on its segment: `passer` for those who look at nothing.
+  /// `first_dimension`: of its kind of paths.
+  WFPG_HD passer passer_of(std::uint32_t path, std::uint32_t segments, std::uint32_t first_dimension) const {
+    return {random, path, first_dimension + distance_dimensions + segments * (most_passed + 1)};
   }
-  /// Whether nothing lies on a ray. Its t_max may be 0.
-  WFPG_HD bool is_clear(const wfpg::ray& ray) const { return !(ray.t_max > 0.0f) || !caster.occluded(ray); }
+
+  /// Moves a path along its ray. Writes the vertex where it arrives. False where there is none. A Visitor is
+  /// one of follow_segment().
+  template <class Visitor>
+  WFPG_HD bool arrive(const subpath& path, std::uint32_t segments, subpath_vertex& vertex,
+                      Visitor& visitor) const {
+    path_segment s;
+    s.throughput = path.throughput;
+    s.solids = path.solids;
+    hit_surface found;
+    const bool from_medium = path.from == subpath::origin_kind::medium;
+    const segment_end end = follow_segment(scene, caster, path.ray(), from_medium, s, found, visitor);
+    if (end == segment_end::surface)
+      vertex = subpath_vertex(found, s, segments, weights_at(path, s, arrival_cosine(path, found)));
+    else if (end == segment_end::medium)
+      vertex = subpath_vertex(path.origin + s.distance * path.direction, -path.direction,
+                              s.solids.medium_of(scene), s.solids.top(scene), s, segments,
+                              weights_at(path, s, 1.0f));
+    return end != segment_end::nothing;
+  }
+
+  /// The way from a vertex to a point that is `end` off its own surface. `ends_inside`: whether paths scatter
+  /// in a medium there.
+  WFPG_HD clear_way way_between(const subpath_vertex& from, vec3 end, bool ends_inside) const {
+    const vec3 way = end - from.at.position;
+    return way_along(from, ray_between(from.leave_along(way), end), ends_inside);
+  }
+  /// The way along a ray that leaves a vertex. Its t_max may be 0. Ways on which less is left than floats can
+  /// weight are hidden.
+  WFPG_HD clear_way way_along(const subpath_vertex& from, const wfpg::ray& ray, bool ends_inside) const {
+    clear_way clear;
+    clear.transmittance = vec3(1.0f);
+    if (ray.t_max > 0.0f)
+      clear = render::way_along(scene, caster, ray, from.solids_along(scene, ray.direction), from.in_medium(),
+                                ends_inside);
+    constexpr float least = 1.4e-11f;  // exp(-25)
+    const vec3 left = clear.transmittance;
+    if (!(glm::max(left.x, glm::max(left.y, left.z)) > least)) clear.transmittance = vec3(0.0f);
+    return clear;
+  }
 
   WFPG_HD vec2 draw(std::uint32_t path, std::uint32_t segments, std::uint32_t use) const {
     return random(path, segments * dimension::per_vertex + use);
   }
 
-  /// Continues a path from its vertex in a direction that the BSDF samples. `carries_flux`: it is a light
-  /// path. False where it ends.
+  /// Continues a path from its vertex in a direction that is sampled there, with roulette. `carries_flux`: it
+  /// is a light path. `dimensions`: the first of its kind of paths. False where it ends.
+  WFPG_HD bool extend(const subpath_vertex& vertex, std::uint32_t id, bool carries_flux,
+                      std::uint32_t dimensions, subpath& path) const {
+    const float begun = path.begun_luminance;
+    if (!scatter(vertex, draw(id, vertex.segments, dimensions + dimension::direction), carries_flux, path))
+      return false;
+    path.begun_luminance = begun;
+    return vertex.segments <= roulette_depth ||
+           survives(path, draw(id, vertex.segments, dimensions + dimension::roulette).x);
+  }
+
+  /// Continues a path from its vertex in the direction that `u` samples. False where there is none.
   WFPG_HD bool scatter(const subpath_vertex& vertex, vec2 u, bool carries_flux, subpath& path) const {
     const vec3 outgoing = vertex.at.outgoing;
-    const bsdf f = vertex.seen_from(outgoing);
+    const scatterer f = vertex.seen_from(outgoing);
     const wfpg::bsdf_sample drawn = f.sample(outgoing, u);
     if (!(drawn.pdf > 0.0f)) return false;
     const vec3 direction = drawn.direction;
-    const bool is_delta = drawn.is_delta || f.is_delta();
     vec3 weight;
     wfpg::path_departure to;
-    if (is_delta) {
-      weight = f.delta_weight_rgb(outgoing, direction, drawn.pdf);
+    if (drawn.is_delta || f.is_delta()) {
+      weight = f.surface.delta_weight_rgb(outgoing, direction, drawn.pdf);
       // Refraction changes radiance, but not flux.
       if (carries_flux) {
-        const float eta = f.ior_beyond(outgoing, direction);
-        const float shading = std::abs(glm::dot(outgoing, f.normal) / glm::dot(direction, f.normal));
+        const float eta = f.surface.ior_beyond(outgoing, direction);
+        const vec3 normal = f.surface.normal;
+        const float shading = std::abs(glm::dot(outgoing, normal) / glm::dot(direction, normal));
         weight *= eta * eta * shading * vertex.cosine(direction) / vertex.cosine(outgoing);
       }
       to.kind = wfpg::scattering_kind::delta;
@@ -143,8 +292,21 @@ struct bidirectional_world {
       to.pdf = drawn.pdf;
     }
     if (!(wfpg::luminance(weight) > 0.0f)) return false;
-    path = subpath(vertex.leave_along(direction), direction, vertex.throughput * weight,
-                   vertex.weights.depart(techniques, to));
+    path = subpath(ray_along(vertex.leave_along(direction), direction), vertex.throughput * weight,
+                   vertex.weights.depart(techniques, to), vertex.solids_along(scene, direction));
+    if (f.in_medium) path.from = subpath::origin_kind::medium;
+    return true;
+  }
+
+ private:
+  // Roulette spares paths with more than a tenth of the light that they began with. Weights leave it out, so
+  // that they add up to 1 whatever it does.
+  WFPG_HD static bool survives(subpath& path, float u) {
+    constexpr float spared_part = 0.1f;
+    const float probability =
+        glm::min(1.0f, wfpg::luminance(path.throughput) / (spared_part * path.begun_luminance));
+    if (!(u < probability)) return false;
+    path.throughput /= probability;
     return true;
   }
 };

@@ -13,13 +13,14 @@ template <class World>
 struct start_camera_paths {
   World world;
   pinhole camera;
+  wfpg::array_view<const solid_stack> around_camera;
   tiled_view<subpath> paths;
 
   WFPG_HD void operator()(std::size_t i) const {
     const auto pixel = static_cast<std::uint32_t>(i);
     const wfpg::ray ray = camera.through(pixel, world.random(pixel, dimension::pixel));
-    paths.emplace(i, ray.origin, ray.direction, vec3(1.0f),
-                  wfpg::subpath_weights::from_camera(camera.pdf(ray.direction)));
+    paths.emplace(i, ray, vec3(1.0f), wfpg::subpath_weights::from_camera(camera.pdf(ray.direction)),
+                  around_camera[0]);
   }
 };
 
@@ -36,23 +37,40 @@ struct trace_camera_paths {
 
   WFPG_HD void operator()(std::size_t i) const {
     const subpath path = paths[i];
-    if (path.active == 0) return;
+    if (!path.is_active()) return;
     ++segment_counts[i];
     subpath_vertex vertex;
-    hit_surface found;
-    if (!world.arrive(path, segments, vertex, found)) {
-      gather(i, path.throughput * world.scene.environment.radiance(path.direction),
-             path.weights.arrive(wfpg::path_arrival{1.0f}),
-             world.lights.end_in_environment(world.scene.environment, path.direction));
-      return paths.emplace(i);
-    }
-    gather(i, vertex.throughput * found.emission, vertex.weights,
-           world.lights.end_on_emitter(found.emitted_luminance, vertex.cosine(vertex.at.outgoing)));
-    if (segments == world.max_depth) return paths.emplace(i);
+    visitor ahead{world.passer_of(static_cast<std::uint32_t>(i), segments, 0), *this, i, path};
+    if (!world.arrive(path, segments, vertex, ahead) || segments == world.max_depth) return paths.emplace(i);
     vertices.emplace(i, vertex);
   }
 
  private:
+  /// Adds what is emitted on a segment.
+  struct visitor : passer {
+    const trace_camera_paths& kernel;
+    std::size_t i;
+    const subpath& path;
+
+    WFPG_HD visitor(const passer& way, const trace_camera_paths& told, std::size_t number, const subpath& of)
+        : passer(way), kernel(told), i(number), path(of) {}
+
+    WFPG_HD void meet(const path_segment& s, const hit_surface& found) const {
+      if (found.emission == vec3(0.0f)) return;
+      const float cosine = World::arrival_cosine(path, found);
+      kernel.gather(i, s.throughput * found.emission, World::weights_at(path, s, cosine),
+                    kernel.world.lights.end_on_emitter(found.emitted_luminance, cosine));
+    }
+    WFPG_HD void leave(const path_segment& s) const {
+      path_segment far = s;
+      far.distance = 1.0f;
+      const environment_view& environment = kernel.world.scene.environment;
+      kernel.gather(i, s.throughput * environment.radiance(path.direction),
+                    World::weights_at(path, far, 1.0f),
+                    kernel.world.lights.end_in_environment(environment, path.direction));
+    }
+  };
+
   WFPG_HD void gather(std::size_t i, vec3 found, const wfpg::vertex_weights& arrived,
                       const wfpg::light_end& end) const {
     if (found == vec3(0.0f)) return;
@@ -65,13 +83,14 @@ struct trace_camera_paths {
   }
 };
 
-/// Copies the positions of stored vertices, for a photon map.
+/// Copies the positions of stored vertices on surfaces, for a photon map. The map skips the others.
 struct copy_positions {
   wfpg::light_vertices_view<subpath_vertex> stored;
   wfpg::array_view<vec3> positions;
 
   WFPG_HD void operator()(std::size_t i) const {
-    positions[i] = stored[static_cast<std::uint32_t>(i)].at.position;
+    const subpath_vertex& vertex = stored[static_cast<std::uint32_t>(i)];
+    positions[i] = vertex.in_medium() ? vec3(2.0f * wfpg::largest_coordinate) : vertex.at.position;
   }
 };
 
@@ -87,44 +106,43 @@ struct connect_camera_paths {
   wfpg::array_view<vec3> radiance;
 
   WFPG_HD void operator()(std::size_t i) const {
-    if (paths[i].active == 0) return;
+    if (!paths[i].is_active()) return;
     const auto id = static_cast<std::uint32_t>(i);
     const subpath_vertex vertex = vertices[i];
-    const bsdf f = vertex.seen_from(vertex.at.outgoing);
+    const scatterer f = vertex.seen_from(vertex.at.outgoing);
     if (!f.is_delta()) {
       vec3 found(0.0f);
       if (world.techniques.next_event > 0.0f) found += sample_light(id, vertex, f);
       if (world.techniques.connections > 0.0f) found += connect_all(i, vertex, f);
-      if (world.techniques.surface_points > 0.0f) found += merge_all(vertex, f);
+      if (world.techniques.surface_points > 0.0f && !f.in_medium) found += merge_all(vertex, f);
       radiance[i] += vertex.throughput * found;
     }
-    subpath next;
-    if (world.scatter(vertex, world.draw(id, vertex.segments, dimension::direction), false, next))
+    subpath next = paths[i];
+    if (world.extend(vertex, id, false, 0, next))
       paths.emplace(i, next);
     else
       paths.emplace(i);
   }
 
  private:
-  WFPG_HD vec3 sample_light(std::uint32_t id, const subpath_vertex& vertex, const bsdf& f) const {
+  WFPG_HD vec3 sample_light(std::uint32_t id, const subpath_vertex& vertex, const scatterer& f) const {
     const light_sample light =
         world.lights.sample(world.scene, vertex.at.position, wfpg::light_choice{},
                             [&](std::uint32_t use) { return world.draw(id, vertex.segments, use); });
     if (!(light.pdf > 0.0f)) return vec3(0.0f);
     const vec3 value = f.eval_rgb(vertex.at.outgoing, light.direction) * light.radiance / light.pdf;
-    if (!(wfpg::luminance(value) > 0.0f) || is_hidden(vertex, light)) return vec3(0.0f);
-    wfpg::path_edge edge;
-    if (!light.is_distant) edge.distance = glm::length(light.end - vertex.at.position);
-    return value *
+    if (!(wfpg::luminance(value) > 0.0f)) return vec3(0.0f);
+    const vec3 to_light = light.is_distant ? light.direction : light.end - vertex.at.position;
+    const clear_way way = world.way_along(vertex, ray_toward(vertex.leave_along(to_light), light), false);
+    if (way.transmittance == vec3(0.0f)) return vec3(0.0f);
+    // A light path comes the other way.
+    wfpg::path_edge edge{1.0f, way.pdf.back, way.pdf.there};
+    if (!light.is_distant) edge.distance = glm::length(to_light);
+    return value * way.transmittance *
            vertex.weights.next_event(world.techniques, vertex.leave(f, light.direction), light.source, edge);
   }
 
-  WFPG_HD bool is_hidden(const subpath_vertex& vertex, const light_sample& light) const {
-    const vec3 way = light.is_distant ? light.direction : light.end - vertex.at.position;
-    return !world.is_clear(ray_toward(vertex.leave_along(way), light));
-  }
-
-  WFPG_HD vec3 connect_all(std::size_t i, const subpath_vertex& vertex, const bsdf& f) const {
+  WFPG_HD vec3 connect_all(std::size_t i, const subpath_vertex& vertex, const scatterer& f) const {
     vec3 found(0.0f);
     for (std::uint32_t k = stored.last(i); k != stored.none; k = stored.previous(k)) {
       const subpath_vertex& light = stored[k];
@@ -133,7 +151,7 @@ struct connect_camera_paths {
     return found;
   }
 
-  WFPG_HD vec3 merge_all(const subpath_vertex& vertex, const bsdf& f) const {
+  WFPG_HD vec3 merge_all(const subpath_vertex& vertex, const scatterer& f) const {
     vec3 found(0.0f);
     photons.for_each_point(vertex.at.position, [&](std::uint32_t k) {
       const subpath_vertex& light = stored[k];
@@ -143,7 +161,7 @@ struct connect_camera_paths {
     return found / world.techniques.surface_points;
   }
 
-  WFPG_HD vec3 merge(const subpath_vertex& camera, const bsdf& f, const subpath_vertex& light) const {
+  WFPG_HD vec3 merge(const subpath_vertex& camera, const scatterer& f, const subpath_vertex& light) const {
     const vec3 outgoing = camera.at.outgoing, incident = light.at.outgoing;
     // The photon's flux is that of a surface with the geometric normal.
     const vec3 value = f.eval_rgb(outgoing, incident) * light.throughput / camera.cosine(incident);
@@ -152,7 +170,7 @@ struct connect_camera_paths {
                                        camera.weights, camera.leave(f, incident));
   }
 
-  WFPG_HD vec3 connect(const subpath_vertex& camera, const bsdf& f, const subpath_vertex& light) const {
+  WFPG_HD vec3 connect(const subpath_vertex& camera, const scatterer& f, const subpath_vertex& light) const {
     const vec3 way = light.at.position - camera.at.position;
     const float distance = glm::length(way);
     if (!(distance > 0.0f)) return vec3(0.0f);
@@ -160,12 +178,13 @@ struct connect_camera_paths {
     const vec3 value = f.eval_rgb(camera.at.outgoing, toward) * light.scattered_flux(-toward) *
                        light.throughput / (distance * distance);
     if (!(wfpg::luminance(value) > 0.0f)) return vec3(0.0f);
-    if (!world.sees(camera, light.leave_along(-way))) return vec3(0.0f);
-    wfpg::path_edge edge;
-    edge.distance = distance;
+    const clear_way clear = world.way_between(camera, light.leave_along(-way), light.in_medium());
+    if (clear.transmittance == vec3(0.0f)) return vec3(0.0f);
+    const wfpg::path_edge edge{distance, clear.pdf.back, clear.pdf.there};
     const wfpg::path_departure to_camera = light.leave(light.seen_from(light.at.outgoing), -toward);
-    return value * light.weights.connection(world.techniques, to_camera, camera.weights,
-                                            camera.leave(f, toward), edge);
+    return value * clear.transmittance *
+           light.weights.connection(world.techniques, to_camera, camera.weights, camera.leave(f, toward),
+                                    edge);
   }
 };
 

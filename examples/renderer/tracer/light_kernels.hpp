@@ -5,13 +5,25 @@
 
 namespace render {
 
-/// Random numbers of light paths begin at this use, far from those of camera paths.
-inline constexpr std::uint32_t light_path_dimensions = 0x40000000u;
+/// Finds the solids around each light.
+template <class World>
+struct find_light_solids {
+  World world;
+  wfpg::array_view<solid_stack> found;  ///< by the light's column
+
+  WFPG_HD void operator()(std::size_t light) const {
+    vec3 place;
+    found[light] = world.lights.find_place(world.scene, static_cast<std::uint32_t>(light), place)
+                       ? solids_around(world.scene, world.caster, place)
+                       : solid_stack();
+  }
+};
 
 /// Starts a path at a light.
 template <class World>
 struct start_light_paths {
   World world;
+  wfpg::array_view<const solid_stack> around_lights;  ///< empty: there are no solids
   tiled_view<subpath> paths;
 
   WFPG_HD void operator()(std::size_t i) const {
@@ -19,8 +31,9 @@ struct start_light_paths {
     const emitted_ray emitted = world.lights.emit(
         world.scene, [&](std::uint32_t use) { return world.random(id, light_path_dimensions + use); });
     if (!(wfpg::luminance(emitted.throughput) > 0.0f)) return paths.emplace(i);
-    paths.emplace(i, emitted.ray.origin, emitted.ray.direction, emitted.throughput,
-                  wfpg::subpath_weights::from_light(world.techniques, emitted.source));
+    paths.emplace(i, emitted.ray, emitted.throughput,
+                  wfpg::subpath_weights::from_light(world.techniques, emitted.source),
+                  around_lights.empty() ? solid_stack() : around_lights[emitted.light]);
   }
 };
 
@@ -37,13 +50,13 @@ struct trace_light_paths {
   WFPG_HD void operator()(std::size_t i) const {
     keeps[i] = 0;
     const subpath path = paths[i];
-    if (path.active == 0) return;
+    if (!path.is_active()) return;
     ++segment_counts[i];
     subpath_vertex vertex;
-    hit_surface found;
-    if (!world.arrive(path, segments, vertex, found)) return paths.emplace(i);
+    passer ahead = world.passer_of(static_cast<std::uint32_t>(i), segments, light_path_dimensions);
+    if (!world.arrive(path, segments, vertex, ahead)) return paths.emplace(i);
     vertices.emplace(i, vertex);
-    keeps[i] = found.surface.bsdf.is_delta() ? 0u : 1u;
+    keeps[i] = vertex.seen_from(vertex.at.outgoing).is_delta() ? 0u : 1u;
   }
 };
 
@@ -60,16 +73,14 @@ struct extend_light_paths {
   wfpg::splat_view splats;
 
   WFPG_HD void operator()(std::size_t i) const {
-    if (paths[i].active == 0) return;
+    if (!paths[i].is_active()) return;
     const subpath_vertex vertex = vertices[i];
     if (keeps[i] != 0) {
       if (stored.paths() > 0 && stored.has_place(i)) stored.write(i, vertex);
       if (world.techniques.splats > 0.0f) splat(i, vertex);
     }
-    const auto id = static_cast<std::uint32_t>(i);
-    const vec2 u = world.draw(id, vertex.segments, light_path_dimensions + dimension::direction);
-    subpath next;
-    if (!is_last && world.scatter(vertex, u, true, next))
+    subpath next = paths[i];
+    if (!is_last && world.extend(vertex, static_cast<std::uint32_t>(i), true, light_path_dimensions, next))
       paths.emplace(i, next);
     else
       paths.emplace(i);
@@ -77,19 +88,22 @@ struct extend_light_paths {
 
  private:
   WFPG_HD void splat(std::size_t i, const subpath_vertex& vertex) const {
-    const vec3 way = camera.position() - vertex.at.position;
-    const float distance = glm::length(way);
+    const vec3 to_camera = camera.position() - vertex.at.position;
+    const float distance = glm::length(to_camera);
     if (!(distance > 0.0f)) return;
-    const vec3 toward = way / distance;
+    const vec3 toward = to_camera / distance;
     std::uint32_t pixel;
     if (!camera.find_pixel(-toward, pixel)) return;
     const float pdf = camera.pdf(-toward);
     const vec3 value = vertex.throughput * vertex.scattered_flux(toward) * (pdf / (distance * distance));
-    if (!(wfpg::luminance(value) > 0.0f) || !world.sees(vertex, camera.position())) return;
-    const bsdf f = vertex.seen_from(vertex.at.outgoing);
-    wfpg::path_edge edge;
-    edge.distance = distance;
-    splats.add(i, pixel, value * vertex.weights.splat(world.techniques, vertex.leave(f, toward), pdf, edge));
+    if (!(wfpg::luminance(value) > 0.0f)) return;
+    const clear_way way = world.way_between(vertex, camera.position(), false);
+    if (way.transmittance == vec3(0.0f)) return;
+    const scatterer f = vertex.seen_from(vertex.at.outgoing);
+    const wfpg::path_edge edge{distance, way.pdf.there, way.pdf.back};
+    splats.add(i, pixel,
+               value * way.transmittance *
+                   vertex.weights.splat(world.techniques, vertex.leave(f, toward), pdf, edge));
   }
 };
 

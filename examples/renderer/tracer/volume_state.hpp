@@ -2,8 +2,8 @@
 // surfaces, and of queues.
 #pragma once
 
+#include "tracer/media_ways.hpp"
 #include "tracer/path_kernels.hpp"
-#include "tracer/solid_stack.hpp"
 
 namespace render {
 
@@ -29,10 +29,6 @@ static_assert(sizeof(volume_path) == 64, "every kernel of a wave reads it");
 /// The key of vertices in a medium. Those on surfaces have their material's kind.
 inline constexpr std::uint32_t medium_key = (1u << material_key_bits) - 2;
 
-/// Most boundaries that a ray passes without a vertex: those of equal index, and those that other solids
-/// cover. A ray that meets more finds no light.
-inline constexpr std::uint32_t most_passed = 64;
-
 /// The sample and depth of a wave through media. A segment draws a distance for each piece between the
 /// boundaries that it passes.
 struct volume_position : wave_position {
@@ -41,25 +37,6 @@ struct volume_position : wave_position {
 
   WFPG_HD vec2 draw(std::uint32_t path, std::uint32_t use) const {
     return random(path, depth * per_vertex + use);
-  }
-};
-
-/// A ray that goes straight through boundaries, and how far it has come.
-struct straight_ray {
-  wfpg::ray ray;
-  float covered = 0.0f;  ///< distance from its origin, scene units
-
-  WFPG_HD explicit straight_ray(const wfpg::ray& begun) : ray(begun) {}
-
-  /// Distance from the origin to a point on the ray.
-  WFPG_HD float distance_to(vec3 position) const { return glm::length(position - ray.origin); }
-  /// Length of the piece that ends at a distance.
-  WFPG_HD float piece(float distance) const { return glm::max(distance - covered, 0.0f); }
-  /// Goes on behind a surface. `offset`: as in surface_point.
-  WFPG_HD void pass(float distance, vec3 geometric_normal, float offset) {
-    covered = distance;
-    const float cosine = std::abs(glm::dot(geometric_normal, ray.direction));
-    ray.t_min = distance + offset / glm::max(cosine, 1e-3f);
   }
 };
 
