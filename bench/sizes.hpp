@@ -35,6 +35,16 @@ struct gpu_sizes {
   static constexpr argument casting[][2] = {{100, 1}, {100, 0}, {1000, 1}, {1000, 0}, {0, 1}};
 
   static constexpr argument photons[][2] = {{2000, 0}, {2000, 1}};  // thousands, whether most lie in a corner
+
+  // Connections among how many thousands of triangles. Then whether surfaces are coated, and the vertices
+  // before each end.
+  static constexpr std::uint32_t connections = 1u << 22, connection_thousands = 100;
+  static constexpr argument connecting[][2] = {{0, 1}, {0, 32}, {1, 1}};
+
+  // Pixels of a bidirectional iteration. Then whether the scene is mirror-balls, not caustic-pool, and
+  // whether vertices are merged.
+  static constexpr int iteration_width = 1920, iteration_height = 1080;
+  static constexpr argument iteration[][2] = {{0, 0}, {1, 0}, {0, 1}, {1, 1}};
 };
 
 /// CPUs. All iterations of a stage take about two seconds on one core.
@@ -57,6 +67,12 @@ struct cpu_sizes {
   static constexpr argument casting[][2] = {{20, 1}, {20, 0}, {0, 1}};
 
   static constexpr argument photons[][2] = {{100, 0}, {100, 1}};
+
+  static constexpr std::uint32_t connections = 1u << 16, connection_thousands = 20;
+  static constexpr argument connecting[][2] = {{0, 1}, {0, 32}, {1, 1}};
+
+  static constexpr int iteration_width = 96, iteration_height = 54;
+  static constexpr argument iteration[][2] = {{0, 0}, {1, 0}, {0, 1}, {1, 1}};
 };
 
 #if defined(__CUDACC__)

@@ -22,6 +22,9 @@ FLOORS = {
     "casting": "OptiX, the same rays",
     "building_boxes": "CUB's sort of as many 63-bit keys",
     "finding_photons": "reading points and photons that are found",
+    "merging": "as many rays among as many triangles",
+    "connecting": "connections without weights",
+    "iteration": "its own rays, cast again alone",
 }
 MEASURES = ("mse_reinhard", "relmse_robust")
 STAGES = ("trace", "sort", "lights", "directions", "shade", "update")
