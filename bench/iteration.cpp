@@ -100,7 +100,7 @@ class traced_scene {
     settings_.width = sizes::iteration_width;
     settings_.height = sizes::iteration_height;
     settings_.max_depth = static_cast<std::uint32_t>(host_.max_depth);
-    settings_.techniques.merges = merges;
+    if (merges) settings_.techniques.add(render::technique::surf);
     settings_.light.memory = std::size_t(4) << 30;  // for all vertices
   }
 

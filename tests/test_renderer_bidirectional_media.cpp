@@ -45,7 +45,9 @@ double mean_of_channel(const image& picture, int channel) {
 
 /// Sets that find all light, and have noise without end nowhere. Light samples and splats alone have it
 /// where they are near a vertex in a medium.
-constexpr const char* all_techniques[] = {"hits", "hits+nee", "hits+nee+connect", "hits+splat", "bpt"};
+constexpr const char* all_techniques[] = {
+    "hits",          "hits+nee",      "hits+nee+connect", "hits+splat",     "bpt",
+    "hits+nee+pp3d", "hits+nee+pb2d", "hits+nee+bb1d",    "hits+pp3d+bb1d", "bpt+surf+pp3d+pb2d+bb1d"};
 
 sample_mean radiance_of_furnace(const std::string& techniques, bool solids, int seeds) {
   return mean_over_seeds(white_furnace(solids), with(techniques, 32, solids ? 12 : 8, 400), 1, seeds,
@@ -78,11 +80,13 @@ TEST_CASE("both ends: light that fog scatters once is an integral", "[renderer][
     one.view.forward = camera.through(place, vec2(0.5f)).direction;
     expected += airlight(one, 1, clear) / (places * places);
   }
-  for (const std::string techniques : {"nee", "splat", "bpt"}) {
+  for (const std::string techniques : {"nee", "splat", "bpt", "pb2d", "bb1d", "bpt+pp3d+pb2d+bb1d"}) {
     INFO(techniques);
     const int spp = techniques == "splat" ? 350 : 120;
-    const sample_mean found = mean_over_seeds(s, with(techniques, 32, spp, 2), 1, 16,
-                                              [](const image& p) { return mean_of_channel(p, 1); });
+    render_options options = with(techniques, 32, spp, 2);
+    options.light.volume_radius = techniques == "pb2d" ? 0.03f : 0.01f;
+    const sample_mean found =
+        mean_over_seeds(s, options, 1, 16, [](const image& p) { return mean_of_channel(p, 1); });
     CHECK(has_mean(found, expected));
   }
 }
@@ -137,9 +141,9 @@ TEST_CASE("both ends: each set of techniques has the light of path tracing throu
 
 TEST_CASE("both ends: pictures of media are the same on every policy", "[renderer][bidirectional][media]") {
   render_options options = with("bpt", 32, 2, 12);
-  options.method = sampling_method::vcm;
+  options.method = sampling_method::upbp;
   options.techniques.reset();
-  options.light.merge_radius = 0.03f;
+  options.light.merge_radius = options.light.volume_radius = 0.03f;
   options.where = device::seq;
   const scene s = foggy_box();
   const std::vector<vec3> serial = picture_of(s, options).pixels;

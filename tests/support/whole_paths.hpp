@@ -33,7 +33,9 @@ struct test_world {
         accelerated(exec, host, geometry.view()),
         camera(host.view, pixels, pixels),
         view(geometry.view()),
-        world{view, lights.view(), accelerated.caster(), {}, {7, 0}, 6} {
+        world{view, lights.view(), accelerated.caster()} {
+    world.random = {7, 0};
+    world.max_depth = 6;
     world.techniques.splats = static_cast<float>(pixels * pixels);
     around_camera = render::solids_around(view, world.caster, camera.position());
   }

@@ -4,14 +4,16 @@
 namespace render {
 
 /// Sampling methods. pt is path tracing, vpt path tracing through media. bpt is bidirectional path tracing,
-/// vcm vertex connection and merging, lt light tracing. wfpg guides by fields, wfpg_product by products of
-/// fields and BSDFs. sarsa guides by a SARSA grid, records by irradiance records. openpgl_vmm guides by Open
-/// PGL's mixtures of von Mises-Fisher lobes with parallax, openpgl_dqt by its quadtrees of directions.
+/// vcm vertex connection and merging, upbp that with points and beams in media, lt light tracing. wfpg guides
+/// by fields, wfpg_product by products of fields and BSDFs. sarsa guides by a SARSA grid, records by
+/// irradiance records. openpgl_vmm guides by Open PGL's mixtures of von Mises-Fisher lobes with parallax,
+/// openpgl_dqt by its quadtrees of directions.
 enum class sampling_method {
   pt,
   vpt,
   bpt,
   vcm,
+  upbp,
   lt,
   wfpg,
   wfpg_product,
@@ -39,6 +41,7 @@ inline constexpr method_properties all_methods[] = {
     {sampling_method::vpt, "vpt", guide_kind::none, false, true, true, true},
     {sampling_method::bpt, "bpt", guide_kind::none, false, true, true, true},
     {sampling_method::vcm, "vcm", guide_kind::none, false, true, true, true},
+    {sampling_method::upbp, "upbp", guide_kind::none, false, true, true, true},
     {sampling_method::lt, "lt", guide_kind::none, false, true, true, true},
     {sampling_method::wfpg, "wfpg", guide_kind::octree, true, true, false, false},
     {sampling_method::wfpg_product, "wfpg-product", guide_kind::octree, true, true, false, false},
@@ -63,9 +66,14 @@ constexpr bool is_wfpg(sampling_method method) {
   return properties_of(method).guide == guide_kind::octree;
 }
 
+/// Whether paths begin at lights and at the camera, and are joined.
+constexpr bool chooses_techniques(sampling_method method) {
+  return method == sampling_method::bpt || method == sampling_method::vcm || method == sampling_method::upbp;
+}
+
 /// Whether paths begin at lights, too.
 constexpr bool is_bidirectional(sampling_method method) {
-  return method == sampling_method::bpt || method == sampling_method::vcm || method == sampling_method::lt;
+  return chooses_techniques(method) || method == sampling_method::lt;
 }
 
 constexpr bool is_openpgl(sampling_method method) {

@@ -74,38 +74,34 @@ std::string names_of_methods(bool method_properties::*has) {
 
 namespace {
 
-struct technique_name {
-  const char* name;
-  bool technique_set::*is_on;
-};
-constexpr technique_name technique_names[] = {{"hits", &technique_set::light_hits},
-                                              {"nee", &technique_set::next_event},
-                                              {"connect", &technique_set::connections},
-                                              {"splat", &technique_set::splats},
-                                              {"surf", &technique_set::merges}};
+// In the order of the enumerators.
+constexpr const char* technique_names[technique_count] = {"hits", "nee",  "connect", "splat",
+                                                          "surf", "pp3d", "pb2d",    "bb1d"};
 
 }  // namespace
 
 std::string names_of(const technique_set& set) {
   std::string names;
-  for (const technique_name& row : technique_names)
-    if (set.*row.is_on) names += (names.empty() ? "" : "+") + std::string(row.name);
+  for (int i = 0; i < technique_count; ++i)
+    if (set.has(technique(i))) names += (names.empty() ? "" : "+") + std::string(technique_names[i]);
   return names;
 }
 
 technique_set techniques_of(const std::string& names) {
-  technique_set set{false, false, false, false, false};
+  technique_set set(std::initializer_list<technique>{});
   std::istringstream rest(names + '+');
   for (std::string name; std::getline(rest, name, '+');) {
     bool is_known = name == "bpt";
-    if (is_known) set.light_hits = set.next_event = set.connections = set.splats = true;
-    for (const technique_name& row : technique_names) {
-      if (name != row.name) continue;
-      set.*row.is_on = is_known = true;
+    if (is_known) set.add(technique_set());
+    for (int i = 0; i < technique_count; ++i) {
+      if (name != technique_names[i]) continue;
+      set.add(technique(i));
+      is_known = true;
     }
     if (!is_known)
       throw std::invalid_argument(
-          "expected hits, nee, connect, splat, surf or bpt, with + between them, not " + name);
+          "expected hits, nee, connect, splat, surf, pp3d, pb2d, bb1d or bpt, with + between them, not " +
+          name);
   }
   return set;
 }

@@ -70,6 +70,9 @@ render_options completed(const scene& scene, render_options options) {
               .c_str());
   require(options.light.merge_radius > 0.0f && options.light.merge_radius <= 1.0f, "merge_radius",
           options.light.merge_radius, "above 0, at most 1");
+  require(options.light.volume_radius > 0.0f && options.light.volume_radius <= 1.0f, "volume_radius",
+          options.light.volume_radius, "above 0, at most 1");
+  require(options.light.beam_paths >= 1, "beam_paths", options.light.beam_paths, "at least 1");
   require(options.light.radius_alpha > 0.0f && options.light.radius_alpha <= 1.0f, "radius_alpha",
           options.light.radius_alpha, "above 0, at most 1");
   require_guided_files(options);

@@ -71,7 +71,7 @@ struct render_options {
   /// Of a path, from its first vertex on, at least 1; with next-event estimation never the last of several.
   std::uint32_t guided_depths = wfpg::sampling_options().guided_depths;
   std::uint32_t light_groups = 32;  ///< that guided paths learn to choose lights from, in [1, 255]
-  /// Of bpt and vcm; nee decides on next-event estimation, too. Unset: the method's own.
+  /// Of bpt, vcm and upbp; nee decides on next-event estimation, too. Unset: the method's own.
   std::optional<technique_set> techniques;
   light_path_options light;                  ///< of paths from both ends
   std::uint32_t samples_per_leaf = 32000;    ///< after which Open PGL's field splits a leaf, 8 to 2^30
@@ -148,8 +148,9 @@ struct render_report {
 /// How a method of paths from both ends finds light.
 inline technique_set techniques_of(const render_options& options) {
   if (options.method == sampling_method::lt) return light_tracing();
-  const technique_set own =
-      options.method == sampling_method::vcm ? connection_and_merging() : technique_set();
+  const technique_set own = options.method == sampling_method::upbp  ? points_beams_and_paths()
+                            : options.method == sampling_method::vcm ? connection_and_merging()
+                                                                     : technique_set();
   return options.techniques.value_or(own);
 }
 

@@ -151,11 +151,20 @@ const std::vector<requirement>& requirements() {
        [](options o) { return o.octree != octree_source::samples || o.through == cones::scene; }},
       {{"--guide-fraction"}, "a --method that guides", [](options o) { return is_guided(o.method); }},
       {{"--techniques", "--light-memory"},
-       "--method bpt or vcm",
-       [](options o) { return o.method == sampling_method::bpt || o.method == sampling_method::vcm; }},
-      {{"--radius", "--radius-alpha"},
-       "--method vcm, or bpt with surf among its --techniques",
-       [](options o) { return is_bidirectional(o.method) && techniques_of(o).merges; }},
+       "--method bpt, vcm or upbp",
+       [](options o) { return chooses_techniques(o.method); }},
+      {{"--radius"},
+       "--method vcm or upbp, or surf among --techniques",
+       [](options o) { return is_bidirectional(o.method) && techniques_of(o).has(technique::surf); }},
+      {{"--radius-alpha"},
+       "--method vcm or upbp, or merges among --techniques",
+       [](options o) { return is_bidirectional(o.method) && techniques_of(o).merges(); }},
+      {{"--volume-radius"},
+       "--method upbp, or pp3d, pb2d or bb1d among --techniques",
+       [](options o) { return is_bidirectional(o.method) && techniques_of(o).merges_in_media(); }},
+      {{"--beam-paths"},
+       "--method upbp, or bb1d among --techniques",
+       [](options o) { return is_bidirectional(o.method) && techniques_of(o).has(technique::bb1d); }},
       {{"--guided-depths"},
        "--method wfpg, wfpg-product, sarsa or records",
        [](options o) { return is_guided(o.method) && !is_openpgl(o.method); }},
@@ -191,8 +200,8 @@ void add_scene_options(CLI::App& app, scene_arguments& given) {
 void add_method_options(CLI::App& app, render_options& options) {
   add_choice<sampling_method>(app, "--method", options.method, method_names(),
                               "path tracing; that of scenes with media; bidirectional path tracing; that and "
-                              "merging of vertices; light "
-                              "tracing; guided by fields (default), or by their products with BSDFs; by "
+                              "merging of vertices; that and points and beams in media; light tracing; "
+                              "guided by fields (default), or by their products with BSDFs; by "
                               "a grid that learns by SARSA; by irradiance records that are made before the "
                               "first path; by Open PGL's mixtures of lobes or quadtrees");
   add_choice<guiding>(app, "--guiding", options.mode,
@@ -223,21 +232,28 @@ void add_bidirectional_options(CLI::App& app, render_options& options) {
   };
   app.add_option_function<std::string>(
          "--techniques", parse,
-         "how bpt and vcm find light: hits of lights, light samples, connections of paths, light paths that "
-         "the camera sees, merges; names with + between them (default: all, for bpt without surf: " +
-             names_of(connection_and_merging()) + ")")
+         "how bpt, vcm and upbp find light: hits of lights, light samples, connections of paths, light paths "
+         "that the camera sees, merges on surfaces, merges in media of points, of points with beams, of "
+         "beams; names with + between them (default of upbp: " +
+             names_of(points_beams_and_paths()) + "; of vcm: without the last three; of bpt: without merges)")
       ->type_name("NAMES");
   app.add_option("--light-memory", options.light.memory,
                  with_default("memory of light paths' vertices", options.light.memory))
       ->transform(byte_count());
-  app.add_option(
-         "--radius", options.light.merge_radius,
-         with_default("of the first sample's merges, over the scene's radius", options.light.merge_radius))
+  app.add_option("--radius", options.light.merge_radius,
+                 with_default("of the first sample's merges on surfaces, over the scene's radius",
+                              options.light.merge_radius))
       ->transform(positive_number(1.0));
-  app.add_option(
-         "--radius-alpha", options.light.radius_alpha,
-         with_default("radii shrink as the sample's number to the power (this - 1) / 2; 1: not at all",
-                      options.light.radius_alpha))
+  app.add_option("--volume-radius", options.light.volume_radius,
+                 with_default("the same, of merges in media", options.light.volume_radius))
+      ->transform(positive_number(1.0));
+  app.add_option("--beam-paths", options.light.beam_paths,
+                 with_default("light paths of a sample that leave beams", options.light.beam_paths))
+      ->transform(whole_number(1, 1 << 30));
+  app.add_option("--radius-alpha", options.light.radius_alpha,
+                 with_default("radii shrink as the sample's number to the power (this - 1) / D, for merges "
+                              "in D dimensions; 1: not at all",
+                              options.light.radius_alpha))
       ->transform(positive_number(1.0));
 }
 

@@ -68,9 +68,13 @@ named_values values_of(const render_options& o) {
     const technique_set techniques = techniques_of(o);
     values.insert(values.end(), {{"--techniques", names_of(techniques)},
                                  {"--light-memory", std::to_string(o.light.memory)}});
-    if (techniques.merges)
-      values.insert(values.end(), {{"--radius", std::to_string(o.light.merge_radius)},
-                                   {"--radius-alpha", std::to_string(o.light.radius_alpha)}});
+    if (techniques.has(technique::surf))
+      values.emplace_back("--radius", std::to_string(o.light.merge_radius));
+    if (techniques.merges()) values.emplace_back("--radius-alpha", std::to_string(o.light.radius_alpha));
+    if (techniques.merges_in_media())
+      values.emplace_back("--volume-radius", std::to_string(o.light.volume_radius));
+    if (techniques.has(technique::bb1d))
+      values.emplace_back("--beam-paths", std::to_string(o.light.beam_paths));
   }
   if (is_guided(o.method)) add_guider_values(o, values);
   return values;

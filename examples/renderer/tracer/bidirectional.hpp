@@ -10,13 +10,12 @@
 #include "tracer/connection_kernels.hpp"
 #include "tracer/light_kernels.hpp"
 #include "tracer/path_film.hpp"
+#include "tracer/photon_maps.hpp"
 #include "tracer/stage_clock.hpp"
 #include "tracer/unguided.hpp"
 #include "tracer/wavefront.hpp"
 
 #include <wfpg/host/ray_caster.hpp>
-#include <wfpg/light/photon_estimators.hpp>
-#include <wfpg/light/photon_map.hpp>
 
 #include <cstdint>
 #include <vector>
@@ -37,26 +36,19 @@ class bidirectional_tracer {
       : exec_(exec),
         settings_(settings),
         count_(settings.pixels()),
-        world_{world.scene,
-               world.lights,
-               caster,
-               counts_of(settings.techniques, world.next_event, count_),
-               {},
-               settings.max_depth,
-               settings.roulette_depth},
+        world_(world_of(settings, world, caster)),
         paths_(exec, count_),
         vertices_(exec, count_),
         keeps_(exec, count_),
         radiance_(exec, count_),
         splats_(exec, count_, count_),
-        positions_(exec, 0),
-        stored_(exec, {settings.techniques.needs_light_vertices() ? count_ : 0, settings.light.memory,
-                       glm::max(settings.max_depth, 2u) - 1}),
+        photons_(exec, settings),
         around_camera_(exec, std::vector<solid_stack>(1)),
         around_lights_(exec,
                        std::vector<solid_stack>(world.scene.has_solids ? world.lights.lights.size() : 0)),
         film_(exec, count_),
         clock_(exec) {
+    world_.beam_paths = static_cast<float>(photons_.beam_paths());
     exec_.for_each(around_lights_.size(), find_light_solids<world_type>{world_, around_lights_.view()});
   }
 
@@ -64,15 +56,14 @@ class bidirectional_tracer {
   void render_sample(no_guide, const pinhole& camera, std::uint32_t sample, float weight) {
     world_.random = {settings_.seed, sample};
     exec_.fill_bytes(radiance_.data(), 0, radiance_.bytes());
-    stored_.begin(exec_);
-    const float radius = radius_of(sample);
-    if (settings_.techniques.merges)
-      world_.techniques.surface_points = static_cast<float>(count_) * pi * radius * radius;
+    photons_.begin();
+    const merge_radii radii(settings_.light, extent(camera), sample);
+    count_merges(radii);
     if (settings_.techniques.needs_light_paths()) follow_light(camera);
-    if (settings_.techniques.merges) clock_.measure("photon map", [&] { build_photon_map(radius); });
+    if (settings_.techniques.merges()) clock_.measure("photon map", [&] { photons_.build(radii); });
     follow_camera(camera);
     clock_.measure("film", [&] { film_.add(radiance_.view(), weight); });
-    dropped_ += stored_.dropped(exec_);  // waits, so that a look at the time sees the whole sample
+    dropped_ += photons_.dropped();  // waits, so that a look at the time sees the whole sample
     clock_.resolve();
   }
 
@@ -80,36 +71,48 @@ class bidirectional_tracer {
   const path_film<Exec>& film() const { return film_; }
   path_film<Exec>& film() { return film_; }
 
-  /// Vertices of light paths that had no memory, over all samples. Their light is missing.
+  /// Vertices and beams of light paths that had no memory, over all samples. Their light is missing.
   std::uint64_t dropped() const { return dropped_; }
-  /// Bytes of the vertices of light paths.
-  std::size_t light_bytes() const { return stored_.bytes(); }
+  /// Bytes of the vertices and beams of light paths, and of the maps over them.
+  std::size_t light_bytes() const { return photons_.bytes(); }
   const named_seconds& seconds() const { return clock_.seconds(); }
 
  private:
   /// A light path a pixel.
-  static wfpg::path_techniques counts_of(const technique_set& set, bool next_event, std::size_t pixels) {
-    wfpg::path_techniques counts;
-    counts.light_hits = set.light_hits ? 1.0f : 0.0f;
-    counts.next_event = set.next_event && next_event ? 1.0f : 0.0f;
-    counts.connections = set.connections ? 1.0f : 0.0f;
-    counts.splats = set.splats ? static_cast<float>(pixels) : 0.0f;
-    return counts;
+  static world_type world_of(const tracer_settings& settings, const path_lights& given,
+                             const Caster& caster) {
+    const auto pixels = static_cast<float>(settings.pixels());
+    const auto on = [&](technique t) { return settings.techniques.has(t) ? 1.0f : 0.0f; };
+    world_type world{given.scene, given.lights, caster};
+    world.light_paths = pixels;
+    world.techniques.light_hits = on(technique::hits);
+    world.techniques.next_event = given.next_event ? on(technique::nee) : 0.0f;
+    world.techniques.connections = on(technique::connect);
+    world.techniques.splats = on(technique::splat) * pixels;
+    world.max_depth = settings.max_depth;
+    world.roulette_depth = settings.roulette_depth;
+    return world;
   }
 
-  /// Of a sample's merges. A scene without extent has any.
-  float radius_of(std::uint32_t sample) const {
-    const wfpg::radius_schedule radius{settings_.light.merge_radius * world_.lights.scene_radius,
-                                       settings_.light.radius_alpha, 2};
-    return glm::max(radius(sample + 1), wfpg::photon_map<Exec>::least_radius);
+  /// Radius of the scene. A scene without extent has the camera's distance.
+  float extent(const pinhole& camera) const {
+    const float radius = world_.lights.scene_radius;
+    return radius > 0.0f ? radius : glm::length(camera.position() - world_.lights.scene_centre);
   }
 
-  void build_photon_map(float radius) {
-    const std::uint32_t photons = stored_.size(exec_);
-    if (positions_.size() < photons) positions_ = wfpg::buffer<vec3, Exec>(exec_, stored_.capacity());
-    exec_.for_each(photons, copy_positions{stored_.view(), positions_.view()});
-    photons_.build(exec_, {positions_.data(), photons}, radius);
+  /// Tells the weights of a sample's merges.
+  void count_merges(const merge_radii& radii) {
+    const auto on = [&](technique t) { return settings_.techniques.has(t) ? 1.0f : 0.0f; };
+    const auto square = [](float r) { return pi * r * r; };
+    wfpg::path_techniques& counts = world_.techniques;
+    counts.surface_points = on(technique::surf) * world_.light_paths * square(radii.on_surfaces);
+    counts.volume_points =
+        on(technique::pp3d) * world_.light_paths * square(radii.in_media) * (4.0f / 3.0f) * radii.in_media;
+    counts.beam_points = on(technique::pb2d) * world_.light_paths * square(radii.for_beams);
+    counts.beams = world_.beam_paths * 2.0f * radii.of_beams;
   }
+
+  found_light found() { return {radiance_.view(), {}, {}}; }
 
   void follow_light(const pinhole& camera) {
     clock_.measure("light paths", [&] {
@@ -117,17 +120,23 @@ class bidirectional_tracer {
     });
     for (std::uint32_t segments = 1; segments < settings_.max_depth; ++segments) {
       clock_.measure("light paths", [&] {
-        exec_.for_each(count_,
-                       trace_light_paths<world_type>{world_, segments, paths_.view(), vertices_.view(),
-                                                     keeps_.view(), film_.segment_counts()});
-        if (settings_.techniques.needs_light_vertices()) stored_.reserve(exec_, keeps_.view());
-        const bool is_last = segments + 1 == settings_.max_depth;
         exec_.for_each(
-            count_, extend_light_paths<world_type>{world_, camera, is_last, paths_.view(), vertices_.view(),
-                                                   keeps_.view(), stored_.view(), splats_.view()});
+            count_, trace_light_paths<world_type>{world_, segments, paths_.view(), vertices_.view(),
+                                                  keeps_.view(), photons_.pending(), film_.segment_counts()});
+        photons_.reserve(keeps_.view());
+        const bool is_last = segments + 1 == settings_.max_depth;
+        exec_.for_each(count_, extend_light_paths<world_type>{world_,
+                                                              camera,
+                                                              is_last,
+                                                              paths_.view(),
+                                                              vertices_.view(),
+                                                              keeps_.view(),
+                                                              photons_.stored(),
+                                                              splats_.view(),
+                                                              {}});
       });
       clock_.measure("splats", [&] {
-        if (settings_.techniques.splats)
+        if (settings_.techniques.has(technique::splat))
           splats_.add_to(exec_, radiance_.view(), 1.0f / static_cast<float>(count_));
       });
     }
@@ -141,19 +150,27 @@ class bidirectional_tracer {
       exec_.for_each(count_,
                      start_camera_paths<world_type>{world_, camera, around_camera_.view(), paths_.view()});
     });
+    const bool merges = settings_.techniques.has(technique::pb2d) || photons_.beam_paths() > 0;
     for (std::uint32_t segments = 1; segments <= settings_.max_depth; ++segments) {
       clock_.measure("trace", [&] {
-        exec_.for_each(count_, trace_camera_paths<world_type>{
-                                   world_, segments, paths_.view(), vertices_.view(), radiance_.view(),
-                                   film_.segment_counts(), film_.light_hit_counts()});
+        if (merges)
+          trace_camera<true>(segments);
+        else
+          trace_camera<false>(segments);
       });
       if (segments == settings_.max_depth) break;
       clock_.measure("connections", [&] {
-        exec_.for_each(
-            count_, connect_camera_paths<world_type>{world_, paths_.view(), vertices_.view(), photons_.view(),
-                                                     stored_.view(), radiance_.view()});
+        exec_.for_each(count_, connect_camera_paths<world_type>{world_, paths_.view(), vertices_.view(),
+                                                                photons_.view(), found()});
       });
     }
+  }
+
+  template <bool merges>
+  void trace_camera(std::uint32_t segments) {
+    exec_.for_each(count_, trace_camera_paths<world_type, merges>{
+                               world_, segments, paths_.view(), vertices_.view(), photons_.view(), found(),
+                               film_.segment_counts(), film_.light_hit_counts()});
   }
 
   Exec exec_;
@@ -165,9 +182,7 @@ class bidirectional_tracer {
   wfpg::buffer<std::uint32_t, Exec> keeps_;
   wfpg::buffer<vec3, Exec> radiance_;
   wfpg::splats<Exec> splats_;
-  wfpg::buffer<vec3, Exec> positions_;  // of stored vertices
-  wfpg::light_vertices<Exec, subpath_vertex> stored_;
-  wfpg::photon_map<Exec> photons_;
+  photon_maps<Exec> photons_;
   wfpg::buffer<solid_stack, Exec> around_camera_;
   wfpg::buffer<solid_stack, Exec> around_lights_;  // by the lights' columns; empty where there are no solids
   path_film<Exec> film_;

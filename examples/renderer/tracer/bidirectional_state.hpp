@@ -160,6 +160,31 @@ struct subpath_vertex {
 
 static_assert(sizeof(subpath_vertex) == 144, "tiles have pieces of 16 bytes");
 
+/// A light path's segment in one medium. Nothing is initialised.
+struct light_beam {
+  wfpg::path_beam beam;           ///< from where the path leaves its vertex
+  vec3 throughput;                ///< where the beam begins
+  std::uint32_t segments;         ///< of the path, with this one
+  wfpg::subpath_weights weights;  ///< of the path as it leaves its vertex
+  way_densities before;           ///< of getting to the beam's begin
+  std::uint32_t solid;            ///< whose medium it is in
+  std::uint32_t begins_inside;    ///< 1: the path scattered where the beam begins
+
+  light_beam() = default;
+  WFPG_HD light_beam(const subpath& path, const path_segment& s, const medium_piece& piece,
+                     std::uint32_t from_end, std::uint32_t in_solid)
+      : beam{path.origin, path.direction, piece.begin, piece.end},
+        throughput(s.throughput),
+        segments(from_end),
+        weights(path.weights),
+        before(s.pdf),
+        solid(in_solid),
+        begins_inside(piece.begins_inside ? 1 : 0) {}
+};
+
+/// Most beams that a segment leaves: media that scatter on its way.
+inline constexpr std::uint32_t most_beams = 8;
+
 /// Random numbers of light paths begin at this use, and those of distances in media at another. Both are far
 /// from those of camera paths' vertices.
 inline constexpr std::uint32_t light_path_dimensions = 0x40000000u;
@@ -172,7 +197,7 @@ struct passer {
   std::uint32_t first_dimension;  ///< of the segment's distances
 
   WFPG_HD vec2 draw(std::uint32_t piece) const { return random(path, first_dimension + piece); }
-  WFPG_HD void cross(const path_segment&, const medium&, float, float, float) const {}
+  WFPG_HD void cross(const path_segment&, const medium_piece&) const {}
   WFPG_HD void meet(const path_segment&, const hit_surface&) const {}
   WFPG_HD void leave(const path_segment&) const {}
 };
@@ -183,8 +208,10 @@ struct bidirectional_world {
   scene_view scene;
   light_view lights;
   Caster caster;
-  wfpg::path_techniques techniques;
-  random_stream random;
+  wfpg::path_techniques techniques = {};
+  float light_paths = 0.0f;  ///< of a sample
+  float beam_paths = 0.0f;   ///< of them, those that leave beams
+  random_stream random = {};
   std::uint32_t max_depth = 1;       ///< most segments of a whole path
   std::uint32_t roulette_depth = 3;  ///< roulette begins at this vertex, from 0
 

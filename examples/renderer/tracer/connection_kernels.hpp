@@ -2,9 +2,7 @@
 // bidirectional_state.hpp. A camera path is connected with the light path of its own index.
 #pragma once
 
-#include "tracer/bidirectional_state.hpp"
-
-#include <wfpg/light/photon_map.hpp>
+#include "tracer/merge_kernels.hpp"
 
 namespace render {
 
@@ -24,14 +22,16 @@ struct start_camera_paths {
   }
 };
 
-/// Finds the next vertex of each camera path, and adds its emission with its weight.
-template <class World>
+/// Finds the next vertex of each camera path, and adds its emission with its weight. `merges`: whether the
+/// path's segments are merged with photons along them.
+template <class World, bool merges>
 struct trace_camera_paths {
   World world;
   std::uint32_t segments;  ///< of the paths, with this one
   tiled_view<subpath> paths;
   tiled_view<subpath_vertex> vertices;
-  wfpg::array_view<vec3> radiance;
+  photon_view photons;
+  found_light found;
   wfpg::array_view<std::uint32_t> segment_counts;
   wfpg::array_view<std::uint32_t> light_hits;  ///< segments that ended where light is emitted toward them
 
@@ -55,11 +55,14 @@ struct trace_camera_paths {
     WFPG_HD visitor(const passer& way, const trace_camera_paths& told, std::size_t number, const subpath& of)
         : passer(way), kernel(told), i(number), path(of) {}
 
-    WFPG_HD void meet(const path_segment& s, const hit_surface& found) const {
-      if (found.emission == vec3(0.0f)) return;
-      const float cosine = World::arrival_cosine(path, found);
-      kernel.gather(i, s.throughput * found.emission, World::weights_at(path, s, cosine),
-                    kernel.world.lights.end_on_emitter(found.emitted_luminance, cosine));
+    WFPG_HD void cross(const path_segment& before, const medium_piece& piece) const {
+      if constexpr (merges) kernel.merge(i, path, before, piece);
+    }
+    WFPG_HD void meet(const path_segment& s, const hit_surface& met) const {
+      if (met.emission == vec3(0.0f)) return;
+      const float cosine = World::arrival_cosine(path, met);
+      kernel.gather(i, s.throughput * met.emission, World::weights_at(path, s, cosine),
+                    kernel.world.lights.end_on_emitter(met.emitted_luminance, cosine));
     }
     WFPG_HD void leave(const path_segment& s) const {
       path_segment far = s;
@@ -71,26 +74,25 @@ struct trace_camera_paths {
     }
   };
 
-  WFPG_HD void gather(std::size_t i, vec3 found, const wfpg::vertex_weights& arrived,
+  WFPG_HD void gather(std::size_t i, vec3 emitted, const wfpg::vertex_weights& arrived,
                       const wfpg::light_end& end) const {
-    if (found == vec3(0.0f)) return;
+    if (emitted == vec3(0.0f)) return;
     ++light_hits[i];
+    technique_sum sum;
     // A light that the camera sees has no other technique.
     if (segments == 1)
-      radiance[i] += found;
+      sum.add(emitted, 1.0f);
     else if (world.techniques.light_hits > 0.0f)
-      radiance[i] += found * arrived.light_hit(world.techniques, end);
+      sum.add(emitted, arrived.light_hit(world.techniques, end));
+    found.add(i, technique::hits, sum, vec3(1.0f));
   }
-};
 
-/// Copies the positions of stored vertices on surfaces, for a photon map. The map skips the others.
-struct copy_positions {
-  wfpg::light_vertices_view<subpath_vertex> stored;
-  wfpg::array_view<vec3> positions;
-
-  WFPG_HD void operator()(std::size_t i) const {
-    const subpath_vertex& vertex = stored[static_cast<std::uint32_t>(i)];
-    positions[i] = vertex.in_medium() ? vec3(2.0f * wfpg::largest_coordinate) : vertex.at.position;
+  WFPG_HD void merge(std::size_t i, const subpath& path, const path_segment& before,
+                     const medium_piece& piece) const {
+    if (segments == world.max_depth) return;
+    const merge_along_piece<World> merge(world, photons, path, segments, before, piece);
+    if (world.techniques.beam_points > 0.0f) found.add(i, technique::pb2d, merge.with_points(), vec3(1.0f));
+    if (world.techniques.beams > 0.0f) found.add(i, technique::bb1d, merge.with_beams(), vec3(1.0f));
   }
 };
 
@@ -101,9 +103,8 @@ struct connect_camera_paths {
   World world;
   tiled_view<subpath> paths;
   tiled_view<subpath_vertex> vertices;
-  wfpg::photon_map_view photons;  ///< of all stored vertices
-  wfpg::light_vertices_view<subpath_vertex> stored;
-  wfpg::array_view<vec3> radiance;
+  photon_view photons;
+  found_light found;
 
   WFPG_HD void operator()(std::size_t i) const {
     if (!paths[i].is_active()) return;
@@ -111,11 +112,15 @@ struct connect_camera_paths {
     const subpath_vertex vertex = vertices[i];
     const scatterer f = vertex.seen_from(vertex.at.outgoing);
     if (!f.is_delta()) {
-      vec3 found(0.0f);
-      if (world.techniques.next_event > 0.0f) found += sample_light(id, vertex, f);
-      if (world.techniques.connections > 0.0f) found += connect_all(i, vertex, f);
-      if (world.techniques.surface_points > 0.0f && !f.in_medium) found += merge_all(vertex, f);
-      radiance[i] += vertex.throughput * found;
+      const wfpg::path_techniques& counts = world.techniques;
+      const auto add = [&](technique by, const technique_sum& sum) {
+        found.add(i, by, sum, vertex.throughput);
+      };
+      if (counts.next_event > 0.0f) add(technique::nee, sample_light(id, vertex, f));
+      if (counts.connections > 0.0f) add(technique::connect, connect_all(i, vertex, f));
+      const merge_at_vertex<World> merge{world, photons, vertex, f};
+      if (counts.surface_points > 0.0f && !f.in_medium) add(technique::surf, merge.on_surface());
+      if (counts.volume_points > 0.0f && f.in_medium) add(technique::pp3d, merge.in_medium());
     }
     subpath next = paths[i];
     if (world.extend(vertex, id, false, 0, next))
@@ -125,66 +130,52 @@ struct connect_camera_paths {
   }
 
  private:
-  WFPG_HD vec3 sample_light(std::uint32_t id, const subpath_vertex& vertex, const scatterer& f) const {
+  WFPG_HD technique_sum sample_light(std::uint32_t id, const subpath_vertex& vertex,
+                                     const scatterer& f) const {
+    technique_sum sum;
     const light_sample light =
         world.lights.sample(world.scene, vertex.at.position, wfpg::light_choice{},
                             [&](std::uint32_t use) { return world.draw(id, vertex.segments, use); });
-    if (!(light.pdf > 0.0f)) return vec3(0.0f);
+    if (!(light.pdf > 0.0f)) return sum;
     const vec3 value = f.eval_rgb(vertex.at.outgoing, light.direction) * light.radiance / light.pdf;
-    if (!(wfpg::luminance(value) > 0.0f)) return vec3(0.0f);
+    if (!(wfpg::luminance(value) > 0.0f)) return sum;
     const vec3 to_light = light.is_distant ? light.direction : light.end - vertex.at.position;
     const clear_way way = world.way_along(vertex, ray_toward(vertex.leave_along(to_light), light), false);
-    if (way.transmittance == vec3(0.0f)) return vec3(0.0f);
+    if (way.transmittance == vec3(0.0f)) return sum;
     // A light path comes the other way.
     wfpg::path_edge edge{1.0f, way.pdf.back, way.pdf.there};
     if (!light.is_distant) edge.distance = glm::length(to_light);
-    return value * way.transmittance *
-           vertex.weights.next_event(world.techniques, vertex.leave(f, light.direction), light.source, edge);
+    sum.add(
+        value * way.transmittance,
+        vertex.weights.next_event(world.techniques, vertex.leave(f, light.direction), light.source, edge));
+    return sum;
   }
 
-  WFPG_HD vec3 connect_all(std::size_t i, const subpath_vertex& vertex, const scatterer& f) const {
-    vec3 found(0.0f);
+  WFPG_HD technique_sum connect_all(std::size_t i, const subpath_vertex& vertex, const scatterer& f) const {
+    const wfpg::light_vertices_view<subpath_vertex>& stored = photons.stored;
+    technique_sum sum;
     for (std::uint32_t k = stored.last(i); k != stored.none; k = stored.previous(k)) {
       const subpath_vertex& light = stored[k];
-      if (light.segments + vertex.segments < world.max_depth) found += connect(vertex, f, light);
+      if (light.segments + vertex.segments < world.max_depth) connect(vertex, f, light, sum);
     }
-    return found;
+    return sum;
   }
 
-  WFPG_HD vec3 merge_all(const subpath_vertex& vertex, const scatterer& f) const {
-    vec3 found(0.0f);
-    photons.for_each_point(vertex.at.position, [&](std::uint32_t k) {
-      const subpath_vertex& light = stored[k];
-      if (light.segments + vertex.segments <= world.max_depth) found += merge(vertex, f, light);
-    });
-    // Over the number of light paths and the disc of merges.
-    return found / world.techniques.surface_points;
-  }
-
-  WFPG_HD vec3 merge(const subpath_vertex& camera, const scatterer& f, const subpath_vertex& light) const {
-    const vec3 outgoing = camera.at.outgoing, incident = light.at.outgoing;
-    // The photon's flux is that of a surface with the geometric normal.
-    const vec3 value = f.eval_rgb(outgoing, incident) * light.throughput / camera.cosine(incident);
-    if (!(wfpg::luminance(value) > 0.0f)) return vec3(0.0f);
-    return value * light.weights.merge(world.techniques, wfpg::merge_technique::surface_points,
-                                       camera.weights, camera.leave(f, incident));
-  }
-
-  WFPG_HD vec3 connect(const subpath_vertex& camera, const scatterer& f, const subpath_vertex& light) const {
+  WFPG_HD void connect(const subpath_vertex& camera, const scatterer& f, const subpath_vertex& light,
+                       technique_sum& sum) const {
     const vec3 way = light.at.position - camera.at.position;
     const float distance = glm::length(way);
-    if (!(distance > 0.0f)) return vec3(0.0f);
+    if (!(distance > 0.0f)) return;
     const vec3 toward = way / distance;
     const vec3 value = f.eval_rgb(camera.at.outgoing, toward) * light.scattered_flux(-toward) *
                        light.throughput / (distance * distance);
-    if (!(wfpg::luminance(value) > 0.0f)) return vec3(0.0f);
+    if (!(wfpg::luminance(value) > 0.0f)) return;
     const clear_way clear = world.way_between(camera, light.leave_along(-way), light.in_medium());
-    if (clear.transmittance == vec3(0.0f)) return vec3(0.0f);
+    if (clear.transmittance == vec3(0.0f)) return;
     const wfpg::path_edge edge{distance, clear.pdf.back, clear.pdf.there};
     const wfpg::path_departure to_camera = light.leave(light.seen_from(light.at.outgoing), -toward);
-    return value * clear.transmittance *
-           light.weights.connection(world.techniques, to_camera, camera.weights, camera.leave(f, toward),
-                                    edge);
+    sum.add(value * clear.transmittance, light.weights.connection(world.techniques, to_camera, camera.weights,
+                                                                  camera.leave(f, toward), edge));
   }
 };
 

@@ -37,7 +37,17 @@ struct start_light_paths {
   }
 };
 
-/// Finds the next vertex of each light path.
+/// Beams that light paths have left on their last segment, for the first paths.
+struct pending_beams {
+  wfpg::array_view<light_beam> beams;      ///< most_beams a path
+  wfpg::array_view<std::uint32_t> counts;  ///< by path
+
+  WFPG_HD void add(std::size_t path, const light_beam& beam) const {
+    if (counts[path] < most_beams) beams[path * most_beams + counts[path]++] = beam;
+  }
+};
+
+/// Finds the next vertex of each light path, and the beams on its way.
 template <class World>
 struct trace_light_paths {
   World world;
@@ -45,18 +55,48 @@ struct trace_light_paths {
   tiled_view<subpath> paths;
   tiled_view<subpath_vertex> vertices;
   wfpg::array_view<std::uint32_t> keeps;  ///< 1: the vertex can be connected
+  pending_beams beams;                    ///< of no paths, where nobody merges beams
   wfpg::array_view<std::uint32_t> segment_counts;
 
   WFPG_HD void operator()(std::size_t i) const {
     keeps[i] = 0;
+    if (i < beams.counts.size()) beams.counts[i] = 0;
     const subpath path = paths[i];
     if (!path.is_active()) return;
     ++segment_counts[i];
     subpath_vertex vertex;
-    passer ahead = world.passer_of(static_cast<std::uint32_t>(i), segments, light_path_dimensions);
+    visitor ahead{world.passer_of(static_cast<std::uint32_t>(i), segments, light_path_dimensions), *this, i,
+                  path};
     if (!world.arrive(path, segments, vertex, ahead)) return paths.emplace(i);
     vertices.emplace(i, vertex);
     keeps[i] = vertex.seen_from(vertex.at.outgoing).is_delta() ? 0u : 1u;
+  }
+
+ private:
+  struct visitor : passer {
+    const trace_light_paths& kernel;
+    std::size_t i;
+    const subpath& path;
+
+    WFPG_HD visitor(const passer& way, const trace_light_paths& told, std::size_t number, const subpath& of)
+        : passer(way), kernel(told), i(number), path(of) {}
+
+    WFPG_HD void cross(const path_segment& before, const medium_piece& piece) const {
+      if (i >= kernel.beams.counts.size() || !(piece.end > piece.begin)) return;
+      kernel.beams.add(
+          i, light_beam(path, before, piece, kernel.segments, before.solids.top(kernel.world.scene)));
+    }
+  };
+};
+
+/// Stores the beams that have a place.
+struct store_beams {
+  pending_beams beams;
+  wfpg::light_vertices_view<light_beam> stored;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    for (std::uint32_t k = 0; k < beams.counts[i] && stored.has_place(i, k); ++k)
+      stored.write(i, beams.beams[i * most_beams + k], k);
   }
 };
 
@@ -71,6 +111,7 @@ struct extend_light_paths {
   wfpg::array_view<const std::uint32_t> keeps;
   wfpg::light_vertices_view<subpath_vertex> stored;  ///< of no paths, where nothing reads vertices
   wfpg::splat_view splats;
+  wfpg::splat_view plain_splats;  ///< without weights; of no paths, where nobody asks for them
 
   WFPG_HD void operator()(std::size_t i) const {
     if (!paths[i].is_active()) return;
@@ -101,9 +142,9 @@ struct extend_light_paths {
     if (way.transmittance == vec3(0.0f)) return;
     const scatterer f = vertex.seen_from(vertex.at.outgoing);
     const wfpg::path_edge edge{distance, way.pdf.there, way.pdf.back};
-    splats.add(i, pixel,
-               value * way.transmittance *
-                   vertex.weights.splat(world.techniques, vertex.leave(f, toward), pdf, edge));
+    const vec3 found = value * way.transmittance;
+    splats.add(i, pixel, found * vertex.weights.splat(world.techniques, vertex.leave(f, toward), pdf, edge));
+    if (plain_splats.size() > 0) plain_splats.add(i, pixel, found);
   }
 };
 

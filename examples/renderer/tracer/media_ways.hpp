@@ -151,6 +151,15 @@ struct path_segment {
   way_densities pdf;           ///< of getting there, and back
 };
 
+/// A piece of a segment, in one medium. Distances are from the segment's begin, scene units.
+struct medium_piece {
+  medium around;
+  bool begins_inside;  ///< the path scattered where it begins
+  float begin;
+  float end;    ///< where the path scatters, or `limit`
+  float limit;  ///< where the next surface is
+};
+
 /// What ends a segment: a surface, scattering in a medium, or nothing at all.
 enum class segment_end { surface, medium, nothing };
 
@@ -169,7 +178,7 @@ WFPG_HD bool scatters_before(const scene_view& scene, float limit, bool begins_i
   const vec2 u = visitor.draw(piece);
   const wfpg::distance_sample drawn = coefficients.sample(u.x, u.y, length);
   const float end = straight.covered + drawn.distance;
-  visitor.cross(s, around, straight.covered, drawn.scatters ? end : limit, limit);
+  visitor.cross(s, {around, begins_inside, straight.covered, drawn.scatters ? end : limit, limit});
   s.throughput *= drawn.weight;
   s.pdf.there *= drawn.pdf;
   s.pdf.back *= begins_inside == drawn.scatters ? drawn.pdf : coefficients.pdf(drawn.distance, begins_inside);
@@ -204,8 +213,7 @@ WFPG_HD bool passes(const scene_view& scene, path_segment& s, hit_surface& found
 ///
 /// A Visitor is told what is on the way:
 ///   vec2 draw(std::uint32_t piece) const;   // random numbers in [0,1)² for a piece
-///   // A piece in a medium that scatters, from `begin` on. The path goes to `end`, and the piece to `limit`.
-///   void cross(const path_segment& before, const medium&, float begin, float end, float limit);
+///   void cross(const path_segment& before, const medium_piece&);   // a piece in a medium that scatters
 ///   void meet(const path_segment&, const hit_surface&);   // a surface that is there
 ///   void leave(const path_segment&);                      // nothing more is on the way
 template <class Caster, class Visitor>

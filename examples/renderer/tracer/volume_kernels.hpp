@@ -63,7 +63,7 @@ struct find_volume_vertices {
     WFPG_HD vec2 draw(std::uint32_t piece) const {
       return kernel.at.draw(id, volume_position::distance + piece);
     }
-    WFPG_HD void cross(const path_segment&, const medium&, float, float, float) const {}
+    WFPG_HD void cross(const path_segment&, const medium_piece&) const {}
     WFPG_HD void meet(const path_segment& s, const hit_surface& found) const {
       kernel.emit(id, path, s, found);
     }

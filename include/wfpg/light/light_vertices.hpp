@@ -5,9 +5,9 @@
 //
 //   vertices.begin(exec);
 //   for (each depth) {
-//     exec.for_each(paths, trace);                     // keeps[path] = 1 where its new vertex is to be
-//     stored vertices.reserve(exec, keeps); exec.for_each(paths, store);                     //
-//     view.write(path, vertex) where view.has_place(path)
+//     exec.for_each(paths, trace);      // keeps[path] = 1 where its new vertex is to be stored
+//     vertices.reserve(exec, keeps);
+//     exec.for_each(paths, store);      // view.write(path, vertex) where view.has_place(path)
 //   }
 //   for (auto i = view.last(path); i != view.none; i = view.previous(i)) connect(view[i]);
 //
@@ -54,12 +54,14 @@ class light_vertices_view {
   WFPG_HD std::uint32_t last(std::size_t path) const { return last_[path]; }
 
   /// Whether the path's new vertex has a place, after light_vertices::reserve(). False where the path told of
-  /// no vertex to keep, and where memory was used up.
-  WFPG_HD bool has_place(std::size_t path) const { return places_[path] != none; }
-  /// Stores the path's new vertex, which becomes its last. O(1). Precondition: has_place(path). Call it once
-  /// after each reserve(), from one thread for each path.
-  WFPG_HD void write(std::size_t path, const Vertex& vertex) const {
-    const std::uint32_t i = places_[path];
+  /// no vertex to keep, and where memory was used up. `which`: of several new ones, from 0.
+  WFPG_HD bool has_place(std::size_t path, std::uint32_t which = 0) const {
+    return places_[path] != none && which < vertices_.size() - places_[path];
+  }
+  /// Stores the path's new vertex, which becomes its last. O(1). Precondition: has_place(path, which). Call
+  /// it once for each new vertex after each reserve(), in order, from one thread for each path.
+  WFPG_HD void write(std::size_t path, const Vertex& vertex, std::uint32_t which = 0) const {
+    const std::uint32_t i = places_[path] + which;
     vertices_[i] = vertex;
     previous_[i] = last_[path];
     last_[path] = i;
@@ -82,7 +84,7 @@ namespace detail {
 /// Kernel: turns ranks of new vertices into places, or `none`. The last path's thread writes the number of
 /// all new vertices.
 struct place_light_vertices {
-  array_view<const std::uint32_t> keeps;  ///< by path: 1 or 0
+  array_view<const std::uint32_t> keeps;  ///< by path: the number of new vertices
   array_view<std::uint32_t> places;       ///< by path: ranks, then places
   const std::uint32_t* stored;            ///< number of vertices before
   std::uint32_t* news;                    ///< receives the number of new ones
@@ -90,7 +92,6 @@ struct place_light_vertices {
   std::uint32_t none;                     ///< place of what is not stored
   WFPG_HD void operator()(std::size_t path) const {
     if (path + 1 == places.size()) *news = places[path] + keeps[path];
-    // A sum beyond 2^32 cannot be: there are fewer paths, and at most `capacity` vertices before.
     const std::uint64_t place = std::uint64_t(*stored) + places[path];
     places[path] = keeps[path] != 0 && place < capacity ? static_cast<std::uint32_t>(place) : none;
   }
@@ -145,7 +146,8 @@ class light_vertices {
 
   /// Finds places for the paths' new vertices, in the order of paths. What has no place any more counts as
   /// dropped. On a GPU it returns before the work is done. O(paths).
-  /// `keeps`: for each path 1 where its new vertex is to be stored, else 0.
+  /// `keeps`: for each path the number of its new vertices that are to be stored, mostly 1 or 0. Their sum
+  /// is below 2³².
   /// Throws std::invalid_argument where `keeps` does not have an element for each path, and out_of_memory.
   void reserve(const Exec& exec, array_view<const std::uint32_t> keeps) {
     require(keeps.size() == places_.size(), "keeps.size()", keeps.size(), "the number of paths");

@@ -1,0 +1,194 @@
+// Merges of camera paths with photons: what light paths' vertices and beams bring to a camera path's vertices
+// and segments. Source: Krivanek et al. 2014, "Unifying Points, Beams, and Paths in Volumetric Light
+// Transport Simulation".
+#pragma once
+
+#include "tracer/bidirectional_state.hpp"
+#include "tracer/found_light.hpp"
+
+#include <wfpg/light/beam_map.hpp>
+#include <wfpg/light/photon_map.hpp>
+
+namespace render {
+
+/// The photons of a sample. Maps that nobody asked for are empty.
+struct photon_view {
+  wfpg::light_vertices_view<subpath_vertex> stored;
+  wfpg::photon_map_view on_surfaces, in_media, for_beams;  ///< of stored vertices
+  wfpg::light_vertices_view<light_beam> beams;
+  wfpg::beam_map_view beam_map;
+};
+
+/// Copies the positions of stored vertices on surfaces or in media, for a photon map. The map skips the
+/// others.
+struct copy_positions {
+  wfpg::light_vertices_view<subpath_vertex> stored;
+  bool in_media;
+  wfpg::array_view<vec3> positions;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const subpath_vertex& vertex = stored[static_cast<std::uint32_t>(i)];
+    positions[i] =
+        vertex.in_medium() == in_media ? vertex.at.position : vec3(2.0f * wfpg::largest_coordinate);
+  }
+};
+
+/// Copies stored beams, for a beam map.
+struct copy_beams {
+  wfpg::light_vertices_view<light_beam> stored;
+  wfpg::array_view<wfpg::path_beam> beams;
+
+  WFPG_HD void operator()(std::size_t i) const { beams[i] = stored[static_cast<std::uint32_t>(i)].beam; }
+};
+
+/// Whether two numbers of solids mean one medium.
+WFPG_HD inline bool have_one_medium(const scene_view& scene, std::uint32_t a, std::uint32_t b) {
+  if (a == b) return true;
+  return a != solid_stack::none && b != solid_stack::none &&
+         bound_same_solid(scene.materials[a], scene.materials[b]);
+}
+
+/// Merges a camera path's vertex with the photons around it.
+template <class World>
+struct merge_at_vertex {
+  const World& world;
+  const photon_view& photons;
+  const subpath_vertex& vertex;
+  const scatterer& f;
+
+  WFPG_HD technique_sum on_surface() const {
+    technique_sum found;
+    photons.on_surfaces.for_each_point(vertex.at.position, [&](std::uint32_t k) {
+      const subpath_vertex& light = photons.stored[k];
+      if (light.segments + vertex.segments > world.max_depth) return;
+      const vec3 incident = light.at.outgoing;
+      // The photon's flux is that of a surface with the geometric normal. The sum is over the number of light
+      // paths and the disc of merges.
+      add(found, light, wfpg::merge_technique::surface_points,
+          f.eval_rgb(vertex.at.outgoing, incident) * light.throughput /
+              (vertex.cosine(incident) * world.techniques.surface_points));
+    });
+    return found;
+  }
+
+  WFPG_HD technique_sum in_medium() const {
+    const vec3 scattering = vertex.solids.medium_of(world.scene).scattering;
+    technique_sum found;
+    photons.in_media.for_each_point(vertex.at.position, [&](std::uint32_t k) {
+      const subpath_vertex& light = photons.stored[k];
+      if (light.segments + vertex.segments > world.max_depth ||
+          !have_one_medium(world.scene, light.material, vertex.material))
+        return;
+      // Both paths have scattered here. The sum is over the number of light paths and the ball of merges.
+      const vec3 flux = light.throughput / glm::max(scattering, vec3(1e-30f));
+      add(found, light, wfpg::merge_technique::volume_points,
+          f.phase.eval(vertex.at.outgoing, light.at.outgoing) * flux / world.techniques.volume_points);
+    });
+    return found;
+  }
+
+ private:
+  WFPG_HD void add(technique_sum& found, const subpath_vertex& light, wfpg::merge_technique by,
+                   vec3 value) const {
+    if (!(wfpg::luminance(value) > 0.0f)) return;
+    found.add(value,
+              light.weights.merge(world.techniques, by, vertex.weights, vertex.leave(f, light.at.outgoing)));
+  }
+};
+
+/// Merges a piece of a camera path's segment with the photons and the photon beams along it. The piece is
+/// long: it goes on where the path scatters.
+template <class World>
+class merge_along_piece {
+ public:
+  WFPG_HD merge_along_piece(const World& world, const photon_view& photons, const subpath& path,
+                            std::uint32_t segments, const path_segment& before, const medium_piece& piece)
+      : world_(world),
+        photons_(photons),
+        path_(path),
+        segments_(segments),
+        before_(before),
+        piece_(piece),
+        medium_(coefficients_of(piece.around)),
+        solid_(before.solids.top(world.scene)),
+        along_{path.origin, path.direction, piece.begin, piece.limit} {
+    // Weights are floats, and what is left beyond is nothing.
+    const vec3 sigma = piece.around.extinction();
+    const float least = glm::min(sigma.x, glm::min(sigma.y, sigma.z));
+    if (least > 0.0f) along_.end = glm::min(along_.end, piece.begin + 25.0f / least);
+  }
+
+  WFPG_HD technique_sum with_points() const {
+    technique_sum found;
+    const auto merge = [&](std::uint32_t k, const wfpg::merge_geometry& at) {
+      const subpath_vertex& light = photons_.stored[k];
+      if (!may_merge(light.segments, light.material)) return;
+      const vec3 value = arriving(at.t_camera) * light.throughput *
+                         (phase(light.at.outgoing) * at.kernel / world_.light_paths);
+      add(found, light.weights, wfpg::merge_technique::beam_points, at, light.at.outgoing, value);
+    };
+    photons_.for_beams.for_each_point_along(along_, wfpg::merge_kernel::epanechnikov, merge);
+    return found;
+  }
+
+  WFPG_HD technique_sum with_beams() const {
+    technique_sum found;
+    const auto merge = [&](std::uint32_t k, const wfpg::merge_geometry& at) {
+      const light_beam& light = photons_.beams[k];
+      if (!may_merge(light.segments, light.solid)) return;
+      const float length = at.t_light - light.beam.begin;
+      // Short beams: a light path gets as far with this probability.
+      const vec3 flux = light.throughput * medium_.transmittance(length) / medium_.pdf(length, false);
+      const vec3 back = -light.beam.direction;
+      const vec3 value = arriving(at.t_camera) * piece_.around.scattering * flux *
+                         (phase(back) * at.kernel / (at.sine * world_.beam_paths));
+      wfpg::path_arrival arrival;
+      arrival.distance = at.t_light;
+      arrival.pdf_distance = light.before.there * medium_.pdf(length, true);
+      arrival.pdf_distance_back = light.before.back * medium_.pdf(length, light.begins_inside != 0);
+      add(found, light.weights.arrive(arrival), wfpg::merge_technique::beams, at, back, value);
+    };
+    photons_.beam_map.for_each_beam_along(along_, wfpg::merge_kernel::epanechnikov, merge);
+    return found;
+  }
+
+ private:
+  WFPG_HD bool may_merge(std::uint32_t light_segments, std::uint32_t light_solid) const {
+    return light_segments + segments_ <= world_.max_depth &&
+           have_one_medium(world_.scene, light_solid, solid_);
+  }
+  /// Of the camera path, with what is left of light up to a distance.
+  WFPG_HD vec3 arriving(float distance) const {
+    return before_.throughput * medium_.transmittance(distance - piece_.begin);
+  }
+  WFPG_HD float phase(vec3 incident) const {
+    return wfpg::henyey_greenstein{piece_.around.g}.eval(-path_.direction, incident);
+  }
+
+  WFPG_HD void add(technique_sum& found, const wfpg::vertex_weights& light, wfpg::merge_technique by,
+                   const wfpg::merge_geometry& at, vec3 incident, vec3 value) const {
+    if (!(wfpg::luminance(value) > 0.0f)) return;
+    const float length = at.t_camera - piece_.begin;
+    path_segment s = before_;
+    s.distance = at.t_camera;
+    s.pdf.there *= medium_.pdf(length, true);
+    s.pdf.back *= medium_.pdf(length, piece_.begins_inside);
+    // The vertex where the camera path would scatter.
+    const subpath_vertex vertex(path_.origin + at.t_camera * path_.direction, -path_.direction, piece_.around,
+                                solid_, s, segments_, World::weights_at(path_, s, 1.0f));
+    const scatterer f = vertex.seen_from(incident);
+    found.add(value, light.merge(world_.techniques, by, vertex.weights, vertex.leave(f, incident)));
+  }
+
+  const World& world_;
+  const photon_view& photons_;
+  const subpath& path_;
+  std::uint32_t segments_;
+  const path_segment& before_;
+  const medium_piece& piece_;
+  wfpg::homogeneous_medium medium_;
+  std::uint32_t solid_;
+  wfpg::path_beam along_;
+};
+
+}  // namespace render
