@@ -180,13 +180,13 @@ TEST_CASE("options without effect are refused by a line that says what they need
       {"--guided-depths 1 --method pt", "--guided-depths", "--method wfpg, wfpg-product, sarsa or records"},
       {"--sarsa-step 4", "--sarsa-step", "--method sarsa"},
       {"--records-cones 4", "--records-cones", "--method records"},
-      {"--fog 0.1", "--fog", "--method vpt, bpt, vcm or lt"},
+      {"--fog 0.1", "--fog", "--method vpt, bpt, vcm, upbp or lt"},
       {"--guide-fraction 0.5 --method vpt", "--guide-fraction", "a --method that guides"},
       {"--method vpt --device optix", "--method vpt", "a --device other than optix"},
       {"--method bpt --device optix", "--method bpt", "a --device other than optix"},
-      {"--method lt --techniques nee", "--techniques", "--method bpt or vcm"},
-      {"--method pt --light-memory 1M", "--light-memory", "--method bpt or vcm"},
-      {"--method bpt --radius 0.1", "--radius", "--method vcm, or bpt with surf among its --techniques"},
+      {"--method lt --techniques nee", "--techniques", "--method bpt, vcm or upbp"},
+      {"--method pt --light-memory 1M", "--light-memory", "--method bpt, vcm or upbp"},
+      {"--method bpt --radius 0.1", "--radius", "--method vcm or upbp, or surf among --techniques"},
       {"--exposure 2", "--exposure", "--png"},
       {"--method openpgl-vmm --device seq", "--method openpgl-vmm", "--device cpu"},
       {"--method records --device optix", "--method records", "a --device other than optix"}};
@@ -196,7 +196,7 @@ TEST_CASE("options without effect are refused by a line that says what they need
   for (const std::string method : {"sarsa", "records", "openpgl-dqt"})
     for (const std::string option : {"--save-state", "--resume"})
       table.push_back({"--method " + method + " " + option + " file", option,
-                       "--method pt, vpt, bpt, vcm, lt, wfpg or wfpg-product"});
+                       "--method pt, vpt, bpt, vcm, upbp, lt, wfpg or wfpg-product"});
   for (const refusal& one : table)
     CHECK(said_of(one.options) ==
           "wfpg-render: " + one.option + " requires " + one.need + "; --help lists the options\n");

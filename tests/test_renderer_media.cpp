@@ -316,7 +316,7 @@ TEST_CASE("media: methods of surfaces alone refuse them and name others", "[rend
       if (row.has_media)
         CHECK(said == "nothing");
       else
-        CHECK(contains(said, "expected vpt, bpt, vcm or lt for a scene with fog or scattering solids"));
+        CHECK(contains(said, "expected vpt, bpt, vcm, upbp or lt for a scene with fog or scattering solids"));
     }
     if (!is_openpgl(row.method)) CHECK(refusal(absorbing, row.method) == "nothing");
   }

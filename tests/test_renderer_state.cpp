@@ -295,13 +295,13 @@ TEST_CASE("guides and states need a method that can save them", "[renderer][stat
       sampling_method::pt, [](render_options& o) { o.keep_guide = true; }, "method is pt, expected wfpg or");
   refused(
       sampling_method::openpgl_dqt, [](render_options& o) { o.keep_state = true; },
-      "method is openpgl-dqt, expected pt, vpt, bpt, vcm, lt, wfpg or");
+      "method is openpgl-dqt, expected pt, vpt, bpt, vcm, upbp, lt, wfpg or");
   refused(
       sampling_method::openpgl_vmm, [](render_options& o) { o.resume = "a"; },
-      "method is openpgl-vmm, expected pt, vpt, bpt, vcm, lt, wfpg or");
+      "method is openpgl-vmm, expected pt, vpt, bpt, vcm, upbp, lt, wfpg or");
   refused(
       sampling_method::sarsa, [](render_options& o) { o.keep_state = true; },
-      "method is sarsa, expected pt, vpt, bpt, vcm, lt, wfpg or");
+      "method is sarsa, expected pt, vpt, bpt, vcm, upbp, lt, wfpg or");
   refused(
       sampling_method::wfpg, [](render_options& o) { o.load_guide = o.resume = "a"; },
       "load_guide is a, expected none");

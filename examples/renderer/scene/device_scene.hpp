@@ -71,11 +71,32 @@ WFPG_HD inline void orient(bsdf& f, vec3 geometric_normal, vec3 normal, vec3 out
   f.geometric_normal = outward * side * geometric_normal;
 }
 
+/// Boundaries whose index differs by less bend no light.
+inline constexpr float least_index_step = 1e-4f;
+
 /// Whether rays may enter what a material bounds: all that transmits and is no thin sheet.
 WFPG_HD inline bool bounds_solid(const material& m) {
   if (m.kind == material_kind::metallic_roughness)
     return unorm8(m.metallic) < 1.0f && unorm8(m.transmission) > 0.0f;
   return m.kind == material_kind::dielectric || m.kind == material_kind::rough_dielectric;
+}
+
+/// Whether two materials bound the same solid. A ray that enters by one may then leave by the other.
+WFPG_HD inline bool bound_same_solid(const material& a, const material& b) {
+  return a.priority == b.priority && a.ior == b.ior && a.absorption == b.absorption &&
+         a.scattering == b.scattering && a.g == b.g;
+}
+
+/// Whether light may pass boundaries of solids unbent: one has the index of air, or there are several solids,
+/// which may overlap or touch.
+inline bool may_pass_unbent(const std::vector<material>& materials) {
+  const material* first = nullptr;
+  for (const material& m : materials) {
+    if (!bounds_solid(m)) continue;
+    if (std::abs(m.ior - 1.0f) < least_index_step || (first && !bound_same_solid(*first, m))) return true;
+    first = &m;
+  }
+  return false;
 }
 
 /// scene.hpp describes the arrays.
@@ -91,6 +112,8 @@ struct scene_view {
   environment_view environment;
   medium fog;
   bool has_solids = false;  ///< whether any of them bounds one
+  /// Whether light may pass boundaries of solids unbent: one has the index of air, or there are several.
+  bool has_unbent = false;
 
   WFPG_HD const material& material_of(std::uint32_t triangle) const {
     return materials[triangle_materials[triangle]];
@@ -243,7 +266,8 @@ class device_scene {
         materials_(exec, host.materials),
         environment_(host.environment),
         fog_(host.fog),
-        has_solids_(std::any_of(host.materials.begin(), host.materials.end(), bounds_solid)) {
+        has_solids_(std::any_of(host.materials.begin(), host.materials.end(), bounds_solid)),
+        has_unbent_(may_pass_unbent(host.materials)) {
     check(host);
     emitted_luminances_ = wfpg::buffer<float, Exec>(exec, emitted_luminances(host));
     std::vector<texture_span> spans;
@@ -272,6 +296,7 @@ class device_scene {
     v.environment = environment_;
     v.fog = fog_;
     v.has_solids = has_solids_;
+    v.has_unbent = has_unbent_;
     return v;
   }
 
@@ -355,6 +380,7 @@ class device_scene {
   environment_view environment_;
   medium fog_;
   bool has_solids_;
+  bool has_unbent_;
 };
 
 }  // namespace render

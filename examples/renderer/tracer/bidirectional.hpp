@@ -159,11 +159,30 @@ class bidirectional_tracer {
           trace_camera<false>(segments);
       });
       if (segments == settings_.max_depth) break;
-      clock_.measure("connections", [&] {
-        exec_.for_each(count_, connect_camera_paths<world_type>{world_, paths_.view(), vertices_.view(),
-                                                                photons_.view(), found()});
-      });
+      join_camera_paths();
     }
+  }
+
+  void join_camera_paths() {
+    const tiled_view<subpath> paths = paths_.view();
+    const tiled_view<subpath_vertex> vertices = vertices_.view();
+    const wfpg::path_techniques& counts = world_.techniques;
+    if (counts.next_event > 0.0f)
+      clock_.measure("lights", [&] {
+        exec_.for_each(count_, sample_lights<world_type>{world_, paths, vertices, found()});
+      });
+    if (counts.connections > 0.0f)
+      clock_.measure("connections", [&] {
+        exec_.for_each(count_,
+                       connect_paths<world_type>{world_, paths, vertices, photons_.stored(), found()});
+      });
+    if (counts.surface_points > 0.0f || counts.volume_points > 0.0f)
+      clock_.measure("merges", [&] {
+        exec_.for_each(count_, merge_vertices<world_type>{world_, paths, vertices, photons_.view(), found()});
+      });
+    clock_.measure("shade", [&] {
+      exec_.for_each(count_, extend_camera_paths<world_type>{world_, paths, vertices});
+    });
   }
 
   template <bool merges>

@@ -10,6 +10,7 @@
 #include <wfpg/host/phase.hpp>
 #include <wfpg/light/light_vertices.hpp>
 #include <wfpg/light/path_weights.hpp>
+#include <wfpg/light/photon_estimators.hpp>
 #include <wfpg/light/splats.hpp>
 
 namespace render {

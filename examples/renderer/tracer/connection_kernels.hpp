@@ -96,37 +96,20 @@ struct trace_camera_paths {
   }
 };
 
-/// Adds what the camera paths' vertices find by light samples, by connections and by merges, and continues
-/// the paths.
+/// Adds what the vertices of camera paths find by light samples.
 template <class World>
-struct connect_camera_paths {
+struct sample_lights {
   World world;
   tiled_view<subpath> paths;
   tiled_view<subpath_vertex> vertices;
-  photon_view photons;
   found_light found;
 
   WFPG_HD void operator()(std::size_t i) const {
     if (!paths[i].is_active()) return;
-    const auto id = static_cast<std::uint32_t>(i);
     const subpath_vertex vertex = vertices[i];
     const scatterer f = vertex.seen_from(vertex.at.outgoing);
-    if (!f.is_delta()) {
-      const wfpg::path_techniques& counts = world.techniques;
-      const auto add = [&](technique by, const technique_sum& sum) {
-        found.add(i, by, sum, vertex.throughput);
-      };
-      if (counts.next_event > 0.0f) add(technique::nee, sample_light(id, vertex, f));
-      if (counts.connections > 0.0f) add(technique::connect, connect_all(i, vertex, f));
-      const merge_at_vertex<World> merge{world, photons, vertex, f};
-      if (counts.surface_points > 0.0f && !f.in_medium) add(technique::surf, merge.on_surface());
-      if (counts.volume_points > 0.0f && f.in_medium) add(technique::pp3d, merge.in_medium());
-    }
-    subpath next = paths[i];
-    if (world.extend(vertex, id, false, 0, next))
-      paths.emplace(i, next);
-    else
-      paths.emplace(i);
+    if (!f.is_delta())
+      found.add(i, technique::nee, sample_light(static_cast<std::uint32_t>(i), vertex, f), vertex.throughput);
   }
 
  private:
@@ -150,9 +133,26 @@ struct connect_camera_paths {
         vertex.weights.next_event(world.techniques, vertex.leave(f, light.direction), light.source, edge));
     return sum;
   }
+};
 
+/// Adds what the vertices of camera paths find by connections with their light paths.
+template <class World>
+struct connect_paths {
+  World world;
+  tiled_view<subpath> paths;
+  tiled_view<subpath_vertex> vertices;
+  wfpg::light_vertices_view<subpath_vertex> stored;
+  found_light found;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    if (!paths[i].is_active()) return;
+    const subpath_vertex vertex = vertices[i];
+    const scatterer f = vertex.seen_from(vertex.at.outgoing);
+    if (!f.is_delta()) found.add(i, technique::connect, connect_all(i, vertex, f), vertex.throughput);
+  }
+
+ private:
   WFPG_HD technique_sum connect_all(std::size_t i, const subpath_vertex& vertex, const scatterer& f) const {
-    const wfpg::light_vertices_view<subpath_vertex>& stored = photons.stored;
     technique_sum sum;
     for (std::uint32_t k = stored.last(i); k != stored.none; k = stored.previous(k)) {
       const subpath_vertex& light = stored[k];
@@ -176,6 +176,45 @@ struct connect_camera_paths {
     const wfpg::path_departure to_camera = light.leave(light.seen_from(light.at.outgoing), -toward);
     sum.add(value * clear.transmittance, light.weights.connection(world.techniques, to_camera, camera.weights,
                                                                   camera.leave(f, toward), edge));
+  }
+};
+
+/// Adds what the vertices of camera paths find by merges.
+template <class World>
+struct merge_vertices {
+  World world;
+  tiled_view<subpath> paths;
+  tiled_view<subpath_vertex> vertices;
+  photon_view photons;
+  found_light found;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    if (!paths[i].is_active()) return;
+    const subpath_vertex vertex = vertices[i];
+    const scatterer f = vertex.seen_from(vertex.at.outgoing);
+    if (f.is_delta()) return;
+    const merge_at_vertex<World> merge{world, photons, vertex, f};
+    if (f.in_medium)
+      found.add(i, technique::pp3d, merge.in_medium(), vertex.throughput);
+    else
+      found.add(i, technique::surf, merge.on_surface(), vertex.throughput);
+  }
+};
+
+/// Continues camera paths from their vertices.
+template <class World>
+struct extend_camera_paths {
+  World world;
+  tiled_view<subpath> paths;
+  tiled_view<subpath_vertex> vertices;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    subpath next = paths[i];
+    if (!next.is_active()) return;
+    if (world.extend(vertices[i], static_cast<std::uint32_t>(i), false, 0, next))
+      paths.emplace(i, next);
+    else
+      paths.emplace(i);
   }
 };
 

@@ -119,7 +119,7 @@ WFPG_HD clear_way way_along(const scene_view& scene, const Caster& caster, const
     add_piece(ray.t_max, true, true);
     return way;
   }
-  if (!scene.has_solids) return hidden;
+  if (!scene.has_unbent) return hidden;
   straight_ray straight(ray);
   for (std::uint32_t piece = 0; piece <= most_passed; ++piece) {
     const triangle_hit hit = caster.intersect(straight.ray);

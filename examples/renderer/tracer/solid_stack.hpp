@@ -9,12 +9,6 @@
 
 namespace render {
 
-/// Whether two materials bound the same solid. A ray that enters by one may then leave by the other.
-WFPG_HD inline bool bound_same_solid(const material& a, const material& b) {
-  return a.priority == b.priority && a.ior == b.ior && a.absorption == b.absorption &&
-         a.scattering == b.scattering && a.g == b.g;
-}
-
 WFPG_HD inline wfpg::homogeneous_medium coefficients_of(const medium& m) {
   return {m.absorption, m.scattering};
 }
@@ -100,7 +94,7 @@ struct solid_boundary {
 
   /// Whether light passes the boundary unbent and without reflection. Both sides have the same index.
   WFPG_HD bool is_matched(const material& m) const {
-    return m.kind != material_kind::metallic_roughness && std::abs(ior - 1.0f) < least_step;
+    return m.kind != material_kind::metallic_roughness && std::abs(ior - 1.0f) < least_index_step;
   }
   /// The index of rough facets, which cannot refract where it is 1.
   WFPG_HD float ior_of(const material& m) const {
@@ -108,7 +102,7 @@ struct solid_boundary {
     return ior < 1.0f ? 1.0f - least_rough_step : 1.0f + least_rough_step;
   }
 
-  static constexpr float least_step = 1e-4f, least_rough_step = 0.01f;
+  static constexpr float least_rough_step = 0.01f;
 };
 
 }  // namespace render

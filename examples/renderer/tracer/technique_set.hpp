@@ -62,7 +62,7 @@ class technique_set {
 struct light_path_options {
   std::size_t memory = wfpg::light_vertices_options().budget_bytes;  ///< bytes of vertices, and of beams
   float merge_radius = 0.003f;                                       ///< on surfaces
-  float volume_radius = 0.005f;                                      ///< in media
+  float volume_radius = 0.002f;                                      ///< in media
   float radius_alpha = wfpg::radius_schedule().alpha;                ///< as in radius_schedule
   std::uint32_t beam_paths = 4096;  ///< light paths of a sample that leave beams, at least 1
 };
