@@ -187,6 +187,39 @@ TEST_CASE("one seed gives one picture of paths from both ends on any policy", "[
   CHECK(pictures[2] == pictures[0]);
 }
 
+TEST_CASE("the pictures of all techniques add up to the picture", "[renderer][bidirectional]") {
+  const render::scene scene = render::make_builtin_scene("fog-spot");
+  render::render_options options;
+  options.method = sampling_method::upbp;
+  options.light.volume_radius = options.light.merge_radius = 0.03f;
+  options.width = 16;
+  options.height = 12;
+  options.spp = 4;
+  options.technique_pictures = true;
+  const render::render_result result = render::render(scene, options, {});
+  CHECK(result.by_technique.size() == std::size_t(render::technique_count));
+  std::vector<vec3> sum(result.picture.pixels.size(), vec3(0.0f));
+  std::vector<int> found_by(std::size_t(render::technique_count), 0);
+  for (const render::technique_images& one : result.by_technique)
+    for (std::size_t i = 0; i < sum.size(); ++i) {
+      sum[i] += one.weighted.pixels[i];
+      // A weight is at most 1.
+      CHECK(one.weighted.pixels[i].x <= 1.0001f * one.plain.pixels[i].x);
+      found_by[std::size_t(one.by)] += one.weighted.pixels[i].x > 0.0f ? 1 : 0;
+    }
+  for (std::size_t i = 0; i < sum.size(); ++i)
+    CHECK(glm::length(sum[i] - result.picture.pixels[i]) <= 1e-4f * glm::length(sum[i]));
+  CHECK(found_by[std::size_t(render::technique::hits)] == 0);  // its lamp has no extent
+  for (const render::technique by :
+       {render::technique::nee, render::technique::connect, render::technique::splat, render::technique::surf,
+        render::technique::pb2d, render::technique::bb1d})
+    CHECK(found_by[std::size_t(by)] > 0);
+  options.technique_pictures = false;
+  const render::render_result without = render::render(scene, options, {});
+  CHECK(without.by_technique.empty());
+  CHECK(without.picture.pixels == result.picture.pixels);
+}
+
 TEST_CASE("vertices of light paths beyond their memory are counted", "[renderer][bidirectional]") {
   const render::scene scene = render::make_builtin_scene("cornell-box");
   render::render_options options;
@@ -205,6 +238,8 @@ TEST_CASE("names of techniques are read and written", "[renderer][bidirectional]
   CHECK(render::names_of(render::technique_set()) == "hits+nee+connect+splat");
   CHECK(render::names_of(render::connection_and_merging()) == "hits+nee+connect+splat+surf");
   CHECK(render::names_of(render::techniques_of("splat+nee")) == "nee+splat");
+  CHECK(render::names_of(render::points_beams_and_paths()) == "hits+nee+connect+splat+surf+pp3d+pb2d+bb1d");
+  CHECK(render::names_of(render::light_tracing()) == "splat");
   CHECK(render::names_of(render::techniques_of("bpt")) == "hits+nee+connect+splat");
   for (const char* wrong : {"", "hit", "nee,splat", "nee+", "+nee"})
     CHECK_THROWS_AS(render::techniques_of(wrong), std::invalid_argument);

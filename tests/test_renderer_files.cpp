@@ -96,6 +96,20 @@ TEST_CASE("an unwritable folder is found before the scene is loaded", "[renderer
   CHECK(said == "wfpg-render: --stats: " + folder.file("a.json") + " cannot be written: Permission denied\n");
 }
 
+TEST_CASE("pictures of techniques are files, and their folder is checked", "[renderer][files]") {
+  const temporary_folder folder;
+  const std::string begin = folder.file("by-");
+  CHECK(complaint_of({"--method", "lt", "--technique-pictures", folder.file("none/by-")}) ==
+        "wfpg-render: --technique-pictures: " + folder.file("none/by-hits.exr") +
+            " cannot be written: No such file or directory\n");
+  const outcome done = run_render(
+      {"cornell-box", "--method", "lt", "--size", "8x8", "--spp", "1", "--technique-pictures", begin});
+  CHECK(done.code == 0);
+  for (const char* name : {"hits", "hits-unweighted", "splat", "splat-unweighted"})
+    CHECK(render::read_exr(begin + name + ".exr").width == 8);
+  CHECK_FALSE(fs::exists(begin + "nee.exr"));
+}
+
 TEST_CASE("unknown picture formats are refused, and the known ones are named", "[renderer][files]") {
   const temporary_folder folder;
   for (const std::string name : {"a.jpg", "a", "a.exr.gz", ".exr"})

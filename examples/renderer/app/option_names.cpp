@@ -80,6 +80,10 @@ constexpr const char* technique_names[technique_count] = {"hits", "nee",  "conne
 
 }  // namespace
 
+const char* name_of(technique which) {
+  return technique_names[static_cast<int>(which)];
+}
+
 std::string names_of(const technique_set& set) {
   std::string names;
   for (int i = 0; i < technique_count; ++i)

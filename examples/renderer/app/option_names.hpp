@@ -19,6 +19,7 @@ const std::map<std::string, wfpg::sarsa_sampler>& sarsa_sampler_names();
 
 /// Names of the methods with a property, in a sentence.
 std::string names_of_methods(bool method_properties::*has);
+const char* name_of(technique which);
 /// The value of --techniques: names of all that are on, with + between them.
 std::string names_of(const technique_set& set);
 /// The set of such a value. Throws std::invalid_argument that says which name is unknown.

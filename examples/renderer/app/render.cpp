@@ -75,6 +75,8 @@ render_options completed(const scene& scene, render_options options) {
   require(options.light.beam_paths >= 1, "beam_paths", options.light.beam_paths, "at least 1");
   require(options.light.radius_alpha > 0.0f && options.light.radius_alpha <= 1.0f, "radius_alpha",
           options.light.radius_alpha, "above 0, at most 1");
+  require(!options.technique_pictures || options.resume.empty(), "technique_pictures", "on",
+          "off where a rendering goes on, whose state has none");
   require_guided_files(options);
   return options;
 }

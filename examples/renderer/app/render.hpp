@@ -74,6 +74,7 @@ struct render_options {
   /// Of bpt, vcm and upbp; nee decides on next-event estimation, too. Unset: the method's own.
   std::optional<technique_set> techniques;
   light_path_options light;                  ///< of paths from both ends
+  bool technique_pictures = false;           ///< the result has a picture a technique
   std::uint32_t samples_per_leaf = 32000;    ///< after which Open PGL's field splits a leaf, 8 to 2^30
   wfpg::sarsa_grid_options sarsa;            ///< its own; what every guide is told follows from the others
   wfpg::irradiance_records_options records;  ///< likewise
@@ -168,9 +169,16 @@ struct checkpoint {
   image picture;
 };
 
+/// What one technique found, with its weights and without.
+struct technique_images {
+  technique by;
+  image weighted, plain;
+};
+
 struct render_result {
   image picture;
-  std::vector<checkpoint> checkpoints;  ///< where options ask for them
+  std::vector<technique_images> by_technique;  ///< where options ask for them
+  std::vector<checkpoint> checkpoints;         ///< where options ask for them
   render_report report;
   bool is_stopped = false;  ///< before its budget was spent
   std::string guide;        ///< a guide file's bytes, where options ask for them

@@ -74,7 +74,8 @@ inline tracer_settings tracer_settings_of(const render_options& options) {
           options.seed,
           static_cast<std::uint32_t>(options.roulette_depth),
           techniques_of(options),
-          options.light};
+          options.light,
+          options.technique_pictures};
 }
 
 /// What every guide is told.
@@ -329,13 +330,18 @@ void take_by_method(const sampling_job<Exec, Caster>& job) {
                               ", expected one that runs on any policy");
 }
 
-/// What a tracer reports beside its film.
+/// What a tracer has beside its film.
 template <class Tracer>
-void report_tracer(const Tracer&, render_report&) {}
+void take_more(const Tracer&, const render_options&, render_result&) {}
 template <class Exec, class Caster>
-void report_tracer(const bidirectional_tracer<Exec, Caster>& tracer, render_report& report) {
-  report.light_vertex_bytes = tracer.light_bytes();
-  report.dropped_light_vertices = tracer.dropped();
+void take_more(const bidirectional_tracer<Exec, Caster>& tracer, const render_options& options,
+               render_result& result) {
+  result.report.light_vertex_bytes = tracer.light_bytes();
+  result.report.dropped_light_vertices = tracer.dropped();
+  for (technique_picture& found : tracer.technique_pictures())
+    result.by_technique.push_back({found.by,
+                                   {options.width, options.height, std::move(found.weighted)},
+                                   {options.width, options.height, std::move(found.plain)}});
 }
 
 /// Renders by a tracer that has no guide. Its kernels trace all rays. Throws std::runtime_error for a caster
@@ -348,7 +354,7 @@ render_result render_in_kernels(const Exec& exec, const scene& scene, const rend
     return render_by<Accelerated, Tracer>(exec, scene, options, progress, [](const auto& job) {
       no_guide none;
       take_samples(job, none);
-      report_tracer(job.tracer, job.result.report);
+      take_more(job.tracer, job.options, job.result);
     });
   else
     refuse_batches(options.method);

@@ -28,14 +28,21 @@ namespace {
 
 constexpr int failure = 2;
 constexpr int interrupted = 3;
+constexpr const char* plain_end = "-unweighted";  ///< of names of technique pictures without weights
 
 struct arguments {
   scene_arguments scene;
   std::string output, png, stats, reference, save_guide, save_state;
-  float exposure = 1.0f;  ///< of the PNG
-  float fog = 0.0f;       ///< scattering per scene unit; 0: the scene's own
+  std::string technique_pictures;  ///< how names of files begin
+  float exposure = 1.0f;           ///< of the PNG
+  float fog = 0.0f;                ///< scattering per scene unit; 0: the scene's own
   render_options options;
 };
+
+/// The file of a technique's picture. `end`: of its name, without extension.
+std::string technique_file(const arguments& given, technique by, const char* end = "") {
+  return given.technique_pictures + name_of(by) + end + ".exr";
+}
 
 /// Checks files before the scene is loaded, since rendering takes long.
 void check_files(const arguments& given) {
@@ -45,6 +52,11 @@ void check_files(const arguments& given) {
                                      {"--stats", given.stats, ""},
                                      {"--save-guide", given.save_guide, ""},
                                      {"--save-state", given.save_state, ""}};
+  const technique_set techniques = pictured(techniques_of(options));
+  for (int i = 0; i < technique_count && !given.technique_pictures.empty(); ++i)
+    if (techniques.has(technique(i)))
+      for (const char* end : {"", plain_end})
+        outputs.push_back({"--technique-pictures", technique_file(given, technique(i), end), ""});
   // An interrupted rendering continues from its newer state.
   if (given.save_state.empty()) outputs.push_back({"--resume", options.resume, ""});
   check_outputs(outputs, {{"SCENE", is_builtin_scene(given.scene.name) ? "" : given.scene.name, ""},
@@ -58,6 +70,8 @@ void add_file_options(CLI::App& app, arguments& given) {
   app.add_option("--exposure", given.exposure, "multiplies the PNG's values (default: 1)")
       ->transform(positive_number(1.0e30))
       ->needs("--png");
+  app.add_option("--technique-pictures", given.technique_pictures,
+                 "pictures of what each technique finds, OpenEXR; how their names begin, such as out/by-");
   app.add_option("--stats", given.stats, "what it cost, JSON")->transform(file_path());
   app.add_option("--reference", given.reference, "picture to print the error against, OpenEXR")
       ->transform(file_path());
@@ -83,7 +97,8 @@ void add_state_options(CLI::App& app, arguments& given) {
   app.add_option("--resume", given.options.resume,
                  "state of the rendering to go on with; where it goes when that is interrupted")
       ->transform(file_path())
-      ->excludes(load);
+      ->excludes(load)
+      ->excludes(app.get_option("--technique-pictures"));
 }
 
 /// Writes the state of a rendering that can be resumed, also with more samples.
@@ -122,6 +137,10 @@ bool write_all(const arguments& given, const render_result& result, const std::o
   };
   if (!given.output.empty()) attempt([&] { write_exr(given.output, result.picture); });
   if (!given.png.empty()) attempt([&] { write_png(given.png, result.picture, given.exposure); });
+  for (const technique_images& found : result.by_technique) {
+    attempt([&] { write_exr(technique_file(given, found.by), found.weighted); });
+    attempt([&] { write_exr(technique_file(given, found.by, plain_end), found.plain); });
+  }
   if (!given.save_guide.empty()) attempt([&] { write_file(given.save_guide, result.guide); });
   attempt([&] { save_state(given, result, log); });
   std::optional<image_error> error;
@@ -155,6 +174,7 @@ int render_scene(arguments& given, std::ostream& out, std::ostream& log) {
   warn_of_far_lights(scene, log);
   const std::optional<image> reference = reference_of(given, scene);
 
+  given.options.technique_pictures = !given.technique_pictures.empty();
   given.options.keep_guide = !given.save_guide.empty();
   given.options.keep_state = !given.save_state.empty() || !given.options.resume.empty();
   given.options.is_stopped = is_interrupted;
@@ -190,8 +210,9 @@ int run_program(int argc, const char* const* argv, std::ostream& out, std::ostre
   try {
     app.parse(argc, argv);
     if (given.output.empty() && given.png.empty() && given.stats.empty() && given.reference.empty() &&
-        given.save_guide.empty() && given.save_state.empty())
-      throw CLI::RequiredError("one of -o, --png, --stats, --reference, --save-guide, --save-state");
+        given.save_guide.empty() && given.save_state.empty() && given.technique_pictures.empty())
+      throw CLI::RequiredError(
+          "one of -o, --png, --stats, --reference, --technique-pictures, --save-guide, --save-state");
     check_render_options(app, given.options);
   } catch (const CLI::ParseError& error) {
     return app.exit(error, out, log) == 0 ? 0 : failure;

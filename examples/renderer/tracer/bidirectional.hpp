@@ -12,6 +12,7 @@
 #include "tracer/path_film.hpp"
 #include "tracer/photon_maps.hpp"
 #include "tracer/stage_clock.hpp"
+#include "tracer/technique_film.hpp"
 #include "tracer/unguided.hpp"
 #include "tracer/wavefront.hpp"
 
@@ -47,6 +48,7 @@ class bidirectional_tracer {
         around_lights_(exec,
                        std::vector<solid_stack>(world.scene.has_solids ? world.lights.lights.size() : 0)),
         film_(exec, count_),
+        by_technique_(exec, count_, settings.technique_pictures),
         clock_(exec) {
     world_.beam_paths = static_cast<float>(photons_.beam_paths());
     exec_.for_each(around_lights_.size(), find_light_solids<world_type>{world_, around_lights_.view()});
@@ -57,12 +59,16 @@ class bidirectional_tracer {
     world_.random = {settings_.seed, sample};
     exec_.fill_bytes(radiance_.data(), 0, radiance_.bytes());
     photons_.begin();
+    by_technique_.begin();
     const merge_radii radii(settings_.light, extent(camera), sample);
     count_merges(radii);
     if (settings_.techniques.needs_light_paths()) follow_light(camera);
     if (settings_.techniques.merges()) clock_.measure("photon map", [&] { photons_.build(radii); });
     follow_camera(camera);
-    clock_.measure("film", [&] { film_.add(radiance_.view(), weight); });
+    clock_.measure("film", [&] {
+      film_.add(radiance_.view(), weight);
+      by_technique_.add(weight);
+    });
     dropped_ += photons_.dropped();  // waits, so that a look at the time sees the whole sample
     clock_.resolve();
   }
@@ -71,6 +77,10 @@ class bidirectional_tracer {
   const path_film<Exec>& film() const { return film_; }
   path_film<Exec>& film() { return film_; }
 
+  /// What each technique found. Empty where settings do not ask for it.
+  std::vector<technique_picture> technique_pictures() const {
+    return by_technique_.pictures(pictured(settings_.techniques));
+  }
   /// Vertices and beams of light paths that had no memory, over all samples. Their light is missing.
   std::uint64_t dropped() const { return dropped_; }
   /// Bytes of the vertices and beams of light paths, and of the maps over them.
@@ -112,7 +122,7 @@ class bidirectional_tracer {
     counts.beams = world_.beam_paths * 2.0f * radii.of_beams;
   }
 
-  found_light found() { return {radiance_.view(), {}, {}}; }
+  found_light found() { return by_technique_.found(radiance_.view()); }
 
   void follow_light(const pinhole& camera) {
     clock_.measure("light paths", [&] {
@@ -125,21 +135,17 @@ class bidirectional_tracer {
                                                   keeps_.view(), photons_.pending(), film_.segment_counts()});
         photons_.reserve(keeps_.view());
         const bool is_last = segments + 1 == settings_.max_depth;
-        exec_.for_each(count_, extend_light_paths<world_type>{world_,
-                                                              camera,
-                                                              is_last,
-                                                              paths_.view(),
-                                                              vertices_.view(),
-                                                              keeps_.view(),
-                                                              photons_.stored(),
-                                                              splats_.view(),
-                                                              {}});
+        exec_.for_each(count_, extend_light_paths<world_type>{
+                                   world_, camera, is_last, paths_.view(), vertices_.view(), keeps_.view(),
+                                   photons_.stored(), splats_.view(), by_technique_.splats()});
       });
       clock_.measure("splats", [&] {
-        if (settings_.techniques.has(technique::splat))
-          splats_.add_to(exec_, radiance_.view(), 1.0f / static_cast<float>(count_));
+        if (!settings_.techniques.has(technique::splat)) return;
+        splats_.add_to(exec_, radiance_.view(), 1.0f / world_.light_paths);
+        by_technique_.add_splats(1.0f / world_.light_paths);
       });
     }
+    by_technique_.take_splats(radiance_);
   }
 
   void follow_camera(const pinhole& camera) {
@@ -205,6 +211,7 @@ class bidirectional_tracer {
   wfpg::buffer<solid_stack, Exec> around_camera_;
   wfpg::buffer<solid_stack, Exec> around_lights_;  // by the lights' columns; empty where there are no solids
   path_film<Exec> film_;
+  technique_film<Exec> by_technique_;
   policy_clock<Exec> clock_;
   std::uint64_t dropped_ = 0;
 };

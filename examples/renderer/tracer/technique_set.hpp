@@ -57,6 +57,12 @@ class technique_set {
   std::uint32_t on_ = 0;
 };
 
+/// Techniques that have a picture of their own. Lights that the camera sees count as hits, whatever is on.
+constexpr technique_set pictured(technique_set on) {
+  on.add(technique::hits);
+  return on;
+}
+
 /// Options of light paths and of merges. Radii are of the first sample, over the scene's radius; above 0, at
 /// most 1.
 struct light_path_options {
