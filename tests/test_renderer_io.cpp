@@ -264,7 +264,9 @@ TEST_CASE("Built-in scenes are valid", "[renderer][builtin]") {
     const scene s = render::make_builtin_scene(name);
     check_consistent(s);
     CHECK(s.name == name);
-    const std::map<std::string, int> depths = {{"thin-wall", 6}, {"mirror-balls", 10}, {"slab", 256}};
+    const std::map<std::string, int> depths = {{"thin-wall", 6}, {"mirror-balls", 10},
+                                               {"slab", 256},    {"glass-caustic-fog", 12},
+                                               {"wax", 64},      {"bottles", 32}};
     CHECK(s.max_depth == (depths.count(name) > 0 ? depths.at(name) : 8));
     int emitters = 0;
     for (std::size_t t = 0; t < s.triangles.size(); ++t) {
@@ -281,7 +283,7 @@ TEST_CASE("Built-in scenes are valid", "[renderer][builtin]") {
     }
     const std::map<std::string, int> others = {{"furnace", 12},    {"many-lamps", 24}, {"outdoor", 0},
                                                {"veach-bidir", 4}, {"fog-lamp", 0},    {"slab", 0},
-                                               {"fog-spot", 0}};
+                                               {"fog-spot", 0},    {"wax", 0}};
     CHECK(emitters == (others.count(name) > 0 ? others.at(name) : 2));
   }
   CHECK_FALSE(render::is_builtin_scene("nowhere"));

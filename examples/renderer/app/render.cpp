@@ -72,7 +72,8 @@ render_options completed(const scene& scene, render_options options) {
           options.light.merge_radius, "above 0, at most 1");
   require(options.light.volume_radius > 0.0f && options.light.volume_radius <= 1.0f, "volume_radius",
           options.light.volume_radius, "above 0, at most 1");
-  require(options.light.beam_paths >= 1, "beam_paths", options.light.beam_paths, "at least 1");
+  require(options.light.beam_paths.value_or(1) >= 1, "beam_paths", options.light.beam_paths.value_or(1),
+          "at least 1");
   require(options.light.radius_alpha > 0.0f && options.light.radius_alpha <= 1.0f, "radius_alpha",
           options.light.radius_alpha, "above 0, at most 1");
   require(!options.technique_pictures || options.resume.empty(), "technique_pictures", "on",

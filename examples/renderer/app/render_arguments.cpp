@@ -251,7 +251,7 @@ void add_bidirectional_options(CLI::App& app, render_options& options) {
                  with_default("the same, of merges in media", options.light.volume_radius))
       ->transform(positive_number(1.0));
   app.add_option("--beam-paths", options.light.beam_paths,
-                 with_default("light paths of a sample that leave beams", options.light.beam_paths))
+                 "light paths of a sample that leave beams (default: one in 64, at most 8192)")
       ->transform(whole_number(1, 1 << 30));
   app.add_option("--radius-alpha", options.light.radius_alpha,
                  with_default("radii shrink as the sample's number to the power (this - 1) / D, for merges "

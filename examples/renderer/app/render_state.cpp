@@ -74,7 +74,8 @@ named_values values_of(const render_options& o) {
     if (techniques.merges_in_media())
       values.emplace_back("--volume-radius", std::to_string(o.light.volume_radius));
     if (techniques.has(technique::bb1d))
-      values.emplace_back("--beam-paths", std::to_string(o.light.beam_paths));
+      values.emplace_back("--beam-paths", std::to_string(o.light.beam_paths_of(std::size_t(o.width) *
+                                                                               std::size_t(o.height))));
   }
   if (is_guided(o.method)) add_guider_values(o, values);
   return values;

@@ -413,6 +413,80 @@ scene fog_spot() {
   return s;
 }
 
+/// The inside of a solid.
+material filled(float ior, vec3 absorption, vec3 scattering, float g) {
+  material m;
+  m.kind = material_kind::dielectric;
+  m.base_color = vec3(1.0f);
+  m.ior = ior;
+  m.absorption = absorption;
+  m.scattering = scattering;
+  m.g = g;
+  return m;
+}
+
+/// A closed room of 4 x 3 x 4. A lamp in the ceiling shines on a ball of glass.
+scene glass_caustic_fog() {
+  scene_builder b("glass-caustic-fog");
+  const auto grey = b.diffuse(vec3(0.4f)), floor = b.diffuse({0.5f, 0.45f, 0.4f});
+  b.room({{-2.0f, 0.0f, -2.0f}, {2.0f, 3.0f, 2.0f}}, {grey, grey, floor, grey, grey, grey});
+  b.ceiling_lamp({0.0f, 2.98f, -0.2f}, {0.16f, 0.16f}, b.lamp({500.0f, 460.0f, 380.0f}));
+  b.sphere({0.0f, 1.8f, -0.2f}, 0.5f, 32, b.glass(material_kind::dielectric));
+  b.look({0.0f, 1.3f, 1.9f}, {0.0f, 1.2f, -1.0f}, 1.1f);
+  scene s = b.finish(12);
+  s.fog = {vec3(0.02f), vec3(0.6f), 0.2f};
+  return s;
+}
+
+/// A closed room with two candles of one wax, each with a small flame. Light enters the left one unbent; the
+/// right one has wax's index.
+scene wax() {
+  scene_builder b("wax");
+  const auto wall = b.diffuse({0.25f, 0.25f, 0.3f}), wood = b.diffuse({0.45f, 0.3f, 0.2f});
+  b.room({{-1.5f, 0.0f, -1.5f}, {1.5f, 2.5f, 1.5f}}, {wall, wall, wood, wall, wall, wall});
+  std::vector<punctual_light> flames;
+  for (const float side : {-1.0f, 1.0f}) {
+    const float x = 0.55f * side, height = side < 0.0f ? 1.1f : 0.8f;
+    b.box({{x, 0.5f * height + 0.001f, 0.0f}, {0.5f, height, 0.5f}, 0.3f * side},
+          b.add(filled(side < 0.0f ? 1.0f : 1.44f, {0.02f, 0.1f, 0.4f}, {12.0f, 10.0f, 8.0f}, 0.3f)));
+    flames.push_back(lamp_at({x, height + 0.12f, 0.0f}, {3.0f, 1.8f, 0.7f}));
+  }
+  b.look({0.0f, 1.2f, 1.45f}, {0.0f, 0.65f, -0.5f}, 1.0f);
+  scene s = b.finish(64);
+  s.punctual_lights = flames;
+  return s;
+}
+
+/// A closed room with five bottles of liquids on a shelf before a mirror. A lamp in a box of glass lights
+/// them, so that light samples find no light.
+scene bottles() {
+  scene_builder b("bottles");
+  const auto white = b.diffuse(vec3(0.6f)), wood = b.diffuse({0.5f, 0.35f, 0.22f});
+  b.room({{-1.5f, 0.0f, -1.2f}, {1.5f, 2.2f, 1.5f}}, {white, white, wood, white, white, white});
+  b.box({{0.0f, 0.35f, -0.75f}, {2.6f, 0.7f, 0.7f}}, wood);
+  b.parallelogram({-1.3f, 0.75f, -1.15f}, {2.6f, 0.0f, 0.0f}, {0.0f, 1.1f, 0.0f},
+                  {{0.0f, 0.0f, 1.0f}, b.glossy(material_kind::mirror, vec3(0.9f), 0.1f)});
+  const material liquids[] = {filled(1.33f, {0.05f, 0.6f, 2.5f}, vec3(0.0f), 0.0f),          // tea
+                              filled(1.34f, vec3(0.02f), {14.0f, 14.0f, 13.0f}, 0.7f),       // milk
+                              filled(1.33f, {0.1f, 1.0f, 3.0f}, {2.0f, 1.4f, 0.8f}, 0.5f),   // juice
+                              filled(1.0f, vec3(0.05f), vec3(1.2f), 0.0f),                   // smoke
+                              filled(1.47f, {1.5f, 0.3f, 0.6f}, {0.4f, 0.5f, 0.4f}, 0.8f)};  // oil
+  for (int i = 0; i < 5; ++i) {
+    const auto inside = b.add(liquids[i]);
+    const float x = 0.5f * static_cast<float>(i - 2), height = i % 2 == 0 ? 0.6f : 0.45f;
+    if (i == 3)
+      b.sphere({x, 0.93f, -0.7f}, 0.22f, 24, inside);
+    else
+      b.box({{x, 0.701f + 0.5f * height, -0.7f}, {0.3f, height, 0.3f}, 0.2f * static_cast<float>(i - 2)},
+            inside);
+  }
+  const vec3 lamp_centre(0.3f, 2.0f, 0.2f);
+  b.ceiling_lamp(lamp_centre, {0.2f, 0.2f}, b.lamp({160.0f, 150.0f, 130.0f}));
+  b.box({lamp_centre, {0.4f, 0.2f, 0.4f}}, b.glass(material_kind::dielectric));
+  b.look({0.0f, 1.35f, 1.4f}, {0.0f, 0.95f, -0.9f}, 0.95f);
+  return b.finish(32);
+}
+
 using maker = scene (*)();
 
 const std::vector<std::pair<std::string, maker>>& makers() {
@@ -431,7 +505,10 @@ const std::vector<std::pair<std::string, maker>>& makers() {
                                                                  {"furnace", furnace},
                                                                  {"fog-lamp", fog_lamp},
                                                                  {"slab", slab},
-                                                                 {"fog-spot", fog_spot}};
+                                                                 {"fog-spot", fog_spot},
+                                                                 {"glass-caustic-fog", glass_caustic_fog},
+                                                                 {"wax", wax},
+                                                                 {"bottles", bottles}};
   return all;
 }
 

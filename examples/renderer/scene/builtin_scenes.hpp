@@ -9,8 +9,9 @@
 
 namespace render {
 
-/// cornell-box, cornell-enclosed, cornell-wall, ajar, thin-wall, glossy-room, caustic-pool, many-lamps,
-/// materials, outdoor, furnace, fog-lamp, slab, fog-spot.
+/// cornell-box, cornell-enclosed, cornell-wall, ajar, thin-wall, glossy-room, caustic-pool, mirror-balls,
+/// veach-bidir, many-lamps, materials, outdoor, furnace, fog-lamp, slab, fog-spot, glass-caustic-fog, wax,
+/// bottles.
 std::vector<std::string> builtin_scene_names();
 
 bool is_builtin_scene(const std::string& name);
@@ -38,12 +39,15 @@ bool is_builtin_scene(const std::string& name);
 ///   are in view nearly everywhere, so guiding has little to gain. Open.
 /// - `outdoor`: a wall and spheres of five materials on a plane, under a map of the sky with a sun. Open.
 /// - `furnace`: a closed box of albedo 0.5 that emits radiance 1 everywhere; see furnace_radiance().
-/// Three have media, for --method vpt, bpt, vcm or lt:
+/// Six have media, for --method vpt, bpt, vcm, upbp or lt:
 /// - `fog-lamp`: a point lamp in endless fog, and nothing else. Its light scattered once is an integral.
 /// - `slab`: a block of scattering matter below a white sky, so large that it is a half-space. Its index is
 ///   that of the air. It scatters alike in all directions; its albedo is 0.95, 0.9 and 0.5. Chandrasekhar's H
 ///   functions give its radiance.
 /// - `fog-spot`: a room of thin fog, in which a lamp shines through a slit. Closed.
+/// - `glass-caustic-fog`: a room of thick fog, in which a ball of glass focuses the light of a lamp. Closed.
+/// - `wax`: two candles of dense wax that scatters, one with the index of air. Closed.
+/// - `bottles`: five liquids, each another medium, before a mirror. The lamp is in glass. Closed.
 scene make_builtin_scene(const std::string& name);
 
 /// The exact radiance of every pixel of `furnace`, if a path has `max_depth` segments and emission counts at

@@ -43,9 +43,7 @@ class photon_maps {
   photon_maps(const Exec& exec, const tracer_settings& settings)
       : exec_(exec),
         techniques_(settings.techniques),
-        beam_paths_(techniques_.has(technique::bb1d)
-                        ? std::min<std::size_t>(settings.light.beam_paths, settings.pixels())
-                        : 0),
+        beam_paths_(techniques_.has(technique::bb1d) ? settings.light.beam_paths_of(settings.pixels()) : 0),
         stored_(exec, {techniques_.needs_light_vertices() ? settings.pixels() : 0, settings.light.memory,
                        std::max(settings.max_depth, 2u) - 1}),
         beams_(exec, {beam_paths_, settings.light.memory, 2 * settings.max_depth}),

@@ -5,9 +5,11 @@
 #include <wfpg/light/light_vertices.hpp>
 #include <wfpg/light/photon_estimators.hpp>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
+#include <optional>
 
 namespace render {
 
@@ -70,7 +72,14 @@ struct light_path_options {
   float merge_radius = 0.003f;                                       ///< on surfaces
   float volume_radius = 0.002f;                                      ///< in media
   float radius_alpha = wfpg::radius_schedule().alpha;                ///< as in radius_schedule
-  std::uint32_t beam_paths = 4096;  ///< light paths of a sample that leave beams, at least 1
+  /// Light paths of a sample that leave beams, at least 1. Unset: one in 64, at most 8192.
+  std::optional<std::uint32_t> beam_paths;
+
+  /// Light paths that leave beams, of as many.
+  std::size_t beam_paths_of(std::size_t paths) const {
+    const std::size_t own = std::min<std::size_t>((paths + 63) / 64, 8192);
+    return std::min<std::size_t>(beam_paths ? *beam_paths : own, paths);
+  }
 };
 
 /// Vertex connection and merging.
