@@ -1,7 +1,7 @@
 // Merging vertices of camera paths with the photons around them, as the renderer does: each photon that is
-// found has its vertex read, its BSDF evaluated and its weight computed. The floor casts as many rays from
-// the same points, in random directions, among as many triangles. A triangle lies at each photon, and all of
-// them have the area of the faces.
+// found is read, the BSDF evaluated and the weight computed. The floor casts as many rays from the same
+// points, in random directions, among as many triangles. A triangle lies at each photon, and all of them have
+// the area of the faces.
 #include "casters/bvh_scene.hpp"
 #include "path_vertices.hpp"
 #include "photons.hpp"
@@ -31,11 +31,32 @@ struct place_vertices {
   }
 };
 
+/// What merges read of a light path's vertex.
+struct photon {
+  vec3 incident;
+  std::uint32_t segments;
+  vec3 flux;
+  std::uint32_t unused;
+  wfpg::vertex_weights weights;
+};
+
+/// Copies vertices of light paths into the order of the map's places.
+struct order_photons {
+  wfpg::photon_map_view map;
+  wfpg::array_view<const path_vertex> vertices;
+  photon* photons;
+
+  WFPG_HD void operator()(std::size_t place) const {
+    const path_vertex& vertex = vertices[map.index(static_cast<std::uint32_t>(place))];
+    photons[place] = {vertex.at.outgoing, vertex.segments, vertex.throughput, 0, vertex.weights};
+  }
+};
+
 struct merge_all {
   wfpg::path_techniques techniques;
   render::tiled_view<path_vertex> cameras;
-  wfpg::photon_map_view photons;
-  wfpg::array_view<const path_vertex> vertices;
+  wfpg::photon_map_view map;
+  wfpg::array_view<const photon> photons;  ///< in the order of places
   wfpg::array_view<vec3> radiance;
   std::uint32_t max_depth;  ///< most segments of a whole path
 
@@ -43,17 +64,17 @@ struct merge_all {
     const path_vertex camera = cameras[i];
     const render::bsdf f = camera.seen_from(camera.at.outgoing);
     vec3 found(0.0f);
-    photons.for_each_point(camera.at.position, [&](std::uint32_t k) {
-      const path_vertex& light = vertices[k];
+    map.for_each_place(camera.at.position, [&](std::uint32_t place) {
+      const photon light = photons[place];
       if (light.segments + camera.segments <= max_depth) found += merge(camera, f, light);
     });
     radiance[i] = camera.throughput * found / techniques.surface_points;
   }
 
  private:
-  WFPG_HD vec3 merge(const path_vertex& camera, const render::bsdf& f, const path_vertex& light) const {
-    const vec3 incident = light.at.outgoing;
-    const vec3 value = f.eval_rgb(camera.at.outgoing, incident) * light.throughput / camera.cosine(incident);
+  WFPG_HD vec3 merge(const path_vertex& camera, const render::bsdf& f, const photon& light) const {
+    const vec3 incident = light.incident;
+    const vec3 value = f.eval_rgb(camera.at.outgoing, incident) * light.flux / camera.cosine(incident);
     if (!(wfpg::luminance(value) > 0.0f)) return vec3(0.0f);
     return value * light.weights.merge(techniques, wfpg::merge_technique::surface_points, camera.weights,
                                        camera.leave(f, incident));
@@ -165,10 +186,13 @@ void merging(benchmark::State& state) {
   exec.for_each(n, place_vertices{make, photon_points, false, vertices.data(), {}});
   exec.for_each(n, place_vertices{make, camera_points, true, nullptr, cameras.view()});
 
+  const wfpg::buffer<photon, Exec> ordered(exec, n);
+  exec.for_each(
+      n, order_photons{map.view(), wfpg::array_view<const path_vertex>(vertices.view()), ordered.data()});
   const wfpg::buffer<vec3, Exec> radiance(exec, n);
   const rays_among_photons<Exec> floor(exec, photon_points, camera_points, radius);
   const merge_all kernel{techniques,      cameras.view(),
-                         map.view(),      wfpg::array_view<const path_vertex>(vertices.view()),
+                         map.view(),      wfpg::array_view<const photon>(ordered.view()),
                          radiance.view(), 8};
   compare(
       state, exec, [&] { exec.for_each(n, kernel); }, floor);

@@ -11,10 +11,43 @@
 
 namespace render {
 
+/// What merges read of a light path's vertex.
+struct photon {
+  vec3 incident;           ///< where it came from, unit length
+  std::uint32_t segments;  ///< of its path
+  vec3 flux;               ///< in a medium with scattering
+  std::uint32_t solid;     ///< whose medium it is in
+  wfpg::vertex_weights weights;
+
+  photon() = default;
+  WFPG_HD explicit photon(const subpath_vertex& vertex)
+      : incident(vertex.at.outgoing),
+        segments(vertex.segments),
+        flux(vertex.throughput),
+        solid(vertex.material),
+        weights(vertex.weights) {}
+};
+
+/// A photon map, and its photons in the order of its places.
+struct placed_photons {
+  wfpg::photon_map_view map;
+  wfpg::array_view<const photon> photons;
+};
+
+/// Copies photons into the order of a map's places.
+struct place_photons {
+  wfpg::light_vertices_view<subpath_vertex> stored;
+  wfpg::photon_map_view map;
+  wfpg::array_view<photon> photons;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    photons[i] = photon(stored[map.index(static_cast<std::uint32_t>(i))]);
+  }
+};
+
 /// The photons of a sample. Maps that nobody asked for are empty.
 struct photon_view {
-  wfpg::light_vertices_view<subpath_vertex> stored;
-  wfpg::photon_map_view on_surfaces, in_media, for_beams;  ///< of stored vertices
+  placed_photons on_surfaces, in_media, for_beams;
   wfpg::light_vertices_view<light_beam> beams;
   wfpg::beam_map_view beam_map;
 };
@@ -58,15 +91,15 @@ struct merge_at_vertex {
 
   WFPG_HD technique_sum on_surface() const {
     technique_sum found;
-    photons.on_surfaces.for_each_point(vertex.at.position, [&](std::uint32_t k) {
-      const subpath_vertex& light = photons.stored[k];
+    const placed_photons& near = photons.on_surfaces;
+    near.map.for_each_place(vertex.at.position, [&](std::uint32_t place) {
+      const photon light = near.photons[place];
       if (light.segments + vertex.segments > world.max_depth) return;
-      const vec3 incident = light.at.outgoing;
       // The photon's flux is that of a surface with the geometric normal. The sum is over the number of light
       // paths and the disc of merges.
       add(found, light, wfpg::merge_technique::surface_points,
-          f.eval_rgb(vertex.at.outgoing, incident) * light.throughput /
-              (vertex.cosine(incident) * world.techniques.surface_points));
+          f.eval_rgb(vertex.at.outgoing, light.incident) * light.flux /
+              (vertex.cosine(light.incident) * world.techniques.surface_points));
     });
     return found;
   }
@@ -74,25 +107,25 @@ struct merge_at_vertex {
   WFPG_HD technique_sum in_medium() const {
     const vec3 scattering = vertex.solids.medium_of(world.scene).scattering;
     technique_sum found;
-    photons.in_media.for_each_point(vertex.at.position, [&](std::uint32_t k) {
-      const subpath_vertex& light = photons.stored[k];
+    const placed_photons& near = photons.in_media;
+    near.map.for_each_place(vertex.at.position, [&](std::uint32_t place) {
+      const photon light = near.photons[place];
       if (light.segments + vertex.segments > world.max_depth ||
-          !have_one_medium(world.scene, light.material, vertex.material))
+          !have_one_medium(world.scene, light.solid, vertex.material))
         return;
       // Both paths have scattered here. The sum is over the number of light paths and the ball of merges.
-      const vec3 flux = light.throughput / glm::max(scattering, vec3(1e-30f));
+      const vec3 flux = light.flux / glm::max(scattering, vec3(1e-30f));
       add(found, light, wfpg::merge_technique::volume_points,
-          f.phase.eval(vertex.at.outgoing, light.at.outgoing) * flux / world.techniques.volume_points);
+          f.phase.eval(vertex.at.outgoing, light.incident) * flux / world.techniques.volume_points);
     });
     return found;
   }
 
  private:
-  WFPG_HD void add(technique_sum& found, const subpath_vertex& light, wfpg::merge_technique by,
-                   vec3 value) const {
+  WFPG_HD void add(technique_sum& found, const photon& light, wfpg::merge_technique by, vec3 value) const {
     if (!(wfpg::luminance(value) > 0.0f)) return;
     found.add(value,
-              light.weights.merge(world.techniques, by, vertex.weights, vertex.leave(f, light.at.outgoing)));
+              light.weights.merge(world.techniques, by, vertex.weights, vertex.leave(f, light.incident)));
   }
 };
 
@@ -120,14 +153,15 @@ class merge_along_piece {
 
   WFPG_HD technique_sum with_points() const {
     technique_sum found;
-    const auto merge = [&](std::uint32_t k, const wfpg::merge_geometry& at) {
-      const subpath_vertex& light = photons_.stored[k];
-      if (!may_merge(light.segments, light.material)) return;
-      const vec3 value = arriving(at.t_camera) * light.throughput *
-                         (phase(light.at.outgoing) * at.kernel / world_.light_paths);
-      add(found, light.weights, wfpg::merge_technique::beam_points, at, light.at.outgoing, value);
+    const placed_photons& near = photons_.for_beams;
+    const auto merge = [&](std::uint32_t place, const wfpg::merge_geometry& at) {
+      const photon light = near.photons[place];
+      if (!may_merge(light.segments, light.solid)) return;
+      const vec3 value =
+          arriving(at.t_camera) * light.flux * (phase(light.incident) * at.kernel / world_.light_paths);
+      add(found, light.weights, wfpg::merge_technique::beam_points, at, light.incident, value);
     };
-    photons_.for_beams.for_each_point_along(along_, wfpg::merge_kernel::epanechnikov, merge);
+    near.map.for_each_place_along(along_, wfpg::merge_kernel::epanechnikov, merge);
     return found;
   }
 

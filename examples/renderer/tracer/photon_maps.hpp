@@ -70,15 +70,15 @@ class photon_maps {
 
   /// Builds the maps that merges need, and waits.
   void build(const merge_radii& radii) {
-    if (techniques_.has(technique::surf)) build(on_surfaces_, false, radii.on_surfaces);
-    if (techniques_.has(technique::pp3d)) build(in_media_, true, radii.in_media);
-    if (techniques_.has(technique::pb2d)) build(for_beams_, true, radii.for_beams);
+    if (techniques_.has(technique::surf))
+      on_surfaces_.build(exec_, positions(false), radii.on_surfaces, stored());
+    if (techniques_.has(technique::pp3d)) in_media_.build(exec_, positions(true), radii.in_media, stored());
+    if (techniques_.has(technique::pb2d)) for_beams_.build(exec_, positions(true), radii.for_beams, stored());
     if (beam_paths_ > 0) build_beams(radii.of_beams);
   }
 
   photon_view view() {
-    return {stored_.view(),    on_surfaces_.view(), in_media_.view(),
-            for_beams_.view(), beams_.view(),       beam_map_.view()};
+    return {on_surfaces_.view(), in_media_.view(), for_beams_.view(), beams_.view(), beam_map_.view()};
   }
 
   /// Vertices and beams of this sample that had no memory. Waits.
@@ -90,11 +90,28 @@ class photon_maps {
   }
 
  private:
-  void build(wfpg::photon_map<Exec>& map, bool in_media, float radius) {
+  /// A map of stored vertices, and what merges read of them.
+  struct placed_map {
+    wfpg::photon_map<Exec> map;
+    wfpg::buffer<photon, Exec> photons;
+
+    void build(const Exec& exec, wfpg::array_view<const vec3> positions, float radius,
+               const wfpg::light_vertices_view<subpath_vertex>& stored) {
+      map.build(exec, positions, radius);
+      const std::uint32_t size = map.view().size();
+      if (photons.size() < size) photons = wfpg::buffer<photon, Exec>(exec, size);
+      exec.for_each(size, place_photons{stored, map.view(), photons.view()});
+    }
+    placed_photons view() const { return {map.view(), photons.view()}; }
+    std::size_t bytes() const { return map.bytes() + photons.bytes(); }
+  };
+
+  /// The positions of the stored vertices in media, or on surfaces.
+  wfpg::array_view<const vec3> positions(bool in_media) {
     const std::uint32_t photons = stored_.size(exec_);
     if (positions_.size() < photons) positions_ = wfpg::buffer<vec3, Exec>(exec_, stored_.capacity());
     exec_.for_each(photons, copy_positions{stored_.view(), in_media, positions_.view()});
-    map.build(exec_, {positions_.data(), photons}, radius);
+    return {positions_.data(), photons};
   }
 
   void build_beams(float radius) {
@@ -120,7 +137,7 @@ class photon_maps {
   wfpg::buffer<std::uint32_t, Exec> pending_counts_;
   wfpg::buffer<vec3, Exec> positions_;  // of stored vertices
   wfpg::buffer<wfpg::path_beam, Exec> copied_beams_;
-  wfpg::photon_map<Exec> on_surfaces_, in_media_, for_beams_;
+  placed_map on_surfaces_, in_media_, for_beams_;
   wfpg::beam_map<Exec> beam_map_;
 };
 

@@ -9,7 +9,7 @@
 //
 // The map is a box_tree over the photons' spheres, with up to seven of them a leaf. Positions are stored in
 // the tree's order, so that a leaf's photons are next to each other. What a photon carries stays the host's,
-// by index.
+// by index. A host that merges much copies it into the order of places, which neighbours share a leaf in.
 //
 // Sources: Moonen & Jalba 2023, "Efficient Hardware Acceleration of Robust Volumetric Light Transport
 // Simulation", section 5, which queries boxes of spheres too. The tree is that of Karras 2012, "Maximizing
@@ -67,13 +67,23 @@ class photon_map_view {
   /// Returns the radius of the last build, scene units. 0 where there was none.
   WFPG_HD float radius() const { return radius_; }
 
+  /// Returns the index of the photon at a place in [0, size()). Each photon that is not skipped has one
+  /// place, until the next build.
+  WFPG_HD std::uint32_t index(std::uint32_t place) const { return tree_.index(place); }
+
   /// Calls f(index) for each photon whose distance from `p` is at most the radius, once each. The order
   /// depends on the photons alone. Distances are rounded as floats. A point that is not finite has no photon.
   template <class F>
   WFPG_HD void for_each_point(vec3 p, const F& f) const {
+    for_each_place(p, [&](std::uint32_t place) { f(tree_.index(place)); });
+  }
+  /// Likewise f(place): for hosts that keep what photons carry in the order of places. A leaf's photons,
+  /// which are near each other, have neighbouring places.
+  template <class F>
+  WFPG_HD void for_each_place(vec3 p, const F& f) const {
     tree_.for_each_place(bounds3{p, p}, [&](std::uint32_t place) {
       const vec3 away = positions_[place] - p;
-      if (glm::dot(away, away) <= radius_ * radius_) f(tree_.index(place));
+      if (glm::dot(away, away) <= radius_ * radius_) f(place);
     });
   }
 
@@ -84,9 +94,16 @@ class photon_map_view {
   /// `shape`: of the kernel, which merge_geometry has the value of.
   template <class F>
   WFPG_HD void for_each_point_along(const path_beam& camera, merge_kernel shape, const F& f) const {
+    for_each_place_along(camera, shape, [&](std::uint32_t place, const merge_geometry& found) {
+      f(tree_.index(place), found);
+    });
+  }
+  /// Likewise f(place, merge_geometry), for hosts that keep what photons carry in the order of places.
+  template <class F>
+  WFPG_HD void for_each_place_along(const path_beam& camera, merge_kernel shape, const F& f) const {
     tree_.nearest_first(camera.as_ray(), [&](std::uint32_t place, float&) {
       const merge_geometry found = beam_point_merge(shape, camera, positions_[place], radius_);
-      if (found.kernel > 0.0f) f(tree_.index(place), found);
+      if (found.kernel > 0.0f) f(place, found);
       return false;
     });
   }
