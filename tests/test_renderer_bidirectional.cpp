@@ -4,6 +4,7 @@
 #include "app/render.hpp"
 #include "scene/scene_builder.hpp"
 #include "support/catch.hpp"
+#include "support/failing_resource.hpp"
 #include "support/policies.hpp"
 #include "support/renderings.hpp"
 #include "support/whole_paths.hpp"
@@ -232,6 +233,30 @@ TEST_CASE("vertices of light paths beyond their memory are counted", "[renderer]
   const render::render_report little = render::render(scene, options, {}).report;
   CHECK(little.dropped_light_vertices > 100);
   CHECK(little.light_vertex_bytes < enough.light_vertex_bytes);
+}
+
+TEST_CASE("each allocation of points, beams and paths may fail", "[renderer][bidirectional]") {
+  using policy = wfpg::exec::tbb;
+  wfpg_test::failing_resource resource;
+  const policy exec = policy().with_resource(&resource);
+  const render::scene host = render::make_builtin_scene("fog-spot");
+  const render::device_scene<policy> geometry(policy(), host);
+  const render::light_distribution<policy> lights(policy(), host);
+  const render::embree_scene accelerated(policy(), host, geometry.view());
+  render::tracer_settings settings;
+  settings.width = settings.height = 8;
+  settings.techniques = render::points_beams_and_paths();
+  settings.light.volume_radius = settings.light.merge_radius = 0.05f;
+  settings.technique_pictures = true;
+  const render::pinhole camera(host.view, settings.width, settings.height);
+  const std::size_t failures = wfpg_test::fail_at_each(resource, [&] {
+    render::bidirectional_tracer<policy, decltype(accelerated.caster())> tracer(
+        exec, settings, {geometry.view(), lights.view(), true}, accelerated.caster());
+    for (std::uint32_t sample = 0; sample < 2; ++sample)
+      tracer.render_sample(render::no_guide(), camera, sample, 1.0f);
+  });
+  CHECK(failures > 60);
+  CHECK(resource.live() == 0);
 }
 
 TEST_CASE("names of techniques are read and written", "[renderer][bidirectional]") {
