@@ -7,6 +7,8 @@
 #include "support/catch.hpp"
 #include "support/sample_means.hpp"
 
+#include <wfpg/light/path_weights.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -39,8 +41,9 @@ inline image picture_of(const scene& s, const render_options& options) {
   return render::render(s, options, {}).picture;
 }
 
-/// The length of a segment inside of a box.
+/// The length of a segment inside of a box, which may be empty.
 inline double length_inside(const wfpg::bounds3& box, glm::dvec3 from, glm::dvec3 to) {
+  if (box.empty()) return 0.0;
   double begin = 0.0, end = 1.0;
   for (int axis = 0; axis < 3; ++axis) {
     const double way = to[axis] - from[axis];
@@ -52,9 +55,9 @@ inline double length_inside(const wfpg::bounds3& box, glm::dvec3 from, glm::dvec
   return std::max(end - begin, 0.0) * glm::length(to - from);
 }
 
-/// Light of a lamp or spot that a fog scatters once toward the eye, in one channel. Simpson's rule. There is
-/// no fog in `clear`.
-inline double airlight(const scene& s, int channel, const wfpg::bounds3& clear = {}) {
+/// Light of a lamp or spot that a fog scatters once toward the eye, in one channel. Simpson's rule with that
+/// even number of steps. There is no fog in `clear`.
+inline double airlight(const scene& s, int channel, const wfpg::bounds3& clear = {}, int steps = 20000) {
   const punctual_light& lamp = s.punctual_lights.at(0);
   const auto g = double(s.fog.g), scattering = double(s.fog.scattering[channel]),
              extinction = double(s.fog.extinction()[channel]);
@@ -75,11 +78,47 @@ inline double airlight(const scene& s, int channel, const wfpg::bounds3& clear =
     return dimming * scattering * phase * std::exp(-extinction * in_fog) / (distance * distance);
   };
   const double end = begin + 30.0 / extinction;
-  const int steps = 20000;
   const double step = (end - begin) / steps;
   double sum = integrand(begin) + integrand(end);
   for (int i = 1; i < steps; ++i) sum += (i % 2 == 1 ? 4.0 : 2.0) * integrand(begin + step * i);
   return double(lamp.intensity[channel]) * sum * step / 3.0;
+}
+
+/// The light of airlight() where a technique merges within a radius, in endless fog. The mean of merges is
+/// light along rays beside the camera's own: in a disc with beams, in a ball with points. Where the ray passes
+/// the lamp at H, photon beams that pass the ray at h come to sqrt(H^2 - h^2) from the lamp there. The radius
+/// is below H, and a spot shines across the ray.
+inline double merged_airlight(const scene& s, int channel, wfpg::merge_technique by, double radius) {
+  const glm::dvec3 eye(s.view.position), direction(glm::normalize(glm::dvec3(s.view.forward)));
+  const glm::dvec3 from_lamp = eye - glm::dvec3(s.punctual_lights.at(0).position);
+  const glm::dvec3 across = from_lamp - glm::dot(from_lamp, direction) * direction;
+  const double passes = glm::length(across);
+  const glm::dvec3 outward = across / passes, aside = glm::cross(direction, outward);
+  scene moved = s;
+  double sum = 0.0, weights = 0.0;
+  const auto add = [&](const glm::dvec3& by_vector, double weight) {
+    moved.view.position = vec3(eye + by_vector);
+    sum += weight * airlight(moved, channel, {}, 1000);
+    weights += weight;
+  };
+  constexpr int rings = 12, angles = 8, heights = 8;
+  for (int ring = 0; ring < rings; ++ring) {
+    const double part = (ring + 0.5) / rings, epanechnikov = 1.0 - part * part;
+    if (by == wfpg::merge_technique::beams) {
+      const double sine = part * radius / passes, square = 1.0 - sine * sine;
+      add(passes * ((square - 1.0) * outward + sine * std::sqrt(square) * aside), epanechnikov);
+    }
+    for (int angle = 0; angle < angles && by != wfpg::merge_technique::beams; ++angle) {
+      const double phi = pi_of_doubles * (angle + 0.5) / angles;  // the other half is alike
+      const glm::dvec3 way = std::cos(phi) * outward + std::sin(phi) * aside;
+      if (by == wfpg::merge_technique::beam_points) add(part * radius * way, part * epanechnikov);
+      for (int height = 0; height < heights && by == wfpg::merge_technique::volume_points; ++height) {
+        const double cosine = 2.0 * (height + 0.5) / heights - 1.0;
+        add(part * radius * (std::sqrt(1.0 - cosine * cosine) * way + cosine * direction), part * part);
+      }
+    }
+  }
+  return sum / weights;
 }
 
 /// Chandrasekhar's H function for isotropic scattering of an albedo. Source: Chandrasekhar 1960, "Radiative
@@ -138,15 +177,15 @@ inline scene white_furnace(bool solids) {
   if (solids) {  // flat ones: where smooth normals refract, some light is lost
     b.box({{0.3f, -0.3f, 0.0f}, vec3(0.6f), 0.7f}, b.add(solid(1.5f, vec3(0.0f), 2)));
     material cloudy = solid(1.3f, vec3(0.0f), 1);
-    cloudy.scattering = {2.0f, 1.0f, 4.0f};
+    cloudy.scattering = {2.0f, 1.5f, 2.5f};
     b.box({{0.0f, -0.4f, -0.2f}, vec3(0.9f), 0.3f}, b.add(cloudy));
     material unbent = solid(1.0f, vec3(0.0f), 3);
-    unbent.scattering = {1.0f, 2.0f, 1.0f};
+    unbent.scattering = {1.0f, 1.4f, 1.2f};
     unbent.g = -0.5f;
     b.box({{-0.3f, 0.2f, 0.1f}, vec3(0.55f), 1.1f}, b.add(unbent));
   }
   scene s = b.finish(8);
-  s.fog = {vec3(0.0f), {0.5f, 1.0f, 2.0f}, 0.7f};
+  s.fog = {vec3(0.0f), {0.8f, 1.0f, 1.2f}, 0.7f};
   return s;
 }
 
