@@ -85,9 +85,9 @@ inline double airlight(const scene& s, int channel, const wfpg::bounds3& clear =
 }
 
 /// The light of airlight() where a technique merges within a radius, in endless fog. The mean of merges is
-/// light along rays beside the camera's own: in a disc with beams, in a ball with points. Where the ray passes
-/// the lamp at H, photon beams that pass the ray at h come to sqrt(H^2 - h^2) from the lamp there. The radius
-/// is below H, and a spot shines across the ray.
+/// light along rays beside the camera's own: in a disc with beams, in a ball with points. Where the ray
+/// passes the lamp at H, photon beams that pass the ray at h come to sqrt(H^2 - h^2) from the lamp there. The
+/// radius is below H, and a spot shines across the ray.
 inline double merged_airlight(const scene& s, int channel, wfpg::merge_technique by, double radius) {
   const glm::dvec3 eye(s.view.position), direction(glm::normalize(glm::dvec3(s.view.forward)));
   const glm::dvec3 from_lamp = eye - glm::dvec3(s.punctual_lights.at(0).position);
