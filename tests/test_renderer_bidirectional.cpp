@@ -122,10 +122,13 @@ TEST_CASE("weights are those of the densities of the renderer's own paths", "[re
     const test_world in(render::make_builtin_scene(name));
     compare_weights(in, 2000, all);
   }
-  INFO(all.connections << " connections, " << all.delta_vertices << " delta vertices");
+  INFO(all.connections << " connections, " << all.merges << " merges, " << all.delta_vertices
+                       << " delta vertices");
   CHECK(all.connections > 10000);
   CHECK(all.delta_vertices > 1000);
+  CHECK(all.merges > 5000);
   CHECK(all.worst < 1e-4);
+  CHECK(all.worst_merged < 1e-4);
 }
 
 TEST_CASE("merging has the mean of path tracing where its radius is small",

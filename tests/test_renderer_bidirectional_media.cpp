@@ -350,10 +350,12 @@ TEST_CASE("both ends: weights in media are those of the densities of the rendere
   };
   wfpg_test::compared_weights all;
   compare_weights(in, 2000, all);
-  INFO(all.connections << " connections, " << all.delta_vertices << " delta vertices, " << all.medium_vertices
-                       << " in media");
+  INFO(all.connections << " connections, " << all.merges << " merges, " << all.delta_vertices
+                       << " delta vertices, " << all.medium_vertices << " in media");
   CHECK(all.connections > 5000);
   CHECK(all.delta_vertices > 100);
   CHECK(all.medium_vertices > 5000);
+  CHECK(all.merges > 5000);
   CHECK(all.worst < 1e-4);
+  CHECK(all.worst_merged < 1e-4);
 }

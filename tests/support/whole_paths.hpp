@@ -8,6 +8,7 @@
 #include <wfpg/exec/seq.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -37,6 +38,10 @@ struct test_world {
     world.random = {7, 0};
     world.max_depth = 6;
     world.techniques.splats = static_cast<float>(pixels * pixels);
+    world.techniques.surface_points = 2.0f;
+    world.techniques.volume_points = 0.3f;
+    world.techniques.beam_points = 0.7f;
+    world.techniques.beams = 1.5f;
     around_camera = render::solids_around(view, world.caster, camera.position());
   }
 
@@ -150,9 +155,26 @@ struct whole_path {
   }
 };
 
-/// The balance heuristic's weight of each number of vertices that the light path has, by brute force.
-inline std::vector<double> weights_of(const whole_path& path, const render::pinhole& camera,
-                                      const wfpg::path_techniques& t) {
+/// Samples of each kind of merge at x[i] times its kernel's volume, by the numbers of wfpg::merge_technique.
+/// Photon beams are short.
+inline std::array<double, 4> merge_volumes(const whole_path& path, const wfpg::path_techniques& t, int i) {
+  const subpath_vertex& at = *path.vertices[static_cast<std::size_t>(i)];
+  if (path.is_delta(i)) return {};
+  if (!at.in_medium()) return {double(t.surface_points), 0.0, 0.0, 0.0};
+  const double sine = double(glm::length(glm::cross(path.toward(i, i - 1), path.toward(i, i + 1))));
+  const double camera = path.distance(i + 1, i);
+  return {0.0, double(t.volume_points), double(t.beam_points) / camera,
+          double(t.beams) * sine / (double(at.extinction) * camera)};
+}
+
+/// The balance heuristic's weights of a whole path, by brute force.
+struct whole_weights {
+  std::vector<double> joins;                  ///< by the number of vertices that the light path has
+  std::vector<std::array<double, 4>> merges;  ///< by the number of the merged vertex, and by the technique
+};
+
+inline whole_weights weights_of(const whole_path& path, const render::pinhole& camera,
+                                const wfpg::path_techniques& t) {
   const int k = path.k();
   std::vector<double> by_light(static_cast<std::size_t>(k)), by_camera(static_cast<std::size_t>(k));
   const auto at = [](std::vector<double>& values, int i) -> double& {
@@ -169,19 +191,29 @@ inline std::vector<double> weights_of(const whole_path& path, const render::pinh
   at(by_camera, 0) = path.light.is_delta ? 0.0
                                          : path.scatters(2, 1, 0) * static_cast<double>(path.light.cosine) /
                                                path.square(1, 0) * path.distance(1, 0);
-  std::vector<double> terms;
+  whole_weights all;
+  double sum = 0.0;
   for (int s = 0; s <= k; ++s) {
     double p = s == 0 ? t.light_hits : s == 1 ? t.next_event : s == k ? t.splats : t.connections;
     for (int i = 0; i < s; ++i) p *= s == 1 ? static_cast<double>(path.light.pdf_connect) : at(by_light, i);
     for (int i = s; i < k; ++i) p *= at(by_camera, i);
     if (s > 0 && s < k && path.is_delta(s)) p = 0.0;
     if (s > 1 && path.is_delta(s - 1)) p = 0.0;
-    terms.push_back(p);
+    all.joins.push_back(p);
+    sum += p;
   }
-  double sum = 0.0;
-  for (const double term : terms) sum += term;
-  for (double& term : terms) term /= sum;
-  return terms;
+  all.merges.resize(static_cast<std::size_t>(k));
+  for (int merged = 1; merged < k; ++merged) {
+    double p = 1.0;
+    for (int i = 0; i <= merged; ++i) p *= at(by_light, i);
+    for (int i = merged; i < k; ++i) p *= at(by_camera, i);
+    all.merges[static_cast<std::size_t>(merged)] = merge_volumes(path, t, merged);
+    for (double& term : all.merges[static_cast<std::size_t>(merged)]) sum += term *= p;
+  }
+  for (double& term : all.joins) term /= sum;
+  for (std::array<double, 4>& terms : all.merges)
+    for (double& term : terms) term /= sum;
+  return all;
 }
 
 /// The path that joins vertex `s` - 1 of a light path with vertex `t` - 1 of a camera path.
@@ -226,13 +258,15 @@ inline bool joins_nothing(const subpath_vertex& vertex) {
   return vertex.seen_from(vertex.at.outgoing).is_delta();
 }
 
-/// What weights of connections have been compared.
+/// What weights of connections and merges have been compared.
 struct compared_weights {
-  double worst = 0.0;  ///< difference of a weight
-  std::size_t connections = 0, delta_vertices = 0, medium_vertices = 0;
+  double worst = 0.0;         ///< difference of a connection's weight
+  double worst_merged = 0.0;  ///< likewise of a merge
+  std::size_t connections = 0, merges = 0, delta_vertices = 0, medium_vertices = 0;
 };
 
-/// Compares the weights of all connections of as many pairs of paths with those by brute force.
+/// Compares the weights of all connections of as many pairs of paths with those by brute force. Where a light
+/// path would go on along a connection, it is merged with the camera path's vertex.
 inline void compare_weights(const test_world& in, std::uint32_t pairs, compared_weights& all) {
   for (std::uint32_t id = 0; id < pairs; ++id) {
     const followed_path light = light_path(in, id), camera = camera_path(in, id);
@@ -254,10 +288,20 @@ inline void compare_weights(const test_world& in, std::uint32_t pairs, compared_
                                    way.pdf.there};
         const float weight =
             y.weights.connection(in.world.techniques, from_light, z.weights, from_camera, edge);
-        const std::vector<double> expected = weights_of(path, in.camera, in.world.techniques);
-        const double difference = std::abs(double(weight) - expected[static_cast<std::size_t>(s + 1)]);
-        all.worst = std::max(all.worst, difference);
+        const whole_weights expected = weights_of(path, in.camera, in.world.techniques);
+        const auto end = static_cast<std::size_t>(s + 1);
+        all.worst = std::max(all.worst, std::abs(double(weight) - expected.joins[end]));
         ++all.connections;
+        const wfpg::vertex_weights arrived =
+            y.weights.depart(in.world.techniques, from_light)
+                .arrive({edge.distance, z.cosine(toward), edge.pdf_light, edge.pdf_camera});
+        for (std::size_t by = 0; by < 4; ++by) {
+          if (!(expected.merges[end][by] > 0.0)) continue;
+          const float merged = arrived.merge(in.world.techniques, static_cast<wfpg::merge_technique>(by),
+                                             z.weights, from_camera);
+          all.worst_merged = std::max(all.worst_merged, std::abs(double(merged) - expected.merges[end][by]));
+          ++all.merges;
+        }
         for (const float delta : path.delta) all.delta_vertices += delta > 0.0f ? 1 : 0;
         for (const subpath_vertex* vertex : path.vertices)
           all.medium_vertices += vertex && vertex->in_medium() ? 1 : 0;
