@@ -155,6 +155,30 @@ TEST_CASE("both ends: merges in media blur by their radius, with a bias that fal
   }
 }
 
+TEST_CASE("both ends: photons of another medium do not merge", "[renderer][bidirectional][media]") {
+  // A view in thin fog, just above a dense block. Half the disc of merges is in the block.
+  scene_builder b("fog above a block");
+  material dense = solid(1.0f, vec3(0.0f));
+  dense.scattering = vec3(10.0f);
+  b.box({{0.0f, -1.02f, 0.0f}, vec3(2.0f)}, b.add(dense));
+  scene s = b.finish(2);
+  s.fog = {vec3(0.02f), vec3(0.3f), 0.0f};
+  s.punctual_lights.emplace_back();
+  s.punctual_lights[0].position = {0.0f, 1.0f, 0.0f};
+  s.punctual_lights[0].intensity = vec3(10.0f);
+  look_along(s, {0.0f, 0.0f, 3.0f}, {0.0f, 0.0f, -1.0f});
+  const double all = airlight(s, 1);
+  for (const char* techniques : {"pp3d", "pb2d"}) {
+    render_options options = with(techniques, 8, 1000, 2);
+    options.light.volume_radius = 0.1f;
+    options.light.radius_alpha = 1.0f;
+    const double found = channel_of(picture_of(s, options), 1).mean();
+    INFO(techniques << ": " << found << " of " << all);
+    CHECK(found > 0.6 * all);
+    CHECK(found < 0.9 * all);
+  }
+}
+
 TEST_CASE("both ends: beams have least noise at small radii and points at large ones",
           "[renderer][bidirectional][media]") {
   // A dense block, ten mean free paths from its middle to its sides. Source: Krivanek et al. 2014.
