@@ -62,7 +62,7 @@ constexpr measured_set all_sets[] = {{"hits", 0.01f, 24},
                                      {"bpt", 0.01f, 64},
                                      {"hits+nee+pp3d", 0.015f, 24},
                                      {"hits+nee+pb2d", 0.01f, 36},
-                                     {"hits+nee+bb1d", 0.003f, 32},
+                                     {"hits+nee+bb1d", 0.003f, 40},
                                      {"hits+pp3d+bb1d", 0.003f, 32},
                                      {"bpt+surf+pp3d+pb2d+bb1d", 0.003f, 48}};
 
