@@ -19,11 +19,13 @@ struct test_vertex {
   std::uint32_t path, depth;
 };
 
-/// Which paths store a vertex at which depth.
+/// How many vertices paths store at which depth: none in a third of the cases, else up to `most`.
 struct random_paths {
   std::uint32_t seed;
+  std::uint32_t most = 1;
   WFPG_HD std::uint32_t keeps(std::size_t path, std::uint32_t depth) const {
-    return wfpg::hash(seed + depth, path) % 3 == 0 ? 0u : 1u;
+    const std::uint64_t random = wfpg::hash(seed + depth, path);
+    return random % 3 == 0 ? 0u : 1u + static_cast<std::uint32_t>(random / 3 % most);
   }
 };
 
@@ -35,10 +37,12 @@ struct choose_paths {
 };
 
 struct store_vertices {
+  random_paths what;
   wfpg::light_vertices_view<test_vertex> vertices;
   std::uint32_t depth;
   WFPG_HD void operator()(std::size_t path) const {
-    if (vertices.has_place(path)) vertices.write(path, {static_cast<std::uint32_t>(path), depth});
+    for (std::uint32_t k = 0; k < what.keeps(path, depth) && vertices.has_place(path, k); ++k)
+      vertices.write(path, {static_cast<std::uint32_t>(path), depth}, k);
   }
 };
 
@@ -51,7 +55,7 @@ void store_all(const Exec& exec, wfpg::light_vertices<Exec, test_vertex>& vertic
   for (std::uint32_t depth = 0; depth < depths; ++depth) {
     exec.for_each(paths, choose_paths{what, depth, keeps.view()});
     vertices.reserve(exec, keeps.view());
-    exec.for_each(paths, store_vertices{vertices.view(), depth});
+    exec.for_each(paths, store_vertices{what, vertices.view(), depth});
   }
 }
 
@@ -88,13 +92,14 @@ struct expected_vertices {
       : last(paths, none) {
     for (std::uint32_t depth = 0; depth < depths; ++depth) {
       for (std::uint32_t path = 0; path < paths; ++path) {
-        if (what.keeps(path, depth) == 0) continue;
-        if (all.size() == capacity) {
-          ++dropped;
-          continue;
+        for (std::uint32_t k = 0; k < what.keeps(path, depth); ++k) {
+          if (all.size() == capacity) {
+            ++dropped;
+            continue;
+          }
+          all.push_back({path, depth, last[path]});
+          last[path] = static_cast<std::uint32_t>(all.size() - 1);
         }
-        all.push_back({path, depth, last[path]});
-        last[path] = static_cast<std::uint32_t>(all.size() - 1);
       }
     }
   }
@@ -110,8 +115,9 @@ WFPG_TEST_CASE("light vertices lie in the order of depths and paths", "[light_ve
       const std::size_t bytes = room * (sizeof(test_vertex) + sizeof(std::uint32_t));
       wfpg::light_vertices<Exec, test_vertex> vertices(exec, {paths, bytes, depths});
       REQUIRE(vertices.capacity() == room);
-      for (const std::uint32_t seed : {1u, 2u}) {  // the second iteration forgets the first
-        const random_paths what{seed};
+      // Each iteration forgets the one before. In the third, paths keep several vertices at a time.
+      for (const std::uint32_t seed : {1u, 2u, 3u}) {
+        const random_paths what{seed, seed == 3 ? 4u : 1u};
         store_all(exec, vertices, what, depths);
         const expected_vertices expected(what, paths, depths, room);
         REQUIRE(vertices.size(exec) == expected.all.size());
