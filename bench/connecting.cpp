@@ -14,8 +14,8 @@ namespace {
 
 struct make_pairs {
   vertex_maker make;
-  render::tiled_view<path_vertex> cameras;
-  path_vertex* lights;
+  render::tiled_view<render::subpath_vertex> cameras;
+  render::subpath_vertex* lights;
 
   WFPG_HD void operator()(std::size_t i) const {
     const vec3 position = 0.2f + 0.6f * random_point(11, i / 32) + 0.01f * random_point(12, i);
@@ -37,21 +37,22 @@ template <weighting Weighting>
 struct connect_pairs {
   wfpg::path_techniques techniques;
   render::bvh_caster caster;
-  render::tiled_view<path_vertex> cameras;
-  wfpg::array_view<const path_vertex> lights;
+  render::tiled_view<render::subpath_vertex> cameras;
+  wfpg::array_view<const render::subpath_vertex> lights;
   wfpg::array_view<vec3> radiance;
   std::uint32_t max_depth;  ///< most segments of a whole path
 
   WFPG_HD void operator()(std::size_t i) const {
-    const path_vertex camera = cameras[i];
-    const render::bsdf f = camera.seen_from(camera.at.outgoing);
-    const path_vertex& light = lights[i];
+    const render::subpath_vertex camera = cameras[i];
+    const render::scatterer f = camera.seen_from(camera.at.outgoing);
+    const render::subpath_vertex& light = lights[i];
     radiance[i] = light.segments + camera.segments < max_depth ? camera.throughput * connect(camera, f, light)
                                                                : vec3(0.0f);
   }
 
  private:
-  WFPG_HD vec3 connect(const path_vertex& camera, const render::bsdf& f, const path_vertex& light) const {
+  WFPG_HD vec3 connect(const render::subpath_vertex& camera, const render::scatterer& f,
+                       const render::subpath_vertex& light) const {
     const vec3 way = light.at.position - camera.at.position;
     const float distance = glm::length(way);
     if (!(distance > 0.0f)) return vec3(0.0f);
@@ -65,8 +66,8 @@ struct connect_pairs {
     return value * weight(camera, f, light, toward, distance);
   }
 
-  WFPG_HD float weight(const path_vertex& camera, const render::bsdf& f, const path_vertex& light,
-                       vec3 toward, float distance) const {
+  WFPG_HD float weight(const render::subpath_vertex& camera, const render::scatterer& f,
+                       const render::subpath_vertex& light, vec3 toward, float distance) const {
     if constexpr (Weighting == weighting::none) {
       return 0.5f;
     } else {
@@ -103,7 +104,7 @@ class connections {
   void connect() const {
     exec_.for_each(sizes::connections,
                    connect_pairs<Weighting>{techniques_, hierarchy_.caster(), cameras_.view(),
-                                            wfpg::array_view<const path_vertex>(lights_.view()),
+                                            wfpg::array_view<const render::subpath_vertex>(lights_.view()),
                                             radiance_.view(), max_depth});
   }
 
@@ -121,8 +122,8 @@ class connections {
   wfpg::path_techniques techniques_;
   triangles_of<Exec> mesh_;
   render::bvh_scene<Exec> hierarchy_;
-  render::tiled_array<path_vertex, Exec> cameras_;
-  wfpg::buffer<path_vertex, Exec> lights_;
+  render::tiled_array<render::subpath_vertex, Exec> cameras_;
+  wfpg::buffer<render::subpath_vertex, Exec> lights_;
   wfpg::buffer<vec3, Exec> radiance_;
 };
 

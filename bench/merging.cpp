@@ -5,6 +5,7 @@
 #include "casters/bvh_scene.hpp"
 #include "path_vertices.hpp"
 #include "photons.hpp"
+#include "tracer/merge_kernels.hpp"
 
 #include <wfpg/light/photon_map.hpp>
 
@@ -18,12 +19,12 @@ struct place_vertices {
   vertex_maker make;
   wfpg::array_view<const vec3> points;
   bool is_camera;
-  path_vertex* vertices;                       ///< of light paths
-  render::tiled_view<path_vertex> of_cameras;  ///< or of camera paths, as the renderer stores them
+  render::subpath_vertex* vertices;                       ///< of light paths
+  render::tiled_view<render::subpath_vertex> of_cameras;  ///< or of camera paths, as the renderer stores them
 
   WFPG_HD void operator()(std::size_t i) const {
     const auto count = static_cast<std::uint32_t>(points.size());
-    const path_vertex made = make(is_camera, i, points[i], normal_of(face_of(i, count)));
+    const render::subpath_vertex made = make(is_camera, i, points[i], normal_of(face_of(i, count)));
     if (is_camera)
       of_cameras.emplace(i, made);
     else
@@ -31,48 +32,39 @@ struct place_vertices {
   }
 };
 
-/// What merges read of a light path's vertex.
-struct photon {
-  vec3 incident;
-  std::uint32_t segments;
-  vec3 flux;
-  std::uint32_t unused;
-  wfpg::vertex_weights weights;
-};
-
 /// Copies vertices of light paths into the order of the map's places.
 struct order_photons {
   wfpg::photon_map_view map;
-  wfpg::array_view<const path_vertex> vertices;
-  photon* photons;
+  wfpg::array_view<const render::subpath_vertex> vertices;
+  render::photon* photons;
 
   WFPG_HD void operator()(std::size_t place) const {
-    const path_vertex& vertex = vertices[map.index(static_cast<std::uint32_t>(place))];
-    photons[place] = {vertex.at.outgoing, vertex.segments, vertex.throughput, 0, vertex.weights};
+    photons[place] = render::photon(vertices[map.index(static_cast<std::uint32_t>(place))]);
   }
 };
 
 struct merge_all {
   wfpg::path_techniques techniques;
-  render::tiled_view<path_vertex> cameras;
+  render::tiled_view<render::subpath_vertex> cameras;
   wfpg::photon_map_view map;
-  wfpg::array_view<const photon> photons;  ///< in the order of places
+  wfpg::array_view<const render::photon> photons;  ///< in the order of places
   wfpg::array_view<vec3> radiance;
   std::uint32_t max_depth;  ///< most segments of a whole path
 
   WFPG_HD void operator()(std::size_t i) const {
-    const path_vertex camera = cameras[i];
-    const render::bsdf f = camera.seen_from(camera.at.outgoing);
+    const render::subpath_vertex camera = cameras[i];
+    const render::scatterer f = camera.seen_from(camera.at.outgoing);
     vec3 found(0.0f);
     map.for_each_place(camera.at.position, [&](std::uint32_t place) {
-      const photon light = photons[place];
+      const render::photon light = photons[place];
       if (light.segments + camera.segments <= max_depth) found += merge(camera, f, light);
     });
     radiance[i] = camera.throughput * found / techniques.surface_points;
   }
 
  private:
-  WFPG_HD vec3 merge(const path_vertex& camera, const render::bsdf& f, const photon& light) const {
+  WFPG_HD vec3 merge(const render::subpath_vertex& camera, const render::scatterer& f,
+                     const render::photon& light) const {
     const vec3 incident = light.incident;
     const vec3 value = f.eval_rgb(camera.at.outgoing, incident) * light.flux / camera.cosine(incident);
     if (!(wfpg::luminance(value) > 0.0f)) return vec3(0.0f);
@@ -181,18 +173,18 @@ void merging(benchmark::State& state) {
   techniques.surface_points = static_cast<float>(n) * wfpg::pi * radius * radius;
   vertex_maker make;
   make.techniques = techniques;
-  const wfpg::buffer<path_vertex, Exec> vertices(exec, n);
-  const render::tiled_array<path_vertex, Exec> cameras(exec, n);
+  const wfpg::buffer<render::subpath_vertex, Exec> vertices(exec, n);
+  const render::tiled_array<render::subpath_vertex, Exec> cameras(exec, n);
   exec.for_each(n, place_vertices{make, photon_points, false, vertices.data(), {}});
   exec.for_each(n, place_vertices{make, camera_points, true, nullptr, cameras.view()});
 
-  const wfpg::buffer<photon, Exec> ordered(exec, n);
-  exec.for_each(
-      n, order_photons{map.view(), wfpg::array_view<const path_vertex>(vertices.view()), ordered.data()});
+  const wfpg::buffer<render::photon, Exec> ordered(exec, n);
+  exec.for_each(n, order_photons{map.view(), wfpg::array_view<const render::subpath_vertex>(vertices.view()),
+                                 ordered.data()});
   const wfpg::buffer<vec3, Exec> radiance(exec, n);
   const rays_among_photons<Exec> floor(exec, photon_points, camera_points, radius);
   const merge_all kernel{techniques,      cameras.view(),
-                         map.view(),      wfpg::array_view<const photon>(ordered.view()),
+                         map.view(),      wfpg::array_view<const render::photon>(ordered.view()),
                          radiance.view(), 8};
   compare(
       state, exec, [&] { exec.for_each(n, kernel); }, floor);

@@ -1,12 +1,11 @@
-// Vertices of light and camera paths with all that the renderer keeps of one: what stages merge and connect.
+// Vertices of light and camera paths on surfaces, as the renderer has them: what stages merge and connect.
 #pragma once
 
 #include "timing.hpp"
-#include "tracer/path_state.hpp"
+#include "tracer/bidirectional_state.hpp"
 
 #include <wfpg/base/math.hpp>
 #include <wfpg/base/types.hpp>
-#include <wfpg/light/path_weights.hpp>
 
 #include <cmath>
 
@@ -15,44 +14,6 @@ namespace bench {
 using wfpg::unit_vec2;
 using wfpg::vec2;
 using wfpg::vec3;
-
-/// A vertex on a surface, as large as the renderer's.
-struct path_vertex {
-  render::path_vertex at;
-  vec3 throughput;
-  std::uint32_t segments;  ///< of its path so far
-  wfpg::vertex_weights weights;
-  std::uint32_t unused[3];
-
-  /// |cos| between the geometric normal and a direction, kept off 0.
-  WFPG_HD float cosine(vec3 direction) const {
-    return glm::max(std::abs(glm::dot(at.geometric_normal, direction)), 1e-6f);
-  }
-  /// The BSDF as a path sees it that leaves in that direction, or comes from there.
-  WFPG_HD render::bsdf seen_from(vec3 direction) const {
-    render::bsdf f = at.bsdf();
-    orient(f, at.geometric_normal, at.normal, direction);
-    return f;
-  }
-  /// Flux that arrived from at.outgoing and is scattered in a direction, per steradian.
-  WFPG_HD vec3 scattered_flux(vec3 direction) const {
-    return seen_from(direction).eval_rgb(direction, at.outgoing) * (cosine(direction) / cosine(at.outgoing));
-  }
-  /// How a path that sees `f` leaves in a direction.
-  WFPG_HD wfpg::path_departure leave(const render::bsdf& f, vec3 direction) const {
-    wfpg::path_departure to;
-    to.pdf = f.pdf(at.outgoing, direction);
-    to.pdf_back = seen_from(direction).pdf(direction, at.outgoing);
-    to.cosine = cosine(direction);
-    return to;
-  }
-  /// Where a ray begins that leaves in a direction.
-  WFPG_HD vec3 leave_along(vec3 direction) const {
-    return render::leave_surface(at.position, at.geometric_normal, direction, at.offset);
-  }
-};
-
-static_assert(sizeof(path_vertex) == 128, "as the renderer's subpath_vertex");
 
 /// A direction above a surface, with density cos / pi.
 WFPG_HD inline vec3 direction_above(vec3 normal, std::uint64_t random) {
@@ -66,9 +27,9 @@ struct vertex_maker {
   std::uint32_t before = 1;  ///< vertices of a path before the one that is made
 
   /// The vertex with index i of light paths, or of camera paths.
-  WFPG_HD path_vertex operator()(bool is_camera, std::size_t i, vec3 position, vec3 normal) const {
+  WFPG_HD render::subpath_vertex operator()(bool is_camera, std::size_t i, vec3 position, vec3 normal) const {
     const std::uint64_t stream = wfpg::hash(is_camera ? 21 : 22, i);
-    path_vertex v;
+    render::subpath_vertex v;
     v.at.position = position;
     v.at.offset = 1e-5f;
     v.at.geometric_normal = v.at.normal = normal;
@@ -82,7 +43,9 @@ struct vertex_maker {
     v.throughput = vec3(0.5f, 0.6f, 0.7f);
     v.segments = before + 1;
     v.weights = weights(is_camera, stream);
-    for (std::uint32_t& word : v.unused) word = 0;
+    v.solids = {};
+    v.material = 0;
+    v.extinction = v.g = 0.0f;  // on a surface
     return v;
   }
 
