@@ -295,14 +295,7 @@ TEST_CASE("both ends: pictures of media are the same on every policy", "[rendere
   options.method = sampling_method::upbp;
   options.techniques.reset();
   options.light.merge_radius = options.light.volume_radius = 0.03f;
-  options.where = device::seq;
-  const scene s = foggy_box();
-  const std::vector<vec3> serial = picture_of(s, options).pixels;
-  CHECK(mean_of(serial) > 0.0);
-  for (const device where : {device::omp, device::cpu}) {
-    options.where = where;
-    CHECK(same_bits(picture_of(s, options).pixels, serial));
-  }
+  check_same_on_policies(foggy_box(), options);
 }
 
 TEST_CASE("both ends: light paths begin in the solids around their lights",

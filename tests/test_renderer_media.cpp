@@ -176,15 +176,7 @@ TEST_CASE("media: without them vpt has the pictures of pt", "[renderer][media]")
 }
 
 TEST_CASE("media: pictures are the same on every policy", "[renderer][media]") {
-  render_options options = volume_options(40, 3, 20);
-  options.where = device::seq;
-  const scene s = foggy_box();
-  const std::vector<vec3> serial = picture_of(s, options).pixels;
-  CHECK(mean_of(serial) > 0.0);
-  for (const device where : {device::omp, device::cpu}) {
-    options.where = where;
-    CHECK(same_bits(picture_of(s, options).pixels, serial));
-  }
+  check_same_on_policies(foggy_box(), volume_options(40, 3, 20));
 }
 
 TEST_CASE("media: a rendering goes on from its state to the same bits", "[renderer][media]") {

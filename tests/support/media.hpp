@@ -5,6 +5,7 @@
 #include "scene/builtin_scenes.hpp"
 #include "scene/scene_builder.hpp"
 #include "support/catch.hpp"
+#include "support/pictures.hpp"
 #include "support/sample_means.hpp"
 
 #include <wfpg/light/path_weights.hpp>
@@ -53,6 +54,17 @@ inline double length_inside(const wfpg::bounds3& box, glm::dvec3 from, glm::dvec
     end = std::min(end, std::max(near, far));
   }
   return std::max(end - begin, 0.0) * glm::length(to - from);
+}
+
+/// Checks that a scene's picture has the same bits on all policies of the CPU, and is not black.
+inline void check_same_on_policies(const scene& s, render_options options) {
+  options.where = device::seq;
+  const std::vector<vec3> serial = picture_of(s, options).pixels;
+  CHECK(mean_of(serial) > 0.0);
+  for (const device where : {device::omp, device::cpu}) {
+    options.where = where;
+    CHECK(same_bits(picture_of(s, options).pixels, serial));
+  }
 }
 
 /// Light of a lamp or spot that a fog scatters once toward the eye, in one channel. Simpson's rule with that

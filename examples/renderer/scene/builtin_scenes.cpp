@@ -376,16 +376,24 @@ scene fog_lamp() {
   return s;
 }
 
+/// The inside of a solid.
+material filled(float ior, vec3 absorption, vec3 scattering, float g) {
+  material m;
+  m.kind = material_kind::dielectric;
+  m.base_color = vec3(1.0f);
+  m.ior = ior;
+  m.absorption = absorption;
+  m.scattering = scattering;
+  m.g = g;
+  return m;
+}
+
 /// A box so large and deep that its sides and its bottom do not show.
 scene slab() {
   scene_builder b("slab");
-  material inside;
-  inside.kind = material_kind::dielectric;
-  inside.base_color = vec3(1.0f);
-  inside.ior = 1.0f;
-  inside.scattering = {0.95f, 0.9f, 0.5f};
-  inside.absorption = vec3(1.0f) - inside.scattering;
-  b.box({{0.0f, -20.0f, 0.0f}, {120.0f, 40.0f, 120.0f}}, b.add(inside));
+  const vec3 scattering(0.95f, 0.9f, 0.5f);
+  b.box({{0.0f, -20.0f, 0.0f}, {120.0f, 40.0f, 120.0f}},
+        b.add(filled(1.0f, vec3(1.0f) - scattering, scattering, 0.0f)));
   b.sky(vec3(1.0f));
   b.look({0.0f, 12.0f, 24.0f}, {0.0f, 0.0f, 0.0f}, 0.9f);
   return b.finish(256);
@@ -411,18 +419,6 @@ scene fog_spot() {
   s.punctual_lights = {spot};
   s.fog = {vec3(0.01f), vec3(0.15f), 0.3f};
   return s;
-}
-
-/// The inside of a solid.
-material filled(float ior, vec3 absorption, vec3 scattering, float g) {
-  material m;
-  m.kind = material_kind::dielectric;
-  m.base_color = vec3(1.0f);
-  m.ior = ior;
-  m.absorption = absorption;
-  m.scattering = scattering;
-  m.g = g;
-  return m;
 }
 
 /// A closed room of 4 x 3 x 4. A lamp in the ceiling shines on a ball of glass.

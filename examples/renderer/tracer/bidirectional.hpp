@@ -60,7 +60,7 @@ class bidirectional_tracer {
     exec_.fill_bytes(radiance_.data(), 0, radiance_.bytes());
     photons_.begin();
     by_technique_.begin();
-    const merge_radii radii(settings_.light, extent(camera), sample);
+    const merge_radii radii(settings_.light, extent(camera), sample, wfpg::photon_map<Exec>::least_radius);
     count_merges(radii);
     if (settings_.techniques.needs_light_paths()) follow_light(camera);
     if (settings_.techniques.merges()) clock_.measure("photon map", [&] { photons_.build(radii); });

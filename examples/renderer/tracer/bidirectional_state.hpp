@@ -280,8 +280,9 @@ struct bidirectional_world {
     return random(path, segments * dimension::per_vertex + use);
   }
 
-  /// Continues a path from its vertex in a direction that is sampled there, with roulette. `carries_flux`: it
-  /// is a light path. `dimensions`: the first of its kind of paths. False where it ends.
+  /// Continues a path from its vertex in a direction that is sampled there, with roulette, which weights
+  /// leave out. `carries_flux`: it is a light path. `dimensions`: the first of its kind of paths. False where
+  /// it ends.
   WFPG_HD bool extend(const subpath_vertex& vertex, std::uint32_t id, bool carries_flux,
                       std::uint32_t dimensions, subpath& path) const {
     const float begun = path.begun_luminance;
@@ -289,7 +290,8 @@ struct bidirectional_world {
       return false;
     path.begun_luminance = begun;
     return vertex.segments <= roulette_depth ||
-           survives(path, draw(id, vertex.segments, dimensions + dimension::roulette).x);
+           survives_by_throughput(path.throughput, begun,
+                                  draw(id, vertex.segments, dimensions + dimension::roulette).x);
   }
 
   /// Continues a path from its vertex in the direction that `u` samples. False where there is none.
@@ -323,18 +325,6 @@ struct bidirectional_world {
     path = subpath(ray_along(vertex.leave_along(direction), direction), vertex.throughput * weight,
                    vertex.weights.depart(techniques, to), vertex.solids_along(scene, direction));
     if (f.in_medium) path.from = subpath::origin_kind::medium;
-    return true;
-  }
-
- private:
-  // Roulette spares paths with more than a tenth of the light that they began with. Weights leave it out, so
-  // that they add up to 1 whatever it does.
-  WFPG_HD static bool survives(subpath& path, float u) {
-    constexpr float spared_part = 0.1f;
-    const float probability =
-        glm::min(1.0f, wfpg::luminance(path.throughput) / (spared_part * path.begun_luminance));
-    if (!(u < probability)) return false;
-    path.throughput /= probability;
     return true;
   }
 };

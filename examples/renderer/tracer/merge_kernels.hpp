@@ -176,10 +176,12 @@ class merge_along_piece {
       const vec3 back = -light.beam.direction;
       const vec3 value = arriving(at.t_camera) * piece_.around.scattering * flux *
                          (phase(back) * at.kernel / (at.sine * world_.beam_paths));
+      way_densities pdf = light.before;
+      pdf.add(piece_.around, length, light.begins_inside != 0, true);
       wfpg::path_arrival arrival;
       arrival.distance = at.t_light;
-      arrival.pdf_distance = light.before.there * medium_.pdf(length, true);
-      arrival.pdf_distance_back = light.before.back * medium_.pdf(length, light.begins_inside != 0);
+      arrival.pdf_distance = pdf.there;
+      arrival.pdf_distance_back = pdf.back;
       add(found, light.weights.arrive(arrival), wfpg::merge_technique::beams, at, back, value);
     };
     photons_.beam_map.for_each_beam_along(along_, wfpg::merge_kernel::epanechnikov, merge);
@@ -202,11 +204,9 @@ class merge_along_piece {
   WFPG_HD void add(technique_sum& found, const wfpg::vertex_weights& light, wfpg::merge_technique by,
                    const wfpg::merge_geometry& at, vec3 incident, vec3 value) const {
     if (!(wfpg::luminance(value) > 0.0f)) return;
-    const float length = at.t_camera - piece_.begin;
     path_segment s = before_;
     s.distance = at.t_camera;
-    s.pdf.there *= medium_.pdf(length, true);
-    s.pdf.back *= medium_.pdf(length, piece_.begins_inside);
+    s.pdf.add(piece_.around, at.t_camera - piece_.begin, piece_.begins_inside, true);
     // The vertex where the camera path would scatter.
     const subpath_vertex vertex(path_.origin + at.t_camera * path_.direction, -path_.direction, piece_.around,
                                 solid_, s, segments_, World::weights_at(path_, s, 1.0f));

@@ -26,6 +26,16 @@ struct path_state {
   WFPG_HD wfpg::ray ray() const { return ray_along(origin, direction); }
 };
 
+/// Roulette by a path's throughput, which it divides. It spares paths with more than a tenth of `begun`, the
+/// luminance with which they began. False where the path ends.
+WFPG_HD inline bool survives_by_throughput(vec3& throughput, float begun, float u) {
+  constexpr float spared_part = 0.1f;
+  const float probability = glm::min(1.0f, wfpg::luminance(throughput) / (spared_part * begun));
+  if (!(u < probability)) return false;
+  throughput /= probability;
+  return true;
+}
+
 /// A path's last hit: its surface without redundant members. Nothing is initialised, since vertices are made
 /// from a hit or copied.
 struct path_vertex {

@@ -20,8 +20,8 @@ namespace render {
 struct merge_radii {
   float on_surfaces, in_media, for_beams, of_beams;
 
-  /// `extent`: radius of the scene. `sample`: from 0.
-  merge_radii(const light_path_options& options, float extent, std::uint32_t sample) {
+  /// `extent`: radius of the scene. `sample`: from 0. `least`: photon_map's smallest radius.
+  merge_radii(const light_path_options& options, float extent, std::uint32_t sample, float least) {
     const auto radius = [&](float first, int dimension) {
       const wfpg::radius_schedule schedule{first * extent, options.radius_alpha, dimension};
       return glm::max(schedule(sample + 1), least);
@@ -31,8 +31,6 @@ struct merge_radii {
     for_beams = radius(options.volume_radius, 2);
     of_beams = radius(options.volume_radius, 1);
   }
-
-  static constexpr float least = 1.0e-15f;
 };
 
 /// Owns what light paths leave in a sample, in a policy's memory.

@@ -207,9 +207,6 @@ struct scatter_volume_paths {
   }
 
  private:
-  // Roulette spares paths with more than a tenth of the light, as that of path_kernels.hpp.
-  static constexpr float spared_throughput = 0.1f;
-
   WFPG_HD bool in_medium(vec2 u, volume_path& path) const {
     const wfpg::henyey_greenstein phase{path.solids.medium_of(scene).g};
     const wfpg::bsdf_sample drawn = phase.sample(-path.direction, u);
@@ -234,11 +231,7 @@ struct scatter_volume_paths {
   }
 
   WFPG_HD bool survives(volume_path& path, float u) const {
-    if (at.depth < roulette_depth) return true;
-    const float probability = glm::min(1.0f, wfpg::luminance(path.throughput) / spared_throughput);
-    if (!(u < probability)) return false;
-    path.throughput /= probability;
-    return true;
+    return at.depth < roulette_depth || survives_by_throughput(path.throughput, 1.0f, u);
   }
 };
 
