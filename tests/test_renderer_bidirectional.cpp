@@ -148,7 +148,7 @@ TEST_CASE("merging blurs by its disc, with a bias that falls as the square of it
       render::render_options options;
       options.method = sampling_method::vcm;
       options.techniques = render::techniques_of("surf");
-      options.light.merge_radius = static_cast<float>(radius / scene_radius);
+      options.light.surface_radius = static_cast<float>(radius / scene_radius);
       options.light.radius_alpha = 1.0f;
       options.width = options.height = 24;
       options.max_depth = 2;
@@ -178,7 +178,7 @@ TEST_CASE("one seed gives one picture of paths from both ends on any policy", "[
   const render::scene scene = render::make_builtin_scene("materials");
   render::render_options options;
   options.method = sampling_method::vcm;
-  options.light.merge_radius = 0.02f;
+  options.light.surface_radius = 0.02f;
   options.width = 24;
   options.height = 16;
   options.spp = 3;
@@ -195,7 +195,7 @@ TEST_CASE("the pictures of all techniques add up to the picture", "[renderer][bi
   const render::scene scene = render::make_builtin_scene("fog-spot");
   render::render_options options;
   options.method = sampling_method::upbp;
-  options.light.volume_radius = options.light.merge_radius = 0.03f;
+  options.light.volume_radius = options.light.surface_radius = 0.03f;
   options.width = 16;
   options.height = 12;
   options.spp = 4;
@@ -232,7 +232,7 @@ TEST_CASE("vertices of light paths beyond their memory are counted", "[renderer]
   options.spp = 2;
   const render::render_report enough = render::render(scene, options, {}).report;
   CHECK(enough.dropped_light_vertices == 0);
-  options.light.memory = 100 * (sizeof(subpath_vertex) + sizeof(std::uint32_t));
+  options.light.budget_bytes = 100 * (sizeof(subpath_vertex) + sizeof(std::uint32_t));
   const render::render_report little = render::render(scene, options, {}).report;
   CHECK(little.dropped_light_vertices > 100);
   CHECK(little.light_vertex_bytes < enough.light_vertex_bytes);
@@ -249,7 +249,7 @@ TEST_CASE("each allocation of points, beams and paths may fail", "[renderer][bid
   render::tracer_settings settings;
   settings.width = settings.height = 8;
   settings.techniques = render::points_beams_and_paths();
-  settings.light.volume_radius = settings.light.merge_radius = 0.05f;
+  settings.light.volume_radius = settings.light.surface_radius = 0.05f;
   settings.technique_pictures = true;
   const render::pinhole camera(host.view, settings.width, settings.height);
   const std::size_t failures = wfpg_test::fail_at_each(resource, [&] {

@@ -294,7 +294,7 @@ TEST_CASE("both ends: pictures of media are the same on every policy", "[rendere
   render_options options = with("bpt", 32, 2, 12);
   options.method = sampling_method::upbp;
   options.techniques.reset();
-  options.light.merge_radius = options.light.volume_radius = 0.03f;
+  options.light.surface_radius = options.light.volume_radius = 0.03f;
   check_same_on_policies(foggy_box(), options);
 }
 

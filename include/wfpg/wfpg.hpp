@@ -58,7 +58,11 @@
 #include <wfpg/host/ray_caster.hpp>
 #include <wfpg/host/wave.hpp>
 #include <wfpg/light/beam_map.hpp>
+#include <wfpg/light/bidirectional.hpp>
+#include <wfpg/light/bidirectional_options.hpp>
 #include <wfpg/light/box_tree.hpp>
+#include <wfpg/light/light_gather.hpp>
+#include <wfpg/light/light_recorder.hpp>
 #include <wfpg/light/light_vertices.hpp>
 #include <wfpg/light/path_weights.hpp>
 #include <wfpg/light/photon_estimators.hpp>

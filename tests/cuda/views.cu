@@ -100,6 +100,25 @@ __global__ void use_light_paths(wfpg::light_vertices_view<float> vertices, wfpg:
   splats.skip(1);
 }
 
+struct stored_point {
+  wfpg::vec3 at;
+  bool inside;
+  WFPG_HD wfpg::vec3 position() const { return at; }
+  WFPG_HD bool in_medium() const { return inside; }
+};
+
+__global__ void use_bidirectional(wfpg::light_recorder_view<stored_point, wfpg::no_beam> recorder,
+                                  wfpg::light_gather_view<stored_point, stored_point, wfpg::no_beam> gather,
+                                  wfpg::path_beam camera, float* out) {
+  if (recorder.leaves_beams(0)) recorder.add_beam(0, {camera});
+  if (recorder.has_place(0)) recorder.write(0, {camera.origin, true});
+  const auto add = [&](const auto&, const wfpg::photon_merge& at) { out[0] += at.scale; };
+  gather.merge_on_surface(camera.origin, add);
+  gather.merge_in_medium(camera.origin, add);
+  gather.merge_points_along(camera, add);
+  gather.merge_beams_along(camera, add);
+}
+
 __global__ void use_photon_estimators(wfpg::path_beam camera, wfpg::path_beam light, float* out) {
   constexpr auto kernel = wfpg::merge_kernel::epanechnikov;
   out[0] = wfpg::beam_beam_merge(kernel, camera, light, 1.0f).kernel +

@@ -68,14 +68,7 @@ render_options completed(const scene& scene, render_options options) {
           name_of(method_names(), options.method),
           (names_of_methods(&method_properties::has_media) + " for a scene with fog or scattering solids")
               .c_str());
-  require(options.light.merge_radius > 0.0f && options.light.merge_radius <= 1.0f, "merge_radius",
-          options.light.merge_radius, "above 0, at most 1");
-  require(options.light.volume_radius > 0.0f && options.light.volume_radius <= 1.0f, "volume_radius",
-          options.light.volume_radius, "above 0, at most 1");
-  require(options.light.beam_paths.value_or(1) >= 1, "beam_paths", options.light.beam_paths.value_or(1),
-          "at least 1");
-  require(options.light.radius_alpha > 0.0f && options.light.radius_alpha <= 1.0f, "radius_alpha",
-          options.light.radius_alpha, "above 0, at most 1");
+  wfpg::require_in_range(light_options_of(options));
   require(!options.technique_pictures || options.resume.empty(), "technique_pictures", "on",
           "off where a rendering goes on, whose state has none");
   require_guided_files(options);

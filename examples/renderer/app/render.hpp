@@ -73,7 +73,7 @@ struct render_options {
   std::uint32_t light_groups = 32;  ///< that guided paths learn to choose lights from, in [1, 255]
   /// Of bpt, vcm and upbp; nee decides on next-event estimation, too. Unset: the method's own.
   std::optional<technique_set> techniques;
-  light_path_options light;                  ///< of paths from both ends
+  wfpg::bidirectional_options light;         ///< of paths from both ends: budget, radii, beam paths
   bool technique_pictures = false;           ///< the result has a picture a technique
   std::uint32_t samples_per_leaf = 32000;    ///< after which Open PGL's field splits a leaf, 8 to 2^30
   wfpg::sarsa_grid_options sarsa;            ///< its own; what every guide is told follows from the others
@@ -153,6 +153,14 @@ inline technique_set techniques_of(const render_options& options) {
                             : options.method == sampling_method::vcm ? connection_and_merging()
                                                                      : technique_set();
   return options.techniques.value_or(own);
+}
+
+/// Their light paths. Precondition: sizes are positive.
+inline wfpg::bidirectional_options light_options_of(const render_options& options) {
+  const std::size_t pixels =
+      static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  return light_options(options.light, techniques_of(options), pixels,
+                       static_cast<std::uint32_t>(options.max_depth));
 }
 
 /// How the samples of these options are combined.

@@ -240,12 +240,12 @@ void add_bidirectional_options(CLI::App& app, render_options& options) {
          "beams; names with + between them (default of upbp: " +
              names_of(points_beams_and_paths()) + "; of vcm: without the last three; of bpt: without merges)")
       ->type_name("NAMES");
-  app.add_option("--light-memory", options.light.memory,
-                 with_default("memory of light paths' vertices", options.light.memory))
+  app.add_option("--light-memory", options.light.budget_bytes,
+                 with_default("memory of light paths' vertices", options.light.budget_bytes))
       ->transform(byte_count());
-  app.add_option("--radius", options.light.merge_radius,
+  app.add_option("--radius", options.light.surface_radius,
                  with_default("of the first sample's merges on surfaces, over the scene's radius",
-                              options.light.merge_radius))
+                              options.light.surface_radius))
       ->transform(positive_number(1.0));
   app.add_option("--volume-radius", options.light.volume_radius,
                  with_default("the same, of merges in media", options.light.volume_radius))

@@ -67,15 +67,14 @@ named_values values_of(const render_options& o) {
   if (is_bidirectional(o.method)) {
     const technique_set techniques = techniques_of(o);
     values.insert(values.end(), {{"--techniques", names_of(techniques)},
-                                 {"--light-memory", std::to_string(o.light.memory)}});
+                                 {"--light-memory", std::to_string(o.light.budget_bytes)}});
     if (techniques.has(technique::surf))
-      values.emplace_back("--radius", std::to_string(o.light.merge_radius));
+      values.emplace_back("--radius", std::to_string(o.light.surface_radius));
     if (techniques.merges()) values.emplace_back("--radius-alpha", std::to_string(o.light.radius_alpha));
     if (techniques.merges_in_media())
       values.emplace_back("--volume-radius", std::to_string(o.light.volume_radius));
     if (techniques.has(technique::bb1d))
-      values.emplace_back("--beam-paths", std::to_string(o.light.beam_paths_of(std::size_t(o.width) *
-                                                                               std::size_t(o.height))));
+      values.emplace_back("--beam-paths", std::to_string(light_options_of(o).count_beam_paths()));
   }
   if (is_guided(o.method)) add_guider_values(o, values);
   return values;

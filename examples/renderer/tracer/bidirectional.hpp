@@ -9,14 +9,15 @@
 
 #include "tracer/connection_kernels.hpp"
 #include "tracer/light_kernels.hpp"
+#include "tracer/merge_kernels.hpp"
 #include "tracer/path_film.hpp"
-#include "tracer/photon_maps.hpp"
 #include "tracer/stage_clock.hpp"
 #include "tracer/technique_film.hpp"
 #include "tracer/unguided.hpp"
 #include "tracer/wavefront.hpp"
 
 #include <wfpg/host/ray_caster.hpp>
+#include <wfpg/light/bidirectional.hpp>
 
 #include <cstdint>
 #include <vector>
@@ -43,14 +44,13 @@ class bidirectional_tracer {
         keeps_(exec, count_),
         radiance_(exec, count_),
         splats_(exec, count_, count_),
-        photons_(exec, settings),
+        light_(exec, light_of(settings, world.next_event)),
         around_camera_(exec, std::vector<solid_stack>(1)),
         around_lights_(exec,
                        std::vector<solid_stack>(world.scene.has_solids ? world.lights.lights.size() : 0)),
         film_(exec, count_),
         by_technique_(exec, count_, settings.technique_pictures),
         clock_(exec) {
-    world_.beam_paths = static_cast<float>(photons_.beam_paths());
     exec_.for_each(around_lights_.size(), find_light_solids<world_type>{world_, around_lights_.view()});
   }
 
@@ -58,18 +58,19 @@ class bidirectional_tracer {
   void render_sample(no_guide, const pinhole& camera, std::uint32_t sample, float weight) {
     world_.random = {settings_.seed, sample};
     exec_.fill_bytes(radiance_.data(), 0, radiance_.bytes());
-    photons_.begin();
+    light_.begin_iteration(sample + 1, extent(camera));
+    world_.techniques = light_.techniques();
     by_technique_.begin();
-    const merge_radii radii(settings_.light, extent(camera), sample, wfpg::photon_map<Exec>::least_radius);
-    count_merges(radii);
     if (settings_.techniques.needs_light_paths()) follow_light(camera);
-    if (settings_.techniques.merges()) clock_.measure("photon map", [&] { photons_.build(radii); });
+    if (settings_.techniques.merges()) clock_.measure("photon map", [&] { light_.build(); });
     follow_camera(camera);
     clock_.measure("film", [&] {
       film_.add(radiance_.view(), weight);
       by_technique_.add(weight);
     });
-    dropped_ += photons_.dropped();  // waits, so that a look at the time sees the whole sample
+    // It waits, so that a look at the time sees the whole sample.
+    const wfpg::bidirectional_statistics left = light_.statistics();
+    dropped_ += std::uint64_t(left.dropped_vertices) + left.dropped_beams;
     clock_.resolve();
   }
 
@@ -84,42 +85,32 @@ class bidirectional_tracer {
   /// Vertices and beams of light paths that had no memory, over all samples. Their light is missing.
   std::uint64_t dropped() const { return dropped_; }
   /// Bytes of the vertices and beams of light paths, and of the maps over them.
-  std::size_t light_bytes() const { return photons_.bytes(); }
+  std::size_t light_bytes() const { return light_.memory().total(); }
   const named_seconds& seconds() const { return clock_.seconds(); }
 
  private:
-  /// A light path a pixel.
   static world_type world_of(const tracer_settings& settings, const path_lights& given,
                              const Caster& caster) {
-    const auto pixels = static_cast<float>(settings.pixels());
-    const auto on = [&](technique t) { return settings.techniques.has(t) ? 1.0f : 0.0f; };
     world_type world{given.scene, given.lights, caster};
-    world.light_paths = pixels;
-    world.techniques.light_hits = on(technique::hits);
-    world.techniques.next_event = given.next_event ? on(technique::nee) : 0.0f;
-    world.techniques.connections = on(technique::connect);
-    world.techniques.splats = on(technique::splat) * pixels;
     world.max_depth = settings.max_depth;
     world.roulette_depth = settings.roulette_depth;
     return world;
   }
 
-  /// Radius of the scene. A scene without extent has the camera's distance.
-  float extent(const pinhole& camera) const {
-    const float radius = world_.lights.scene_radius;
-    return radius > 0.0f ? radius : glm::length(camera.position() - world_.lights.scene_centre);
+  /// A light path a pixel.
+  static wfpg::bidirectional_options light_of(const tracer_settings& settings, bool next_event) {
+    wfpg::bidirectional_options options =
+        light_options(settings.light, settings.techniques, settings.pixels(), settings.max_depth);
+    options.next_event = options.next_event && next_event;
+    return options;
   }
 
-  /// Tells the weights of a sample's merges.
-  void count_merges(const merge_radii& radii) {
-    const auto on = [&](technique t) { return settings_.techniques.has(t) ? 1.0f : 0.0f; };
-    const auto square = [](float r) { return pi * r * r; };
-    wfpg::path_techniques& counts = world_.techniques;
-    counts.surface_points = on(technique::surf) * world_.light_paths * square(radii.on_surfaces);
-    counts.volume_points =
-        on(technique::pp3d) * world_.light_paths * square(radii.in_media) * (4.0f / 3.0f) * radii.in_media;
-    counts.beam_points = on(technique::pb2d) * world_.light_paths * square(radii.for_beams);
-    counts.beams = world_.beam_paths * 2.0f * radii.of_beams;
+  /// Radius of the scene. A scene without extent has the camera's distance, or 1.
+  float extent(const pinhole& camera) const {
+    const float radius = world_.lights.scene_radius;
+    if (radius > 0.0f) return radius;
+    const float distance = glm::length(camera.position() - world_.lights.scene_centre);
+    return distance > 0.0f ? distance : 1.0f;
   }
 
   found_light found() { return by_technique_.found(radiance_.view()); }
@@ -130,19 +121,20 @@ class bidirectional_tracer {
     });
     for (std::uint32_t segments = 1; segments < settings_.max_depth; ++segments) {
       clock_.measure("light paths", [&] {
-        exec_.for_each(
-            count_, trace_light_paths<world_type>{world_, segments, paths_.view(), vertices_.view(),
-                                                  keeps_.view(), photons_.pending(), film_.segment_counts()});
-        photons_.reserve(keeps_.view());
+        exec_.for_each(count_, trace_light_paths<world_type>{
+                                   world_, segments, paths_.view(), vertices_.view(), keeps_.view(),
+                                   light_.light_recorder(), film_.segment_counts()});
+        light_.reserve(keeps_.view());
         const bool is_last = segments + 1 == settings_.max_depth;
         exec_.for_each(count_, extend_light_paths<world_type>{
                                    world_, camera, is_last, paths_.view(), vertices_.view(), keeps_.view(),
-                                   photons_.stored(), splats_.view(), by_technique_.splats()});
+                                   light_.light_recorder(), splats_.view(), by_technique_.splats()});
       });
       clock_.measure("splats", [&] {
         if (!settings_.techniques.has(technique::splat)) return;
-        splats_.add_to(exec_, radiance_.view(), 1.0f / world_.light_paths);
-        by_technique_.add_splats(1.0f / world_.light_paths);
+        const float scale = 1.0f / static_cast<float>(count_);
+        splats_.add_to(exec_, radiance_.view(), scale);
+        by_technique_.add_splats(scale);
       });
     }
     by_technique_.take_splats(radiance_);
@@ -156,7 +148,8 @@ class bidirectional_tracer {
       exec_.for_each(count_,
                      start_camera_paths<world_type>{world_, camera, around_camera_.view(), paths_.view()});
     });
-    const bool merges = settings_.techniques.has(technique::pb2d) || photons_.beam_paths() > 0;
+    const bool merges =
+        settings_.techniques.has(technique::pb2d) || settings_.techniques.has(technique::bb1d);
     for (std::uint32_t segments = 1; segments <= settings_.max_depth; ++segments) {
       clock_.measure("trace", [&] {
         if (merges)
@@ -179,12 +172,12 @@ class bidirectional_tracer {
       });
     if (counts.connections > 0.0f)
       clock_.measure("connections", [&] {
-        exec_.for_each(count_,
-                       connect_paths<world_type>{world_, paths, vertices, photons_.stored(), found()});
+        exec_.for_each(
+            count_, connect_paths<world_type>{world_, paths, vertices, light_.gather().vertices(), found()});
       });
     if (counts.surface_points > 0.0f || counts.volume_points > 0.0f)
       clock_.measure("merges", [&] {
-        exec_.for_each(count_, merge_vertices<world_type>{world_, paths, vertices, photons_.view(), found()});
+        exec_.for_each(count_, merge_vertices<world_type>{world_, paths, vertices, light_.gather(), found()});
       });
     clock_.measure("shade", [&] {
       exec_.for_each(count_, extend_camera_paths<world_type>{world_, paths, vertices});
@@ -194,7 +187,7 @@ class bidirectional_tracer {
   template <bool merges>
   void trace_camera(std::uint32_t segments) {
     exec_.for_each(count_, trace_camera_paths<world_type, merges>{
-                               world_, segments, paths_.view(), vertices_.view(), photons_.view(), found(),
+                               world_, segments, paths_.view(), vertices_.view(), light_.gather(), found(),
                                film_.segment_counts(), film_.light_hit_counts()});
   }
 
@@ -207,7 +200,7 @@ class bidirectional_tracer {
   wfpg::buffer<std::uint32_t, Exec> keeps_;
   wfpg::buffer<vec3, Exec> radiance_;
   wfpg::splats<Exec> splats_;
-  photon_maps<Exec> photons_;
+  wfpg::bidirectional<Exec, subpath_vertex, photon, light_beam> light_;
   wfpg::buffer<solid_stack, Exec> around_camera_;
   wfpg::buffer<solid_stack, Exec> around_lights_;  // by the lights' columns; empty where there are no solids
   path_film<Exec> film_;

@@ -107,6 +107,7 @@ struct subpath_vertex {
     at.outgoing = outgoing;
   }
 
+  WFPG_HD vec3 position() const { return at.position; }
   WFPG_HD bool in_medium() const { return extinction > 0.0f; }
   /// Of a medium that scatters, at least 1e-30, so that it tells a vertex in a medium.
   WFPG_HD static float mean_extinction(const medium& around) {
@@ -183,9 +184,6 @@ struct light_beam {
         begins_inside(piece.begins_inside ? 1 : 0) {}
 };
 
-/// Most beams that a segment leaves: media that scatter on its way.
-inline constexpr std::uint32_t most_beams = 8;
-
 /// Random numbers of light paths begin at this use, and those of distances in media at another. Both are far
 /// from those of camera paths' vertices.
 inline constexpr std::uint32_t light_path_dimensions = 0x40000000u;
@@ -210,8 +208,6 @@ struct bidirectional_world {
   light_view lights;
   Caster caster;
   wfpg::path_techniques techniques = {};
-  float light_paths = 0.0f;  ///< of a sample
-  float beam_paths = 0.0f;   ///< of them, those that leave beams
   random_stream random = {};
   std::uint32_t max_depth = 1;       ///< most segments of a whole path
   std::uint32_t roulette_depth = 3;  ///< roulette begins at this vertex, from 0

@@ -30,7 +30,7 @@ struct trace_camera_paths {
   std::uint32_t segments;  ///< of the paths, with this one
   tiled_view<subpath> paths;
   tiled_view<subpath_vertex> vertices;
-  photon_view photons;
+  photon_gather photons;
   found_light found;
   wfpg::array_view<std::uint32_t> segment_counts;
   wfpg::array_view<std::uint32_t> light_hits;  ///< segments that ended where light is emitted toward them
@@ -185,7 +185,7 @@ struct merge_vertices {
   World world;
   tiled_view<subpath> paths;
   tiled_view<subpath_vertex> vertices;
-  photon_view photons;
+  photon_gather photons;
   found_light found;
 
   WFPG_HD void operator()(std::size_t i) const {

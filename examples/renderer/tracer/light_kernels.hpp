@@ -3,6 +3,8 @@
 
 #include "tracer/bidirectional_state.hpp"
 
+#include <wfpg/light/light_recorder.hpp>
+
 namespace render {
 
 /// Finds the solids around each light.
@@ -37,15 +39,8 @@ struct start_light_paths {
   }
 };
 
-/// Beams that light paths have left on their last segment, for the first paths.
-struct pending_beams {
-  wfpg::array_view<light_beam> beams;      ///< most_beams a path
-  wfpg::array_view<std::uint32_t> counts;  ///< by path
-
-  WFPG_HD void add(std::size_t path, const light_beam& beam) const {
-    if (counts[path] < most_beams) beams[path * most_beams + counts[path]++] = beam;
-  }
-};
+/// Stores a sample's light paths.
+using path_recorder = wfpg::light_recorder_view<subpath_vertex, light_beam>;
 
 /// Finds the next vertex of each light path, and the beams on its way.
 template <class World>
@@ -55,12 +50,11 @@ struct trace_light_paths {
   tiled_view<subpath> paths;
   tiled_view<subpath_vertex> vertices;
   wfpg::array_view<std::uint32_t> keeps;  ///< 1: the vertex can be connected
-  pending_beams beams;                    ///< of no paths, where nobody merges beams
+  path_recorder recorder;
   wfpg::array_view<std::uint32_t> segment_counts;
 
   WFPG_HD void operator()(std::size_t i) const {
     keeps[i] = 0;
-    if (i < beams.counts.size()) beams.counts[i] = 0;
     const subpath path = paths[i];
     if (!path.is_active()) return;
     ++segment_counts[i];
@@ -82,22 +76,11 @@ struct trace_light_paths {
         : passer(way), kernel(told), i(number), path(of) {}
 
     WFPG_HD void cross(const path_segment& before, const medium_piece& piece) const {
-      if (i >= kernel.beams.counts.size() || !(piece.end > piece.begin)) return;
-      kernel.beams.add(
+      if (!kernel.recorder.leaves_beams(i) || !(piece.end > piece.begin)) return;
+      kernel.recorder.add_beam(
           i, light_beam(path, before, piece, kernel.segments, before.solids.top(kernel.world.scene)));
     }
   };
-};
-
-/// Stores the beams that have a place.
-struct store_beams {
-  pending_beams beams;
-  wfpg::light_vertices_view<light_beam> stored;
-
-  WFPG_HD void operator()(std::size_t i) const {
-    for (std::uint32_t k = 0; k < beams.counts[i] && stored.has_place(i, k); ++k)
-      stored.write(i, beams.beams[i * most_beams + k], k);
-  }
 };
 
 /// Stores the new vertices that have a place, connects all new ones to the camera, and continues the paths.
@@ -109,7 +92,7 @@ struct extend_light_paths {
   tiled_view<subpath> paths;
   tiled_view<subpath_vertex> vertices;
   wfpg::array_view<const std::uint32_t> keeps;
-  wfpg::light_vertices_view<subpath_vertex> stored;  ///< of no paths, where nothing reads vertices
+  path_recorder recorder;
   wfpg::splat_view splats;
   wfpg::splat_view plain_splats;  ///< without weights; of no paths, where nobody asks for them
 
@@ -117,7 +100,7 @@ struct extend_light_paths {
     if (!paths[i].is_active()) return;
     const subpath_vertex vertex = vertices[i];
     if (keeps[i] != 0) {
-      if (stored.paths() > 0 && stored.has_place(i)) stored.write(i, vertex);
+      if (recorder.has_place(i)) recorder.write(i, vertex);
       if (world.techniques.splats > 0.0f) splat(i, vertex);
     }
     subpath next = paths[i];

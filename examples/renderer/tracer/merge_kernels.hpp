@@ -6,8 +6,7 @@
 #include "tracer/bidirectional_state.hpp"
 #include "tracer/found_light.hpp"
 
-#include <wfpg/light/beam_map.hpp>
-#include <wfpg/light/photon_map.hpp>
+#include <wfpg/light/light_gather.hpp>
 
 namespace render {
 
@@ -28,51 +27,8 @@ struct photon {
         weights(vertex.weights) {}
 };
 
-/// A photon map, and its photons in the order of its places.
-struct placed_photons {
-  wfpg::photon_map_view map;
-  wfpg::array_view<const photon> photons;
-};
-
-/// Copies photons into the order of a map's places.
-struct place_photons {
-  wfpg::light_vertices_view<subpath_vertex> stored;
-  wfpg::photon_map_view map;
-  wfpg::array_view<photon> photons;
-
-  WFPG_HD void operator()(std::size_t i) const {
-    photons[i] = photon(stored[map.index(static_cast<std::uint32_t>(i))]);
-  }
-};
-
-/// The photons of a sample. Maps that nobody asked for are empty.
-struct photon_view {
-  placed_photons on_surfaces, in_media, for_beams;
-  wfpg::light_vertices_view<light_beam> beams;
-  wfpg::beam_map_view beam_map;
-};
-
-/// Copies the positions of stored vertices on surfaces or in media, for a photon map. The map skips the
-/// others.
-struct copy_positions {
-  wfpg::light_vertices_view<subpath_vertex> stored;
-  bool in_media;
-  wfpg::array_view<vec3> positions;
-
-  WFPG_HD void operator()(std::size_t i) const {
-    const subpath_vertex& vertex = stored[static_cast<std::uint32_t>(i)];
-    positions[i] =
-        vertex.in_medium() == in_media ? vertex.at.position : vec3(2.0f * wfpg::largest_coordinate);
-  }
-};
-
-/// Copies stored beams, for a beam map.
-struct copy_beams {
-  wfpg::light_vertices_view<light_beam> stored;
-  wfpg::array_view<wfpg::path_beam> beams;
-
-  WFPG_HD void operator()(std::size_t i) const { beams[i] = stored[static_cast<std::uint32_t>(i)].beam; }
-};
+/// The light paths of a sample, as kernels of camera paths find them.
+using photon_gather = wfpg::light_gather_view<subpath_vertex, photon, light_beam>;
 
 /// Whether two numbers of solids mean one medium.
 WFPG_HD inline bool have_one_medium(const scene_view& scene, std::uint32_t a, std::uint32_t b) {
@@ -85,21 +41,18 @@ WFPG_HD inline bool have_one_medium(const scene_view& scene, std::uint32_t a, st
 template <class World>
 struct merge_at_vertex {
   const World& world;
-  const photon_view& photons;
+  const photon_gather& photons;
   const subpath_vertex& vertex;
   const scatterer& f;
 
   WFPG_HD technique_sum on_surface() const {
     technique_sum found;
-    const placed_photons& near = photons.on_surfaces;
-    near.map.for_each_place(vertex.at.position, [&](std::uint32_t place) {
-      const photon light = near.photons[place];
+    photons.merge_on_surface(vertex.at.position, [&](const photon& light, const wfpg::photon_merge& at) {
       if (light.segments + vertex.segments > world.max_depth) return;
-      // The photon's flux is that of a surface with the geometric normal. The sum is over the number of light
-      // paths and the disc of merges.
+      // The photon's flux is that of a surface with the geometric normal.
       add(found, light, wfpg::merge_technique::surface_points,
-          f.eval_rgb(vertex.at.outgoing, light.incident) * light.flux /
-              (vertex.cosine(light.incident) * world.techniques.surface_points));
+          f.eval_rgb(vertex.at.outgoing, light.incident) * light.flux *
+              (at.scale / vertex.cosine(light.incident)));
     });
     return found;
   }
@@ -107,16 +60,14 @@ struct merge_at_vertex {
   WFPG_HD technique_sum in_medium() const {
     const vec3 scattering = vertex.solids.medium_of(world.scene).scattering;
     technique_sum found;
-    const placed_photons& near = photons.in_media;
-    near.map.for_each_place(vertex.at.position, [&](std::uint32_t place) {
-      const photon light = near.photons[place];
+    photons.merge_in_medium(vertex.at.position, [&](const photon& light, const wfpg::photon_merge& at) {
       if (light.segments + vertex.segments > world.max_depth ||
           !have_one_medium(world.scene, light.solid, vertex.material))
         return;
-      // Both paths have scattered here. The sum is over the number of light paths and the ball of merges.
+      // Both paths have scattered here.
       const vec3 flux = light.flux / glm::max(scattering, vec3(1e-30f));
       add(found, light, wfpg::merge_technique::volume_points,
-          f.phase.eval(vertex.at.outgoing, light.incident) * flux / world.techniques.volume_points);
+          flux * (f.phase.eval(vertex.at.outgoing, light.incident) * at.scale));
     });
     return found;
   }
@@ -134,7 +85,7 @@ struct merge_at_vertex {
 template <class World>
 class merge_along_piece {
  public:
-  WFPG_HD merge_along_piece(const World& world, const photon_view& photons, const subpath& path,
+  WFPG_HD merge_along_piece(const World& world, const photon_gather& photons, const subpath& path,
                             std::uint32_t segments, const path_segment& before, const medium_piece& piece)
       : world_(world),
         photons_(photons),
@@ -153,38 +104,31 @@ class merge_along_piece {
 
   WFPG_HD technique_sum with_points() const {
     technique_sum found;
-    const placed_photons& near = photons_.for_beams;
-    const auto merge = [&](std::uint32_t place, const wfpg::merge_geometry& at) {
-      const photon light = near.photons[place];
+    photons_.merge_points_along(along_, [&](const photon& light, const wfpg::photon_merge& at) {
       if (!may_merge(light.segments, light.solid)) return;
-      const vec3 value =
-          arriving(at.t_camera) * light.flux * (phase(light.incident) * at.kernel / world_.light_paths);
-      add(found, light.weights, wfpg::merge_technique::beam_points, at, light.incident, value);
-    };
-    near.map.for_each_place_along(along_, wfpg::merge_kernel::epanechnikov, merge);
+      const vec3 value = arriving(at.t_camera) * light.flux * (phase(light.incident) * at.scale);
+      add(found, light.weights, wfpg::merge_technique::beam_points, at.t_camera, light.incident, value);
+    });
     return found;
   }
 
   WFPG_HD technique_sum with_beams() const {
     technique_sum found;
-    const auto merge = [&](std::uint32_t k, const wfpg::merge_geometry& at) {
-      const light_beam& light = photons_.beams[k];
+    photons_.merge_beams_along(along_, [&](const light_beam& light, const wfpg::photon_merge& at) {
       if (!may_merge(light.segments, light.solid)) return;
       const float length = at.t_light - light.beam.begin;
       // Short beams: a light path gets as far with this probability.
       const vec3 flux = light.throughput * medium_.transmittance(length) / medium_.pdf(length, false);
       const vec3 back = -light.beam.direction;
-      const vec3 value = arriving(at.t_camera) * piece_.around.scattering * flux *
-                         (phase(back) * at.kernel / (at.sine * world_.beam_paths));
+      const vec3 value = arriving(at.t_camera) * piece_.around.scattering * flux * (phase(back) * at.scale);
       way_densities pdf = light.before;
       pdf.add(piece_.around, length, light.begins_inside != 0, true);
       wfpg::path_arrival arrival;
       arrival.distance = at.t_light;
       arrival.pdf_distance = pdf.there;
       arrival.pdf_distance_back = pdf.back;
-      add(found, light.weights.arrive(arrival), wfpg::merge_technique::beams, at, back, value);
-    };
-    photons_.beam_map.for_each_beam_along(along_, wfpg::merge_kernel::epanechnikov, merge);
+      add(found, light.weights.arrive(arrival), wfpg::merge_technique::beams, at.t_camera, back, value);
+    });
     return found;
   }
 
@@ -202,20 +146,20 @@ class merge_along_piece {
   }
 
   WFPG_HD void add(technique_sum& found, const wfpg::vertex_weights& light, wfpg::merge_technique by,
-                   const wfpg::merge_geometry& at, vec3 incident, vec3 value) const {
+                   float distance, vec3 incident, vec3 value) const {
     if (!(wfpg::luminance(value) > 0.0f)) return;
     path_segment s = before_;
-    s.distance = at.t_camera;
-    s.pdf.add(piece_.around, at.t_camera - piece_.begin, piece_.begins_inside, true);
+    s.distance = distance;
+    s.pdf.add(piece_.around, distance - piece_.begin, piece_.begins_inside, true);
     // The vertex where the camera path would scatter.
-    const subpath_vertex vertex(path_.origin + at.t_camera * path_.direction, -path_.direction, piece_.around,
+    const subpath_vertex vertex(path_.origin + distance * path_.direction, -path_.direction, piece_.around,
                                 solid_, s, segments_, World::weights_at(path_, s, 1.0f));
     const scatterer f = vertex.seen_from(incident);
     found.add(value, light.merge(world_.techniques, by, vertex.weights, vertex.leave(f, incident)));
   }
 
   const World& world_;
-  const photon_view& photons_;
+  const photon_gather& photons_;
   const subpath& path_;
   std::uint32_t segments_;
   const path_segment& before_;

@@ -2,14 +2,12 @@
 #pragma once
 
 #include <wfpg/base/types.hpp>
-#include <wfpg/light/light_vertices.hpp>
-#include <wfpg/light/photon_estimators.hpp>
+#include <wfpg/light/bidirectional_options.hpp>
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
-#include <optional>
 
 namespace render {
 
@@ -45,12 +43,8 @@ class technique_set {
   constexpr bool merges_in_media() const {
     return has(technique::pp3d) || has(technique::pb2d) || has(technique::bb1d);
   }
-  /// Whether camera paths read vertices of light paths.
-  constexpr bool needs_light_vertices() const {
-    return has(technique::connect) || has(technique::surf) || has(technique::pp3d) || has(technique::pb2d);
-  }
   constexpr bool needs_light_paths() const {
-    return needs_light_vertices() || has(technique::splat) || has(technique::bb1d);
+    return has(technique::connect) || has(technique::splat) || merges();
   }
 
  private:
@@ -65,22 +59,23 @@ constexpr technique_set pictured(technique_set on) {
   return on;
 }
 
-/// Options of light paths and of merges. Radii are of the first sample, over the scene's radius; above 0, at
-/// most 1.
-struct light_path_options {
-  std::size_t memory = wfpg::light_vertices_options().budget_bytes;  ///< bytes of vertices, and of beams
-  float merge_radius = 0.003f;                                       ///< on surfaces
-  float volume_radius = 0.002f;                                      ///< in media
-  float radius_alpha = wfpg::radius_schedule().alpha;                ///< as in radius_schedule
-  /// Light paths of a sample that leave beams, at least 1. Unset: one in 64, at most 8192.
-  std::optional<std::uint32_t> beam_paths;
-
-  /// Light paths that leave beams, of as many.
-  std::size_t beam_paths_of(std::size_t paths) const {
-    const std::size_t own = std::min<std::size_t>((paths + 63) / 64, 8192);
-    return std::min<std::size_t>(beam_paths ? *beam_paths : own, paths);
-  }
-};
+/// Options of light paths: `given`, with a set of techniques, for as many paths of up to `max_depth`
+/// segments.
+inline wfpg::bidirectional_options light_options(wfpg::bidirectional_options given, const technique_set& set,
+                                                 std::size_t paths, std::uint32_t max_depth) {
+  given.paths = paths;
+  given.max_vertices = std::max(max_depth, 2u) - 1;
+  given.max_beams = 2 * max_depth;
+  given.light_hits = set.has(technique::hits);
+  given.next_event = set.has(technique::nee);
+  given.connections = set.has(technique::connect);
+  given.splats = set.has(technique::splat);
+  given.surface_points = set.has(technique::surf);
+  given.volume_points = set.has(technique::pp3d);
+  given.beam_points = set.has(technique::pb2d);
+  given.beams = set.has(technique::bb1d);
+  return given;
+}
 
 /// Vertex connection and merging.
 constexpr technique_set connection_and_merging() {

@@ -22,8 +22,8 @@ struct tracer_settings {
   std::uint64_t seed = 0;
   std::uint32_t roulette_depth = 3;  ///< Russian roulette begins at this vertex; the camera's first hit is 0
   technique_set techniques = {};     ///< of paths from both ends
-  light_path_options light = {};     ///< likewise
-  bool technique_pictures = false;   ///< whether they keep a picture a technique
+  wfpg::bidirectional_options light = {};  ///< of light paths: budget, radii, beam paths
+  bool technique_pictures = false;         ///< whether they keep a picture a technique
 
   std::size_t pixels() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
 };

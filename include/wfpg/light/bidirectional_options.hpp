@@ -1,0 +1,96 @@
+// What bidirectional is told and tells: options, statistics and memory. Cheap to include.
+//
+// Cost: none. Memory: that of a few numbers.
+#pragma once
+
+#include <wfpg/base/error.hpp>
+#include <wfpg/light/photon_estimators.hpp>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+namespace wfpg {
+
+/// Options of bidirectional. Techniques are as in path_techniques. By default they are those of vertex
+/// connection and merging.
+struct bidirectional_options {
+  std::size_t paths = 0;           ///< light paths of an iteration, at least 1, below 2^32 - 1
+  std::uint32_t max_vertices = 8;  ///< most vertices of a path that are stored, at least 1
+  std::uint32_t max_beams = 16;    ///< most beams of a path that are stored, at least 1
+  /// Most beams that a path leaves between two calls of reserve(), at least 1: media on one segment.
+  std::uint32_t segment_beams = 8;
+  /// Memory for vertices, and as much for beams, bytes.
+  std::size_t budget_bytes = std::size_t(1) << 30;
+
+  bool light_hits = true;      ///< camera paths hit lights
+  bool next_event = true;      ///< a light sample at each vertex of a camera path
+  bool connections = true;     ///< vertices of a light and a camera path are connected
+  bool splats = true;          ///< vertices of light paths are connected to the camera
+  bool surface_points = true;  ///< merges on surfaces (P-P2D)
+  bool volume_points = false;  ///< merges of points in media (P-P3D)
+  bool beam_points = false;    ///< merges of points with camera beams in media (P-B2D)
+  bool beams = false;          ///< merges of beams in media (B-B1D)
+
+  // Radii of the first iteration's merges, over the scene's radius, in (0, 1].
+  float surface_radius = 0.003f;                 ///< on surfaces
+  float volume_radius = 0.002f;                  ///< in media
+  float radius_alpha = radius_schedule().alpha;  ///< how radii shrink, in (0, 1], as in radius_schedule
+  /// Light paths that leave beams, at least 1. More than there are paths means all. Unset: one in 64, at most
+  /// 8192.
+  std::optional<std::size_t> beam_paths;
+
+  /// Whether camera paths read vertices of light paths.
+  bool reads_vertices() const { return connections || surface_points || volume_points || beam_points; }
+  /// Whether photons are merged.
+  bool merges() const { return surface_points || volume_points || beam_points || beams; }
+  /// Number of light paths that leave beams. 0 where beams are off.
+  std::size_t count_beam_paths() const {
+    if (!beams) return 0;
+    return std::min(beam_paths.value_or(std::min<std::size_t>((paths + 63) / 64, 8192)), paths);
+  }
+};
+
+/// Throws std::invalid_argument that names the option out of range. bidirectional's constructor calls it.
+inline void require_in_range(const bidirectional_options& options) {
+  const auto require_fraction = [](float value, const char* name) {
+    require(value > 0.0f && value <= 1.0f, name, value, "above 0, at most 1");
+  };
+  const auto require_some = [](std::size_t value, const char* name) {
+    require(value > 0, name, value, "at least 1");
+  };
+  require(options.paths > 0 && options.paths < 0xffffffffu, "bidirectional_options.paths", options.paths,
+          "at least 1, less than 2^32 - 1");
+  require_some(options.max_vertices, "bidirectional_options.max_vertices");
+  require_some(options.max_beams, "bidirectional_options.max_beams");
+  require_some(options.segment_beams, "bidirectional_options.segment_beams");
+  require_some(options.beam_paths.value_or(1), "bidirectional_options.beam_paths");
+  require_fraction(options.surface_radius, "bidirectional_options.surface_radius");
+  require_fraction(options.volume_radius, "bidirectional_options.volume_radius");
+  require_fraction(options.radius_alpha, "bidirectional_options.radius_alpha");
+}
+
+/// What an iteration's light paths have left. A technique that is off has no photons and the radius 0.
+struct bidirectional_statistics {
+  std::uint32_t vertices = 0;          ///< stored
+  std::uint32_t dropped_vertices = 0;  ///< without memory: their light is missing
+  std::uint32_t beams = 0;             ///< stored
+  std::uint32_t dropped_beams = 0;     ///< without memory, or beyond segment_beams
+  /// Photons of merges on surfaces, at points in media, and along camera beams.
+  std::uint32_t surface_photons = 0, volume_photons = 0, beam_point_photons = 0;
+  std::uint32_t beam_pieces = 0;  ///< of all beams
+  /// Radii, scene units.
+  float surface_radius = 0.0f, volume_radius = 0.0f, beam_point_radius = 0.0f, beam_radius = 0.0f;
+};
+
+/// Bytes that bidirectional holds: those of the largest iteration so far.
+struct bidirectional_memory {
+  std::size_t vertices = 0;  ///< stored vertices
+  std::size_t beams = 0;     ///< stored beams, and those without a place yet
+  std::size_t maps = 0;      ///< trees, and photons in their order
+
+  std::size_t total() const { return vertices + beams + maps; }  ///< of all three
+};
+
+}  // namespace wfpg

@@ -1,0 +1,117 @@
+// Members of bidirectional: radii, counts, and the maps of an iteration.
+#pragma once
+
+#include <wfpg/base/error.hpp>
+#include <wfpg/exec/support/thrust.hpp>
+#include <wfpg/light/bidirectional.hpp>
+
+#include <thrust/reduce.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+namespace wfpg {
+
+template <class Exec, class Vertex, class Photon, class Beam>
+auto bidirectional<Exec, Vertex, Photon, Beam>::radii_of(std::uint32_t iteration, float scene_radius) const
+    -> merge_radii {
+  const auto radius = [&](bool is_on, float first, int dimension) {
+    const radius_schedule schedule{first * scene_radius, options_.radius_alpha, dimension};
+    return is_on ? std::max(schedule(iteration), photon_map<Exec>::least_radius) : 0.0f;
+  };
+  merge_radii radii;
+  radii.on_surfaces = radius(options_.surface_points, options_.surface_radius, 2);
+  radii.in_media = radius(options_.volume_points, options_.volume_radius, 3);
+  radii.for_beams = radius(options_.beam_points, options_.volume_radius, 2);
+  radii.of_beams = radius(options_.beams, options_.volume_radius, 1);
+  return radii;
+}
+
+template <class Exec, class Vertex, class Photon, class Beam>
+path_techniques bidirectional<Exec, Vertex, Photon, Beam>::counts_of(const merge_radii& radii) const {
+  const auto on = [](bool is_on) { return is_on ? 1.0f : 0.0f; };
+  const auto disc = [](float r) { return pi * r * r; };
+  const auto paths = static_cast<float>(options_.paths);
+  path_techniques counts;
+  counts.light_hits = on(options_.light_hits);
+  counts.next_event = on(options_.next_event);
+  counts.connections = on(options_.connections);
+  counts.splats = on(options_.splats) * paths;
+  counts.surface_points = paths * disc(radii.on_surfaces);
+  counts.volume_points = paths * disc(radii.in_media) * (4.0f / 3.0f) * radii.in_media;
+  counts.beam_points = paths * disc(radii.for_beams);
+  counts.beams = static_cast<float>(beam_paths()) * 2.0f * radii.of_beams;
+  return counts;
+}
+
+template <class Exec, class Vertex, class Photon, class Beam>
+void bidirectional<Exec, Vertex, Photon, Beam>::begin_iteration(std::uint32_t iteration, float scene_radius) {
+  require(iteration > 0, "iteration", iteration, "at least 1");
+  require(scene_radius > 0.0f, "scene_radius", scene_radius, "positive and finite");
+  radii_ = radii_of(iteration, scene_radius);
+  techniques_ = counts_of(radii_);
+  is_built_ = false;
+  vertices_.begin(exec_);
+  beams_.begin(exec_);
+  exec_.fill_bytes(pending_counts_.data(), 0, pending_counts_.bytes());
+  exec_.fill_bytes(lost_.data(), 0, lost_.bytes());
+}
+
+template <class Exec, class Vertex, class Photon, class Beam>
+void bidirectional<Exec, Vertex, Photon, Beam>::build() {
+  is_built_ = false;
+  const light_vertices_view<Vertex> stored = vertices_.view();
+  if (options_.surface_points) on_surfaces_.build(exec_, positions(false), radii_.on_surfaces, stored);
+  if (options_.volume_points) in_media_.build(exec_, positions(true), radii_.in_media, stored);
+  if (options_.beam_points) for_beams_.build(exec_, positions(true), radii_.for_beams, stored);
+  if (beam_paths() > 0) build_beams();
+  is_built_ = true;
+}
+
+template <class Exec, class Vertex, class Photon, class Beam>
+void bidirectional<Exec, Vertex, Photon, Beam>::build_beams() {
+  const std::uint32_t beams = beams_.size(exec_);
+  if (copied_beams_.size() < beams) copied_beams_ = buffer<path_beam, Exec>(exec_, beams_.capacity());
+  exec_.for_each(beams, detail::copy_beams<Beam>{beams_.view(), copied_beams_.view()});
+  beam_map_options map;
+  map.radius = radii_.of_beams;
+  map.max_pieces = std::max<std::size_t>(pieces_a_beam * beams, 1);
+  beam_map_.build(exec_, {copied_beams_.data(), beams}, map);
+}
+
+template <class Exec, class Vertex, class Photon, class Beam>
+auto bidirectional<Exec, Vertex, Photon, Beam>::gather() -> gather_type {
+  gather_type found;
+  found.vertices_ = vertices_.view();
+  if (!is_built_) return found;
+  found.on_surfaces_ = on_surfaces_.view(1.0f / techniques_.surface_points);
+  found.in_media_ = in_media_.view(1.0f / techniques_.volume_points);
+  found.for_beams_ = for_beams_.view(1.0f / static_cast<float>(options_.paths));
+  found.beams_ = beams_.view();
+  found.beam_map_ = beam_map_.view();
+  found.beam_scale_ = 1.0f / static_cast<float>(beam_paths());
+  return found;
+}
+
+template <class Exec, class Vertex, class Photon, class Beam>
+bidirectional_statistics bidirectional<Exec, Vertex, Photon, Beam>::statistics() const {
+  bidirectional_statistics s;
+  s.vertices = vertices_.size(exec_);
+  s.dropped_vertices = vertices_.dropped(exec_);
+  s.beams = beams_.size(exec_);
+  const array_view<const std::uint32_t> lost = lost_.view();
+  s.dropped_beams = ::thrust::reduce(exec_.thrust(), lost.begin(), lost.end(), beams_.dropped(exec_));
+  s.surface_radius = radii_.on_surfaces;
+  s.volume_radius = radii_.in_media;
+  s.beam_point_radius = radii_.for_beams;
+  s.beam_radius = radii_.of_beams;
+  if (!is_built_) return s;
+  s.surface_photons = on_surfaces_.map.view().size();
+  s.volume_photons = in_media_.map.view().size();
+  s.beam_point_photons = for_beams_.map.view().size();
+  s.beam_pieces = beam_map_.view().pieces();
+  return s;
+}
+
+}  // namespace wfpg
