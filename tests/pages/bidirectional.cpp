@@ -51,10 +51,10 @@ float weight(const wfpg::path_techniques& techniques, const my::vertex& light, c
 float merge(const wfpg::photon_map_view& map, const my::vertex& camera);
 int beams_along(const wfpg::exec::tbb& exec, const std::vector<wfpg::bounds3>& boxes, const wfpg::ray& ray);
 
-#include "bidirectional-1.inc"
-#include "bidirectional-2.inc"
 #include "bidirectional-3.inc"
 #include "bidirectional-4.inc"
+#include "bidirectional-5.inc"
+#include "bidirectional-6.inc"
 
 template void follow_all(const wfpg::exec::seq&, wfpg::light_vertices<wfpg::exec::seq, my::vertex>&,
                          wfpg::splats<wfpg::exec::seq>&, wfpg::array_view<std::uint32_t>,

@@ -4,6 +4,7 @@
 #include <wfpg/guides/octree/options.hpp>
 #include <wfpg/guides/records/options.hpp>
 #include <wfpg/guides/sarsa/options.hpp>
+#include <wfpg/light/bidirectional_options.hpp>
 #include <wfpg/octree/fragments_from_caster.hpp>
 
 #include <fstream>
@@ -39,8 +40,9 @@ std::vector<option_default> defaults() {
   const wfpg::transient_guide_options transient;
   const wfpg::sarsa_grid_options sarsa;
   const wfpg::irradiance_records_options records;
+  const wfpg::bidirectional_options light;
   const std::string both = "Both octree guides", grid = "A SARSA grid", irradiance = "Irradiance records",
-                    lights = "Choices of lights", all = "Every guide";
+                    lights = "Choices of lights", all = "Every guide", paths = "Light paths";
   return {{all, "max_paths", text_of(every.max_paths)},
           {all, "max_depth", text_of(every.max_depth)},
           {all, "max_rays", every.max_rays ? "" : "unset"},
@@ -87,7 +89,17 @@ std::vector<option_default> defaults() {
           {irradiance, "record_level", text_of(records.record_level)},
           {irradiance, "emitter_rays", records.emitter_rays == 1u << 18 ? "2¹⁸" : ""},
           {irradiance, "cones_per_direction", text_of(records.cones_per_direction)},
-          {irradiance, "albedo", text_of(records.albedo)}};
+          {irradiance, "albedo", text_of(records.albedo)},
+          {paths, "max_vertices", text_of(light.max_vertices)},
+          {paths, "max_beams", text_of(light.max_beams)},
+          {paths, "segment_beams", text_of(light.segment_beams)},
+          {paths, "budget_bytes", light.budget_bytes == std::size_t(1) << 30 ? "1 GiB" : ""},
+          {paths, "surface_points", text_of(light.surface_points)},
+          {paths, "beams", text_of(light.beams)},
+          {paths, "surface_radius", text_of(light.surface_radius)},
+          {paths, "volume_radius", text_of(light.volume_radius)},
+          {paths, "radius_alpha", text_of(light.radius_alpha)},
+          {paths, "beam_paths", light.beam_paths ? "" : "unset"}};
 }
 
 /// The page's row of an option in a section. Empty if there is none.

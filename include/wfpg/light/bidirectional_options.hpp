@@ -47,7 +47,7 @@ struct bidirectional_options {
   bool merges() const { return surface_points || volume_points || beam_points || beams; }
   /// Number of light paths that leave beams. 0 where beams are off.
   std::size_t count_beam_paths() const {
-    if (!beams) return 0;
+    if (!beams) return {};
     return std::min(beam_paths.value_or(std::min<std::size_t>((paths + 63) / 64, 8192)), paths);
   }
 };
