@@ -258,12 +258,13 @@ TEST_CASE("both ends: an emitting box of matter that absorbs nothing has one rad
 // Takes long.
 TEST_CASE("both ends: radiance in an emitting box is right within 0.2%", "[.long][bidirectional][media]") {
   for (const bool solids : {false, true})
-    for (const measured_set& set : all_sets) {
-      const sample_mean found = radiance_of_furnace(set, solids, 30 * set.seeds);
-      INFO(set.techniques << ", solids " << solids << ": " << found.mean() << " +- " << found.error());
-      CHECK(found.error() < 0.001);
-      CHECK(found.mean() == Approx(2.0).epsilon(0.002));
-    }
+    for (const measured_set& set : all_sets)
+      DYNAMIC_SECTION(set.techniques << (solids ? " with" : " without") << " solids") {
+        const sample_mean found = radiance_of_furnace(set, solids, 30 * set.seeds);
+        INFO(found.mean() << " +- " << found.error());
+        CHECK(found.error() < 0.001);
+        CHECK(found.mean() == Approx(2.0).epsilon(0.002));
+      }
 }
 
 TEST_CASE("both ends: each set of techniques has the light of path tracing through media",
