@@ -316,7 +316,7 @@ WFPG_TEST_CASE("photons, beams and what had no memory are counted", "[bidirectio
   CHECK(s.beam_pieces >= beams);
 
   const std::size_t room = 100;
-  options.budget_bytes = room * (sizeof(vertex) + sizeof(std::uint32_t));
+  options.budget_bytes = room * (sizeof(vertex) + 2 * sizeof(std::uint32_t));
   light_of<Exec> small(exec, options);
   follow(exec, small, paths);
   small.build();
@@ -324,7 +324,7 @@ WFPG_TEST_CASE("photons, beams and what had no memory are counted", "[bidirectio
   CHECK(few.vertices == room);
   CHECK(few.dropped_vertices == vertices - room);
   CHECK(few.beams + few.dropped_beams == beams + beyond);
-  CHECK(few.beams == options.budget_bytes / (sizeof(beam) + sizeof(std::uint32_t)));
+  CHECK(few.beams == options.budget_bytes / (sizeof(beam) + 2 * sizeof(std::uint32_t)));
   CHECK(few.surface_photons + few.volume_photons == room);
   CHECK(small.memory().vertices < light.memory().vertices);
   CHECK(small.memory().total() == small.memory().vertices + small.memory().beams + small.memory().maps);

@@ -21,8 +21,8 @@
 //
 // Cost: a scan of paths a depth, and a tree for each photon technique.
 //
-// Memory: sizeof(Vertex) + 16 bytes a vertex, and for each technique of points sizeof(Photon) + 23 a photon.
-// A beam takes sizeof(Beam) + 36 bytes, and 46 for each of its 16 pieces.
+// Memory: sizeof(Vertex) + 20 bytes a vertex, and for each technique of points sizeof(Photon) + 23 a photon.
+// A beam takes sizeof(Beam) + 40 bytes, and 46 for each of its 16 pieces.
 #pragma once
 
 #include <wfpg/base/types.hpp>

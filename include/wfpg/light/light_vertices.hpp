@@ -16,13 +16,15 @@
 //
 // Source: Moonen & Jalba 2023, "Efficient Hardware Acceleration of Robust Volumetric Light Transport
 // Simulation", section 5. Places by a scan, and the budget, are wfpg's own.
-// Cost: one scan of the paths a depth. Memory: sizeof(Vertex) + 4 bytes a vertex, 8 a path.
+// Cost: one scan of the paths a depth. Memory: sizeof(Vertex) + 8 bytes a vertex, 8 a path. On a GPU vertices
+// lie in tiles (exec/tiled_array.hpp), so that loops over indices read them in whole lines.
 #pragma once
 
 #include <wfpg/base/error.hpp>
 #include <wfpg/base/types.hpp>
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/support/thrust.hpp>
+#include <wfpg/exec/tiled_array.hpp>
 
 #include <thrust/scan.h>
 
@@ -44,10 +46,14 @@ class light_vertices_view {
 
   /// Number of paths.
   WFPG_HD std::size_t paths() const { return last_.size(); }
+  /// Most vertices that can be stored.
+  WFPG_HD std::size_t capacity() const { return vertices_.size(); }
   /// Number of vertices stored so far in this iteration.
   WFPG_HD std::uint32_t size() const { return *size_; }
-  /// A stored vertex. Precondition: i < size().
-  WFPG_HD const Vertex& operator[](std::uint32_t i) const { return vertices_[i]; }
+  /// A stored vertex, on a GPU a copy. Precondition: i < size().
+  WFPG_HD typename tiled_view<Vertex>::element operator[](std::uint32_t i) const { return vertices_[i]; }
+  /// The path of a stored vertex. Precondition: i < size().
+  WFPG_HD std::uint32_t path(std::uint32_t i) const { return paths_[i]; }
   /// Index of the vertex before i on its path, or `none`. A vertex that was not stored is left out.
   WFPG_HD std::uint32_t previous(std::uint32_t i) const { return previous_[i]; }
   /// Index of a path's last stored vertex, or `none`.
@@ -62,7 +68,8 @@ class light_vertices_view {
   /// it once for each new vertex after each reserve(), in order, from one thread for each path.
   WFPG_HD void write(std::size_t path, const Vertex& vertex, std::uint32_t which = 0) const {
     const std::uint32_t i = places_[path] + which;
-    vertices_[i] = vertex;
+    vertices_.emplace(i, vertex);
+    paths_[i] = static_cast<std::uint32_t>(path);
     previous_[i] = last_[path];
     last_[path] = i;
   }
@@ -71,12 +78,13 @@ class light_vertices_view {
   template <class Exec, class V>
   friend class light_vertices;
 
-  // By index: vertices, and the index of the one before on its path.
-  array_view<Vertex> vertices_;
-  array_view<std::uint32_t> previous_;
+  // By index: vertices, their paths, and the index of the one before on its path.
+  tiled_view<Vertex> vertices_;
+  array_view<std::uint32_t> paths_, previous_;
   // By path: the index of its last vertex, and of its new one.
   array_view<std::uint32_t> last_, places_;
-  const std::uint32_t* size_ = nullptr;  // in the policy's memory
+  // The number of vertices, in the policy's memory.
+  const std::uint32_t* size_ = nullptr;
 };
 
 namespace detail {
@@ -131,6 +139,7 @@ class light_vertices {
   /// Allocates. Throws out_of_memory, and std::invalid_argument that names an option out of range.
   light_vertices(const Exec& exec, const light_vertices_options& options)
       : vertices_(exec, capacity_of(options)),
+        paths_(exec, vertices_.size()),
         previous_(exec, vertices_.size()),
         last_(exec, options.paths),
         places_(exec, options.paths),
@@ -165,6 +174,7 @@ class light_vertices {
   light_vertices_view<Vertex> view() {
     light_vertices_view<Vertex> v;
     v.vertices_ = vertices_.view();
+    v.paths_ = paths_.view();
     v.previous_ = previous_.view();
     v.last_ = last_.view();
     v.places_ = places_.view();
@@ -182,7 +192,8 @@ class light_vertices {
   }
   /// Bytes allocated, without the scan's temporaries.
   std::size_t bytes() const {
-    return vertices_.bytes() + previous_.bytes() + last_.bytes() + places_.bytes() + counts_.bytes();
+    return vertices_.bytes() + paths_.bytes() + previous_.bytes() + last_.bytes() + places_.bytes() +
+           counts_.bytes();
   }
 
  private:
@@ -193,7 +204,7 @@ class light_vertices {
     require(options.paths < none, "light_vertices_options.paths", options.paths, "less than 2^32 - 1");
     require(options.max_vertices > 0, "light_vertices_options.max_vertices", options.max_vertices,
             "at least 1");
-    const std::size_t fit = options.budget_bytes / (sizeof(Vertex) + sizeof(std::uint32_t));
+    const std::size_t fit = options.budget_bytes / (sizeof(Vertex) + 2 * sizeof(std::uint32_t));
     const std::size_t wanted = options.paths * options.max_vertices;
     const std::size_t capacity = fit < wanted ? fit : wanted;
     require(capacity > 0 || options.paths == 0, "light_vertices_options.budget_bytes", options.budget_bytes,
@@ -201,9 +212,9 @@ class light_vertices {
     return capacity < none ? capacity : std::size_t(none) - 1;
   }
 
-  // As in the view, and the counters above.
-  buffer<Vertex, Exec> vertices_;
-  buffer<std::uint32_t, Exec> previous_, last_, places_, counts_;
+  // By index, as in the view.
+  tiled_array<Vertex, Exec> vertices_;
+  buffer<std::uint32_t, Exec> paths_, previous_, last_, places_, counts_;
 };
 
 }  // namespace wfpg
