@@ -1,0 +1,92 @@
+// Lists of marked indices, compared with lists that are filled in order.
+#include "support/catch.hpp"
+#include "support/evaluate.hpp"
+#include "support/failing_resource.hpp"
+#include "support/policies.hpp"
+
+#include <wfpg/base/math.hpp>
+#include <wfpg/exec/index_list.hpp>
+
+#include <cstdint>
+#include <stdexcept>
+#include <vector>
+
+namespace {
+
+using namespace wfpg_test;
+
+/// Marks one of `period` elements at random.
+struct mark_some {
+  std::uint32_t seed, period;
+  wfpg::array_view<std::uint32_t> marks;
+  WFPG_HD std::uint32_t operator[](std::size_t i) const {
+    return wfpg::hash(seed, i) % period == 0 ? 1u : 0u;
+  }
+  WFPG_HD void operator()(std::size_t i) const { marks[i] = (*this)[i]; }
+};
+
+struct count_calls {
+  wfpg::array_view<std::uint32_t> calls;
+  WFPG_HD void operator()(std::size_t i) const { ++calls[i]; }
+};
+
+}  // namespace
+
+WFPG_TEST_CASE("index lists have the marked elements in ascending order", "[index_list]") {
+  const Exec exec;
+  constexpr std::size_t capacity = 5000;
+  wfpg::index_list<Exec> list(exec, capacity);
+  CHECK(list.capacity() == capacity);
+  CHECK(list.bytes() == 3 * capacity * sizeof(std::uint32_t) + sizeof(std::uint32_t));
+  // Lists forget the ones before. A period of 1 marks all elements.
+  for (const std::size_t n : {capacity, std::size_t(0), std::size_t(1), std::size_t(777)}) {
+    for (const std::uint32_t period : {1u, 2u, 50u, 1000000u}) {
+      const mark_some marks{9, period, list.marks()};
+      exec.for_each(n, marks);
+      list.collect(exec, n);
+      std::vector<std::uint32_t> expected, calls(capacity, 0);
+      for (std::size_t i = 0; i < n; ++i) {
+        if (marks[i] == 0) continue;
+        expected.push_back(static_cast<std::uint32_t>(i));
+        calls[i] = 1;
+      }
+      const std::uint32_t count = wfpg::read_element(exec, list.count().value);
+      REQUIRE(count == expected.size());
+      const wfpg::buffer<std::uint32_t, Exec> called(exec, std::vector<std::uint32_t>(capacity, 0));
+      list.for_each(exec, count_calls{called.view()});
+      CHECK(called.to_host(exec) == calls);
+      std::vector<std::uint32_t> listed(count);
+      exec.copy_to_host(listed.data(), list.indices().data(), count * sizeof(std::uint32_t));
+      CHECK(listed == expected);
+    }
+  }
+}
+
+WFPG_TEST_CASE("index lists are empty before marks are collected", "[index_list]") {
+  const Exec exec;
+  const wfpg::index_list<Exec> list(exec, 40);
+  CHECK(wfpg::read_element(exec, list.count().value) == 0);
+}
+
+TEST_CASE("index lists have fewer than 2^32 elements", "[index_list]") {
+  CHECK_THROWS_AS(wfpg::index_list<wfpg::exec::seq>(wfpg::exec::seq(), std::size_t(1) << 32),
+                  std::invalid_argument);
+}
+
+WFPG_TEST_CASE("index lists free what they have where memory runs out", "[index_list]") {
+  failing_resource resource;
+  const Exec exec = Exec().with_resource(&resource);
+  std::size_t failures = 0;
+  for (std::size_t k = 1;; ++k) {
+    resource.fail_at(k);
+    const bool out = runs_out(resource, [&] {
+      wfpg::index_list<Exec> list(exec, 100);
+      exec.for_each(100, mark_some{1, 2, list.marks()});
+      list.collect(exec, 100);
+    });
+    CHECK(resource.live() == 0);
+    if (!out) break;
+    ++failures;
+  }
+  CHECK(failures >= 4);
+}
