@@ -8,6 +8,7 @@
 #pragma once
 
 #include "tracer/connection_kernels.hpp"
+#include "tracer/connection_list.hpp"
 #include "tracer/light_kernels.hpp"
 #include "tracer/merge_kernels.hpp"
 #include "tracer/path_film.hpp"
@@ -16,6 +17,7 @@
 #include "tracer/unguided.hpp"
 #include "tracer/wavefront.hpp"
 
+#include <wfpg/exec/index_list.hpp>
 #include <wfpg/host/ray_caster.hpp>
 #include <wfpg/light/bidirectional.hpp>
 
@@ -42,9 +44,13 @@ class bidirectional_tracer {
         paths_(exec, count_),
         vertices_(exec, count_),
         keeps_(exec, count_),
+        active_(exec, count_),
+        joined_(exec, count_),
         radiance_(exec, count_),
         splats_(exec, count_, count_),
         light_(exec, light_of(settings, world.next_event)),
+        connections_(exec, settings.techniques.has(technique::connect) ? stored().capacity() : 0,
+                     settings.max_depth),
         around_camera_(exec, std::vector<solid_stack>(1)),
         around_lights_(exec,
                        std::vector<solid_stack>(world.scene.has_solids ? world.lights.lights.size() : 0)),
@@ -85,7 +91,7 @@ class bidirectional_tracer {
   /// Vertices and beams of light paths that had no memory, over all samples. Their light is missing.
   std::uint64_t dropped() const { return dropped_; }
   /// Bytes of the vertices and beams of light paths, and of the maps over them.
-  std::size_t light_bytes() const { return light_.memory().total(); }
+  std::size_t light_bytes() const { return light_.memory().total() + connections_.bytes(); }
   const named_seconds& seconds() const { return clock_.seconds(); }
 
  private:
@@ -113,31 +119,48 @@ class bidirectional_tracer {
     return distance > 0.0f ? distance : 1.0f;
   }
 
+  wfpg::light_vertices_view<subpath_vertex> stored() { return light_.gather().vertices(); }
   found_light found() { return by_technique_.found(radiance_.view()); }
 
   void follow_light(const pinhole& camera) {
+    connections_.begin();
     clock_.measure("light paths", [&] {
-      exec_.for_each(count_, start_light_paths<world_type>{world_, around_lights_.view(), paths_.view()});
+      exec_.for_each(count_, start_light_paths<world_type>{world_, around_lights_.view(), paths_.view(),
+                                                           active_.marks()});
+      active_.collect(exec_, count_);
     });
     for (std::uint32_t segments = 1; segments < settings_.max_depth; ++segments) {
-      clock_.measure("light paths", [&] {
-        exec_.for_each(count_, trace_light_paths<world_type>{
-                                   world_, segments, paths_.view(), vertices_.view(), keeps_.view(),
-                                   light_.light_recorder(), film_.segment_counts()});
-        light_.reserve(keeps_.view());
-        const bool is_last = segments + 1 == settings_.max_depth;
-        exec_.for_each(count_, extend_light_paths<world_type>{
-                                   world_, camera, is_last, paths_.view(), vertices_.view(), keeps_.view(),
-                                   light_.light_recorder(), splats_.view(), by_technique_.splats()});
-      });
-      clock_.measure("splats", [&] {
-        if (!settings_.techniques.has(technique::splat)) return;
-        const float scale = 1.0f / static_cast<float>(count_);
-        splats_.add_to(exec_, radiance_.view(), scale);
-        by_technique_.add_splats(scale);
-      });
+      clock_.measure("light paths", [&] { trace_light(segments); });
+      if (settings_.techniques.has(technique::splat)) splat_light(camera);
+      clock_.measure("light paths", [&] { extend_light(segments); });
     }
     by_technique_.take_splats(radiance_);
+  }
+
+  void trace_light(std::uint32_t segments) {
+    exec_.fill_bytes(keeps_.data(), 0, keeps_.bytes());
+    active_.for_each(exec_, trace_light_paths<world_type>{world_, segments, paths_.view(), vertices_.view(),
+                                                          active_.marks(), keeps_.view(),
+                                                          light_.light_recorder(), film_.segment_counts()});
+    light_.reserve(keeps_.view());
+  }
+
+  void splat_light(const pinhole& camera) {
+    clock_.measure("splats", [&] {
+      active_.for_each(exec_, splat_light_paths<world_type>{world_, camera, vertices_.view(), keeps_.view(),
+                                                            splats_.view(), by_technique_.splats()});
+      const float scale = 1.0f / static_cast<float>(count_);
+      splats_.add_to(exec_, radiance_.view(), scale);
+      by_technique_.add_splats(scale);
+    });
+  }
+
+  void extend_light(std::uint32_t segments) {
+    const bool is_last = segments + 1 == settings_.max_depth;
+    active_.for_each(exec_, extend_light_paths<world_type>{world_, is_last, paths_.view(), vertices_.view(),
+                                                           active_.marks(), light_.light_recorder()});
+    active_.collect(exec_, count_);
+    connections_.end_segment(stored(), segments);
   }
 
   void follow_camera(const pinhole& camera) {
@@ -145,8 +168,9 @@ class bidirectional_tracer {
       if (world_.scene.has_solids)
         exec_.for_each(1, find_camera_solids<Caster, pinhole>{world_.scene, world_.caster, camera,
                                                               around_camera_.view()});
-      exec_.for_each(count_,
-                     start_camera_paths<world_type>{world_, camera, around_camera_.view(), paths_.view()});
+      exec_.for_each(count_, start_camera_paths<world_type>{world_, camera, around_camera_.view(),
+                                                            paths_.view(), active_.marks()});
+      active_.collect(exec_, count_);
     });
     const bool merges =
         settings_.techniques.has(technique::pb2d) || settings_.techniques.has(technique::bb1d);
@@ -158,37 +182,39 @@ class bidirectional_tracer {
           trace_camera<false>(segments);
       });
       if (segments == settings_.max_depth) break;
-      join_camera_paths();
+      join_camera_paths(segments);
+      clock_.measure("shade", [&] {
+        active_.for_each(
+            exec_, extend_camera_paths<world_type>{world_, paths_.view(), vertices_.view(), active_.marks()});
+        active_.collect(exec_, count_);
+      });
     }
   }
 
-  void join_camera_paths() {
-    const tiled_view<subpath> paths = paths_.view();
+  void join_camera_paths(std::uint32_t segments) {
     const tiled_view<subpath_vertex> vertices = vertices_.view();
     const wfpg::path_techniques& counts = world_.techniques;
     if (counts.next_event > 0.0f)
       clock_.measure("lights", [&] {
-        exec_.for_each(count_, sample_lights<world_type>{world_, paths, vertices, found()});
+        joined_.for_each(exec_, sample_lights<world_type>{world_, vertices, found()});
       });
     if (counts.connections > 0.0f)
-      clock_.measure("connections", [&] {
-        exec_.for_each(
-            count_, connect_paths<world_type>{world_, paths, vertices, light_.gather().vertices(), found()});
-      });
+      clock_.measure("connections",
+                     [&] { connections_.connect(world_, segments, vertices, stored(), joined_, found()); });
     if (counts.surface_points > 0.0f || counts.volume_points > 0.0f)
       clock_.measure("merges", [&] {
-        exec_.for_each(count_, merge_vertices<world_type>{world_, paths, vertices, light_.gather(), found()});
+        joined_.for_each(exec_, merge_vertices<world_type>{world_, vertices, light_.gather(), found()});
       });
-    clock_.measure("shade", [&] {
-      exec_.for_each(count_, extend_camera_paths<world_type>{world_, paths, vertices});
-    });
   }
 
   template <bool merges>
   void trace_camera(std::uint32_t segments) {
-    exec_.for_each(count_, trace_camera_paths<world_type, merges>{
-                               world_, segments, paths_.view(), vertices_.view(), light_.gather(), found(),
-                               film_.segment_counts(), film_.light_hit_counts()});
+    exec_.fill_bytes(joined_.marks().data(), 0, count_ * sizeof(std::uint32_t));
+    active_.for_each(exec_,
+                     trace_camera_paths<world_type, merges>{
+                         world_, segments, paths_.view(), vertices_.view(), active_.marks(), joined_.marks(),
+                         light_.gather(), found(), film_.segment_counts(), film_.light_hit_counts()});
+    joined_.collect(exec_, count_);
   }
 
   Exec exec_;
@@ -198,9 +224,12 @@ class bidirectional_tracer {
   tiled_array<subpath, Exec> paths_;
   tiled_array<subpath_vertex, Exec> vertices_;
   wfpg::buffer<std::uint32_t, Exec> keeps_;
+  wfpg::index_list<Exec> active_;  // paths that go on
+  wfpg::index_list<Exec> joined_;  // camera paths whose last vertex can be joined with others
   wfpg::buffer<vec3, Exec> radiance_;
   wfpg::splats<Exec> splats_;
   wfpg::bidirectional<Exec, subpath_vertex, photon, light_beam> light_;
+  connection_list<Exec> connections_;
   wfpg::buffer<solid_stack, Exec> around_camera_;
   wfpg::buffer<solid_stack, Exec> around_lights_;  // by the lights' columns; empty where there are no solids
   path_film<Exec> film_;

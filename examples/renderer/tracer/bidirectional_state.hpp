@@ -17,12 +17,8 @@ namespace render {
 
 /// A light or camera path between two vertices.
 struct subpath {
-  /// Where a path comes from: it has ended, it scattered in a medium, or it left a surface, a light or the
-  /// camera.
-  enum class origin_kind : std::uint32_t { ended, medium, other };
-
-  vec3 origin{0.0f};  ///< of the next segment
-  origin_kind from = origin_kind::ended;
+  vec3 origin{0.0f};              ///< of the next segment
+  std::uint32_t from_medium = 0;  ///< 1: the path scattered in a medium there
   vec3 direction{0.0f, 0.0f, 1.0f};
   float begun_luminance = 1.0f;  ///< of the throughput when the path began
   vec3 throughput{1.0f};         ///< with roulette
@@ -33,14 +29,12 @@ struct subpath {
   WFPG_HD subpath(const wfpg::ray& begun, vec3 carries, const wfpg::subpath_weights& begun_weights,
                   const solid_stack& around)
       : origin(begun.origin),
-        from(origin_kind::other),
         direction(begun.direction),
         begun_luminance(wfpg::luminance(carries)),
         throughput(carries),
         weights(begun_weights),
         solids(around) {}
 
-  WFPG_HD bool is_active() const { return from != origin_kind::ended; }
   WFPG_HD wfpg::ray ray() const { return ray_along(origin, direction); }
 };
 
@@ -109,6 +103,8 @@ struct subpath_vertex {
 
   WFPG_HD vec3 position() const { return at.position; }
   WFPG_HD bool in_medium() const { return extinction > 0.0f; }
+  /// Whether nothing can be joined with it.
+  WFPG_HD bool is_delta() const { return !in_medium() && is_smooth(at.kind); }
   /// Of a medium that scatters, at least 1e-30, so that it tells a vertex in a medium.
   WFPG_HD static float mean_extinction(const medium& around) {
     const vec3 sigma = around.extinction();
@@ -241,7 +237,7 @@ struct bidirectional_world {
     s.throughput = path.throughput;
     s.solids = path.solids;
     hit_surface found;
-    const bool from_medium = path.from == subpath::origin_kind::medium;
+    const bool from_medium = path.from_medium != 0;
     const segment_end end = follow_segment(scene, caster, path.ray(), from_medium, s, found, visitor);
     if (end == segment_end::surface)
       vertex = subpath_vertex(found, s, segments, weights_at(path, s, arrival_cosine(path, found)));
@@ -320,7 +316,7 @@ struct bidirectional_world {
     if (!(wfpg::luminance(weight) > 0.0f)) return false;
     path = subpath(ray_along(vertex.leave_along(direction), direction), vertex.throughput * weight,
                    vertex.weights.depart(techniques, to), vertex.solids_along(scene, direction));
-    if (f.in_medium) path.from = subpath::origin_kind::medium;
+    path.from_medium = f.in_medium ? 1 : 0;
     return true;
   }
 };

@@ -13,23 +13,27 @@ struct start_camera_paths {
   pinhole camera;
   wfpg::array_view<const solid_stack> around_camera;
   tiled_view<subpath> paths;
+  wfpg::array_view<std::uint32_t> active;  ///< receives 1
 
   WFPG_HD void operator()(std::size_t i) const {
     const auto pixel = static_cast<std::uint32_t>(i);
     const wfpg::ray ray = camera.through(pixel, world.random(pixel, dimension::pixel));
     paths.emplace(i, ray, vec3(1.0f), wfpg::subpath_weights::from_camera(camera.pdf(ray.direction)),
                   around_camera[0]);
+    active[i] = 1;
   }
 };
 
-/// Finds the next vertex of each camera path, and adds its emission with its weight. `merges`: whether the
-/// path's segments are merged with photons along them.
+/// Finds the next vertex of an active camera path, and adds its emission with its weight. `merges`: whether
+/// the path's segments are merged with photons along them.
 template <class World, bool merges>
 struct trace_camera_paths {
   World world;
   std::uint32_t segments;  ///< of the paths, with this one
   tiled_view<subpath> paths;
   tiled_view<subpath_vertex> vertices;
+  wfpg::array_view<std::uint32_t> active;  ///< receives 0 where the path ends
+  wfpg::array_view<std::uint32_t> joins;   ///< 1: the vertex can be joined with others; 0 before
   photon_gather photons;
   found_light found;
   wfpg::array_view<std::uint32_t> segment_counts;
@@ -37,12 +41,14 @@ struct trace_camera_paths {
 
   WFPG_HD void operator()(std::size_t i) const {
     const subpath path = paths[i];
-    if (!path.is_active()) return;
     ++segment_counts[i];
     subpath_vertex vertex;
     visitor ahead{world.passer_of(static_cast<std::uint32_t>(i), segments, 0), *this, i, path};
-    if (!world.arrive(path, segments, vertex, ahead) || segments == world.max_depth) return paths.emplace(i);
+    active[i] = 0;
+    if (!world.arrive(path, segments, vertex, ahead) || segments == world.max_depth) return;
+    active[i] = 1;
     vertices.emplace(i, vertex);
+    joins[i] = vertex.is_delta() ? 0 : 1;
   }
 
  private:
@@ -96,20 +102,17 @@ struct trace_camera_paths {
   }
 };
 
-/// Adds what the vertices of camera paths find by light samples.
+/// Adds what the vertex of a camera path finds by light samples.
 template <class World>
 struct sample_lights {
   World world;
-  tiled_view<subpath> paths;
   tiled_view<subpath_vertex> vertices;
   found_light found;
 
   WFPG_HD void operator()(std::size_t i) const {
-    if (!paths[i].is_active()) return;
     const subpath_vertex vertex = vertices[i];
     const scatterer f = vertex.seen_from(vertex.at.outgoing);
-    if (!f.is_delta())
-      found.add(i, technique::nee, sample_light(static_cast<std::uint32_t>(i), vertex, f), vertex.throughput);
+    found.add(i, technique::nee, sample_light(static_cast<std::uint32_t>(i), vertex, f), vertex.throughput);
   }
 
  private:
@@ -135,64 +138,122 @@ struct sample_lights {
   }
 };
 
-/// Adds what the vertices of camera paths find by connections with their light paths.
-template <class World>
-struct connect_paths {
-  World world;
-  tiled_view<subpath> paths;
-  tiled_view<subpath_vertex> vertices;
-  wfpg::light_vertices_view<subpath_vertex> stored;
-  found_light found;
+/// What a connection finds.
+struct connection {
+  vec3 value{0.0f};     ///< what light it brings, without its weight
+  float weight = 0.0f;  ///< 0: it finds none
 
-  WFPG_HD void operator()(std::size_t i) const {
-    if (!paths[i].is_active()) return;
-    const subpath_vertex vertex = vertices[i];
-    const scatterer f = vertex.seen_from(vertex.at.outgoing);
-    if (!f.is_delta()) found.add(i, technique::connect, connect_all(i, vertex, f), vertex.throughput);
-  }
+  connection() = default;
+  WFPG_HD connection(vec3 brings, float weighted) : value(brings), weight(weighted) {}
+};
 
- private:
-  WFPG_HD technique_sum connect_all(std::size_t i, const subpath_vertex& vertex, const scatterer& f) const {
-    technique_sum sum;
-    for (std::uint32_t k = stored.last(i); k != stored.none; k = stored.previous(k)) {
-      const subpath_vertex& light = stored[k];
-      if (light.segments + vertex.segments < world.max_depth) connect(vertex, f, light, sum);
-    }
-    return sum;
-  }
+static_assert(sizeof(connection) == 16, "kernels access it in one piece");
 
-  WFPG_HD void connect(const subpath_vertex& camera, const scatterer& f, const subpath_vertex& light,
-                       technique_sum& sum) const {
-    const vec3 way = light.at.position - camera.at.position;
-    const float distance = glm::length(way);
-    if (!(distance > 0.0f)) return;
+/// The two ends of a connection, and the way between them.
+struct connection_ends {
+  const subpath_vertex& camera;
+  const subpath_vertex& light;
+  scatterer f;  ///< at the camera path's vertex
+  vec3 way;     ///< from there to the light path's vertex
+  float distance;
+
+  WFPG_HD connection_ends(const subpath_vertex& of_camera, const subpath_vertex& of_light)
+      : camera(of_camera),
+        light(of_light),
+        f(of_camera.seen_from(of_camera.at.outgoing)),
+        way(of_light.at.position - of_camera.at.position),
+        distance(glm::length(way)) {}
+
+  /// What the connection brings if nothing is between its ends.
+  WFPG_HD vec3 value() const {
+    if (!(distance > 0.0f)) return vec3(0.0f);
     const vec3 toward = way / distance;
-    const vec3 value = f.eval_rgb(camera.at.outgoing, toward) * light.scattered_flux(-toward) *
-                       light.throughput / (distance * distance);
-    if (!(wfpg::luminance(value) > 0.0f)) return;
-    const clear_way clear = world.way_between(camera, light.leave_along(-way), light.in_medium());
-    if (clear.transmittance == vec3(0.0f)) return;
-    const wfpg::path_edge edge{distance, clear.pdf.back, clear.pdf.there};
+    return f.eval_rgb(camera.at.outgoing, toward) * light.scattered_flux(-toward) * light.throughput /
+           (distance * distance);
+  }
+  WFPG_HD float weight(const wfpg::path_techniques& techniques, const way_densities& pdf) const {
+    const vec3 toward = way / distance;
+    const wfpg::path_edge edge{distance, pdf.back, pdf.there};
     const wfpg::path_departure to_camera = light.leave(light.seen_from(light.at.outgoing), -toward);
-    sum.add(value * clear.transmittance, light.weights.connection(world.techniques, to_camera, camera.weights,
-                                                                  camera.leave(f, toward), edge));
+    return light.weights.connection(techniques, to_camera, camera.weights, camera.leave(f, toward), edge);
   }
 };
 
-/// Adds what the vertices of camera paths find by merges.
+/// The connections of camera paths' vertices with all vertices of their light paths. An element a stored
+/// vertex of light paths: that with the camera path of the same index.
+struct path_connections {
+  tiled_view<subpath_vertex> vertices;  ///< of camera paths
+  wfpg::light_vertices_view<subpath_vertex> stored;
+  tiled_view<connection> found;  ///< by stored vertex
+};
+
+/// Evaluates connections without what is between their ends. An index is a stored vertex.
+struct evaluate_connections {
+  path_connections connections;
+  wfpg::array_view<const std::uint32_t> joins;  ///< by path: 1 where the camera path's vertex can be joined
+  wfpg::array_view<std::uint32_t> marks;        ///< receives 1 where light may come, else 0
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const auto k = static_cast<std::uint32_t>(i);
+    const std::uint32_t path = connections.stored.path(k);
+    marks[i] = 0;
+    if (joins[path] == 0) return;
+    const subpath_vertex& camera = connections.vertices[path];
+    const subpath_vertex& light = connections.stored[k];
+    const vec3 value = connection_ends(camera, light).value();
+    if (!(wfpg::luminance(value) > 0.0f)) return connections.found.emplace(i);
+    marks[i] = 1;
+    connections.found.emplace(i, value, 0.0f);
+  }
+};
+
+/// Looks what is between the ends of connections, and weights them. An index is a stored vertex.
+template <class World>
+struct join_connections {
+  World world;
+  path_connections connections;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const auto k = static_cast<std::uint32_t>(i);
+    const subpath_vertex& camera = connections.vertices[connections.stored.path(k)];
+    const subpath_vertex& light = connections.stored[k];
+    const connection_ends ends(camera, light);
+    const clear_way clear = world.way_between(camera, light.leave_along(-ends.way), light.in_medium());
+    if (clear.transmittance == vec3(0.0f)) return connections.found.emplace(i);
+    connections.found.emplace(i, connections.found[i].value * clear.transmittance,
+                              ends.weight(world.techniques, clear.pdf));
+  }
+};
+
+/// Adds what the connections of a camera path's vertex have found, in the order of its light path.
+struct add_connections {
+  path_connections connections;
+  std::uint32_t size;  ///< stored vertices that are connected: those with a smaller index
+  found_light found;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const auto& stored = connections.stored;
+    technique_sum sum;
+    for (std::uint32_t k = stored.last(i); k != stored.none; k = stored.previous(k)) {
+      if (k >= size) continue;
+      const connection one = connections.found[k];
+      sum.add(one.value, one.weight);
+    }
+    found.add(i, technique::connect, sum, connections.vertices[i].throughput);
+  }
+};
+
+/// Adds what the vertex of a camera path finds by merges.
 template <class World>
 struct merge_vertices {
   World world;
-  tiled_view<subpath> paths;
   tiled_view<subpath_vertex> vertices;
   photon_gather photons;
   found_light found;
 
   WFPG_HD void operator()(std::size_t i) const {
-    if (!paths[i].is_active()) return;
     const subpath_vertex vertex = vertices[i];
     const scatterer f = vertex.seen_from(vertex.at.outgoing);
-    if (f.is_delta()) return;
     const merge_at_vertex<World> merge{world, photons, vertex, f};
     if (f.in_medium)
       found.add(i, technique::pp3d, merge.in_medium(), vertex.throughput);
@@ -201,20 +262,21 @@ struct merge_vertices {
   }
 };
 
-/// Continues camera paths from their vertices.
+/// Continues an active camera path from its vertex.
 template <class World>
 struct extend_camera_paths {
   World world;
   tiled_view<subpath> paths;
   tiled_view<subpath_vertex> vertices;
+  wfpg::array_view<std::uint32_t> active;  ///< 1 where there is a vertex; receives 0 where the path ends
 
   WFPG_HD void operator()(std::size_t i) const {
+    if (active[i] == 0) return;
     subpath next = paths[i];
-    if (!next.is_active()) return;
     if (world.extend(vertices[i], static_cast<std::uint32_t>(i), false, 0, next))
       paths.emplace(i, next);
     else
-      paths.emplace(i);
+      active[i] = 0;
   }
 };
 

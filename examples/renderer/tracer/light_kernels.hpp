@@ -27,12 +27,15 @@ struct start_light_paths {
   World world;
   wfpg::array_view<const solid_stack> around_lights;  ///< empty: there are no solids
   tiled_view<subpath> paths;
+  wfpg::array_view<std::uint32_t> active;  ///< receives 1 for a path that begins, else 0
 
   WFPG_HD void operator()(std::size_t i) const {
     const auto id = static_cast<std::uint32_t>(i);
+    active[i] = 0;
     const emitted_ray emitted = world.lights.emit(
         world.scene, [&](std::uint32_t use) { return world.random(id, light_path_dimensions + use); });
-    if (!(wfpg::luminance(emitted.throughput) > 0.0f)) return paths.emplace(i);
+    if (!(wfpg::luminance(emitted.throughput) > 0.0f)) return;
+    active[i] = 1;
     paths.emplace(i, emitted.ray, emitted.throughput,
                   wfpg::subpath_weights::from_light(world.techniques, emitted.source),
                   around_lights.empty() ? solid_stack() : around_lights[emitted.light]);
@@ -42,28 +45,29 @@ struct start_light_paths {
 /// Stores a sample's light paths.
 using path_recorder = wfpg::light_recorder_view<subpath_vertex, light_beam>;
 
-/// Finds the next vertex of each light path, and the beams on its way.
+/// Finds the next vertex of an active light path, and the beams on its way.
 template <class World>
 struct trace_light_paths {
   World world;
   std::uint32_t segments;  ///< of the paths, with this one
   tiled_view<subpath> paths;
   tiled_view<subpath_vertex> vertices;
-  wfpg::array_view<std::uint32_t> keeps;  ///< 1: the vertex can be connected
+  wfpg::array_view<std::uint32_t> active;  ///< receives 0 where the path ends
+  wfpg::array_view<std::uint32_t> keeps;   ///< 1: the vertex can be connected; 0 before
   path_recorder recorder;
   wfpg::array_view<std::uint32_t> segment_counts;
 
   WFPG_HD void operator()(std::size_t i) const {
-    keeps[i] = 0;
     const subpath path = paths[i];
-    if (!path.is_active()) return;
     ++segment_counts[i];
     subpath_vertex vertex;
     visitor ahead{world.passer_of(static_cast<std::uint32_t>(i), segments, light_path_dimensions), *this, i,
                   path};
-    if (!world.arrive(path, segments, vertex, ahead)) return paths.emplace(i);
+    active[i] = 0;
+    if (!world.arrive(path, segments, vertex, ahead)) return;
+    active[i] = 1;
     vertices.emplace(i, vertex);
-    keeps[i] = vertex.seen_from(vertex.at.outgoing).is_delta() ? 0u : 1u;
+    keeps[i] = vertex.is_delta() ? 0u : 1u;
   }
 
  private:
@@ -83,35 +87,19 @@ struct trace_light_paths {
   };
 };
 
-/// Stores the new vertices that have a place, connects all new ones to the camera, and continues the paths.
+/// Connects the new vertex of an active light path to the camera.
 template <class World>
-struct extend_light_paths {
+struct splat_light_paths {
   World world;
   pinhole camera;
-  bool is_last;  ///< paths end here
-  tiled_view<subpath> paths;
   tiled_view<subpath_vertex> vertices;
   wfpg::array_view<const std::uint32_t> keeps;
-  path_recorder recorder;
   wfpg::splat_view splats;
   wfpg::splat_view plain_splats;  ///< without weights; of no paths, where nobody asks for them
 
   WFPG_HD void operator()(std::size_t i) const {
-    if (!paths[i].is_active()) return;
-    const subpath_vertex vertex = vertices[i];
-    if (keeps[i] != 0) {
-      if (recorder.has_place(i)) recorder.write(i, vertex);
-      if (world.techniques.splats > 0.0f) splat(i, vertex);
-    }
-    subpath next = paths[i];
-    if (!is_last && world.extend(vertex, static_cast<std::uint32_t>(i), true, light_path_dimensions, next))
-      paths.emplace(i, next);
-    else
-      paths.emplace(i);
-  }
-
- private:
-  WFPG_HD void splat(std::size_t i, const subpath_vertex& vertex) const {
+    if (keeps[i] == 0) return;
+    const subpath_vertex& vertex = vertices[i];
     const vec3 to_camera = camera.position() - vertex.at.position;
     const float distance = glm::length(to_camera);
     if (!(distance > 0.0f)) return;
@@ -128,6 +116,29 @@ struct extend_light_paths {
     const vec3 found = value * way.transmittance;
     splats.add(i, pixel, found * vertex.weights.splat(world.techniques, vertex.leave(f, toward), pdf, edge));
     if (plain_splats.size() > 0) plain_splats.add(i, pixel, found);
+  }
+};
+
+/// Stores the new vertex of an active light path where it has a place, and continues the path.
+template <class World>
+struct extend_light_paths {
+  World world;
+  bool is_last;  ///< paths end here
+  tiled_view<subpath> paths;
+  tiled_view<subpath_vertex> vertices;
+  wfpg::array_view<std::uint32_t> active;  ///< 1 where there is a vertex; receives 0 where the path ends
+  path_recorder recorder;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    if (active[i] == 0) return;
+    const subpath_vertex vertex = vertices[i];
+    if (recorder.has_place(i)) recorder.write(i, vertex);
+    active[i] = 0;
+    if (is_last) return;
+    subpath next = paths[i];
+    if (!world.extend(vertex, static_cast<std::uint32_t>(i), true, light_path_dimensions, next)) return;
+    paths.emplace(i, next);
+    active[i] = 1;
   }
 };
 
