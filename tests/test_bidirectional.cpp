@@ -150,8 +150,8 @@ bidirectional_options all_techniques() {
   options.max_vertices = depths;
   options.max_beams = 64;
   options.volume_points = options.beam_points = options.beams = true;
-  options.surface_radius = 0.15f;
-  options.volume_radius = 0.1f;
+  options.radii.surface = 0.15f;
+  options.radii.volume = 0.1f;
   options.beam_paths = beam_paths;
   return options;
 }
@@ -199,7 +199,7 @@ std::vector<sums> expected(const random_paths& paths, const bidirectional_statis
     const auto count = static_cast<float>(light_paths);
     const auto add = [&](float& sum, float flux, const wfpg::merge_geometry& at, float number) {
       if (at.kernel > 0.0f)
-        sum += term(flux, {at.kernel / (number * at.sine), at.t_camera, at.t_light, at.sine});
+        sum += term(flux, {at.kernel / (number * at.sine), at.t_camera, at.t_light, at.sine, 0});
     };
     for (std::size_t path = 0; path < light_paths; ++path)
       for (std::uint32_t depth = 0; depth < depths; ++depth) {
@@ -209,11 +209,11 @@ std::vector<sums> expected(const random_paths& paths, const bidirectional_statis
           const auto constant = merge_kernel::constant, smooth = merge_kernel::epanechnikov;
           const vec3 p = where.points[i];
           if (v.inside) {
-            add(all[i].in_medium, v.flux, wfpg::point_merge<3>(constant, p, v.at, s.volume_radius), count);
+            add(all[i].in_medium, v.flux, wfpg::point_merge<3>(constant, p, v.at, s.radii.volume), count);
             add(all[i].points_along, v.flux,
-                wfpg::beam_point_merge(smooth, where.cameras[i], v.at, s.beam_point_radius), count);
+                wfpg::beam_point_merge(smooth, where.cameras[i], v.at, s.radii.beam_points), count);
           } else {
-            add(all[i].on_surface, v.flux, wfpg::point_merge<2>(constant, p, v.at, s.surface_radius), count);
+            add(all[i].on_surface, v.flux, wfpg::point_merge<2>(constant, p, v.at, s.radii.surface), count);
           }
           if (path == i) all[i].chain += v.flux;
         }
@@ -221,7 +221,7 @@ std::vector<sums> expected(const random_paths& paths, const bidirectional_statis
              ++k) {
           const beam b = paths.beam_of(path, depth, k);
           add(all[i].beams_along, b.flux,
-              wfpg::beam_beam_merge(merge_kernel::epanechnikov, where.cameras[i], b.beam, s.beam_radius),
+              wfpg::beam_beam_merge(merge_kernel::epanechnikov, where.cameras[i], b.beam, s.radii.beams),
               static_cast<float>(beam_paths));
         }
       }
@@ -345,20 +345,20 @@ TEST_CASE("counts of techniques follow from radii and numbers of paths", "[bidir
     light.begin_iteration(iteration, size);
     const bidirectional_statistics s = light.statistics();
     const double shrunk = std::log(double(iteration)) * -0.5;  // of the area, the volume, the length
-    CHECK(double(s.surface_radius) == Approx(0.15 * 3.0 * std::exp(shrunk / 2.0)));
-    CHECK(double(s.volume_radius) == Approx(0.1 * 3.0 * std::exp(shrunk / 3.0)));
-    CHECK(double(s.beam_point_radius) == Approx(0.1 * 3.0 * std::exp(shrunk / 2.0)));
-    CHECK(double(s.beam_radius) == Approx(0.1 * 3.0 * std::exp(shrunk)));
+    CHECK(double(s.radii.surface) == Approx(0.15 * 3.0 * std::exp(shrunk / 2.0)));
+    CHECK(double(s.radii.volume) == Approx(0.1 * 3.0 * std::exp(shrunk / 3.0)));
+    CHECK(double(s.radii.beam_points) == Approx(0.1 * 3.0 * std::exp(shrunk / 2.0)));
+    CHECK(double(s.radii.beams) == Approx(0.1 * 3.0 * std::exp(shrunk)));
     const wfpg::path_techniques& t = light.techniques();
     const double pi = 3.14159265358979, n = light_paths;
     CHECK(t.light_hits == 1.0f);
     CHECK(t.next_event == 1.0f);
     CHECK(t.connections == 1.0f);
     CHECK(double(t.splats) == n);
-    CHECK(double(t.surface_points) == Approx(n * pi * std::pow(double(s.surface_radius), 2.0)));
-    CHECK(double(t.volume_points) == Approx(n * pi * 4.0 / 3.0 * std::pow(double(s.volume_radius), 3.0)));
-    CHECK(double(t.beam_points) == Approx(n * pi * std::pow(double(s.beam_point_radius), 2.0)));
-    CHECK(double(t.beams) == Approx(beam_paths * 2.0 * double(s.beam_radius)));
+    CHECK(double(t.surface_points) == Approx(n * pi * std::pow(double(s.radii.surface), 2.0)));
+    CHECK(double(t.volume_points) == Approx(n * pi * 4.0 / 3.0 * std::pow(double(s.radii.volume), 3.0)));
+    CHECK(double(t.beam_points) == Approx(n * pi * std::pow(double(s.radii.beam_points), 2.0)));
+    CHECK(double(t.beams) == Approx(beam_paths * 2.0 * double(s.radii.beams)));
   }
   CHECK(bidirectional_options().count_beam_paths() == 0);
   options.beam_paths.reset();

@@ -4,6 +4,7 @@
 #include "app/option_names.hpp"
 #include "app/output_files.hpp"
 #include "app/progress_bar.hpp"
+#include "both_ends_page.hpp"
 #include "numbers.hpp"
 #include "octree_pictures.hpp"
 #include "octree_vdb.hpp"
@@ -22,12 +23,20 @@ namespace {
 void check(const inspection& asked) {
   using wfpg::require;
   const render::render_options& options = asked.learning;
-  require_fields(options);
+  const std::string& method = render::name_of(render::method_names(), options.method);
+  const bool has_fields = render::is_wfpg(options.method);
+  require(has_fields || render::is_bidirectional(options.method), "method", method,
+          "wfpg or wfpg-product, which have fields to look at, or bpt, vcm, upbp or lt, which have photons");
+  if (has_fields) require_fields(options);
+  require(options.where == render::device::cpu, "device",
+          render::name_of(render::device_names(), options.where), "cpu: paths are looked at in its memory");
   const auto range = [](int side) { return "0 to " + std::to_string(side - 1); };
   require(asked.x >= 0 && asked.x < options.width, "pixel's x", asked.x, range(options.width).c_str());
   require(asked.y >= 0 && asked.y < options.height, "pixel's y", asked.y, range(options.height).c_str());
   require(asked.reference_spp >= 2, "reference_spp", asked.reference_spp, "at least 2");
   require(asked.histogram >= 1, "histogram", asked.histogram, "at least 1");
+  require(asked.sample >= 0 && (options.seconds > 0.0 || asked.sample <= options.spp), "sample", asked.sample,
+          ("1 to " + std::to_string(options.spp)).c_str());
   if (!asked.vdb.empty()) require_vdb();
 }
 
@@ -56,14 +65,6 @@ double greatest_of(const std::vector<double>& values) {
   return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
 }
 
-float exposure_of(const render::image& picture) {
-  std::vector<float> values;
-  for (const vec3& pixel : picture.pixels) values.push_back(wfpg::luminance(pixel));
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle > 0.0f && std::isfinite(*middle) ? 0.25f / *middle : 1.0f;
-}
-
 /// Adds the picture so far, and the octree at its pixels.
 void show_octree(const learnt_scene& learnt, const inspection& asked, const picture_folder& folder,
                  page& shown) {
@@ -71,15 +72,12 @@ void show_octree(const learnt_scene& learnt, const inspection& asked, const pict
   const auto write = [&](const std::string& name, const std::string& caption, const render::image& picture) {
     return folder.write(name, caption, marked(picture, asked.x, asked.y));
   };
-  render::image exposed = rendered;
-  const float exposure = exposure_of(rendered);
-  for (vec3& pixel : exposed.pixels) pixel *= exposure;
   const exitance_pictures exitance = exitance_of(learnt);
   const auto radiance = colour_scale::logarithmic(exitance.greatest, "W/(m² sr), luminance");
   shown.sections.push_back({"The picture",
                             "What the guider learnt from; the frame is around the pixel.",
                             {},
-                            {write("picture", "rendered", exposed)}});
+                            {write("picture", "rendered", exposed(rendered, exposure_of(rendered)))}});
   shown.sections.push_back(
       {"Cached exitance",
        "Light that leaves the voxels, as cones read it. Blue: no data.",
@@ -191,6 +189,69 @@ void write_numbers(const picture_folder& folder, const json& numbers) {
   render::write_file((folder.path() / "numbers.json").string(), numbers.dump(2) + '\n');
 }
 
+page page_of(const render::scene& scene, const inspection& asked) {
+  page shown;
+  shown.title = scene.name + ", pixel " + std::to_string(asked.x) + ", " + std::to_string(asked.y);
+  return shown;
+}
+
+std::size_t pixel_of(const inspection& asked) {
+  return std::size_t(asked.y) * std::size_t(asked.learning.width) + std::size_t(asked.x);
+}
+
+void add_note(const std::string& note, page& shown, std::ostream& log) {
+  if (note.empty()) return;
+  log << "wfpg-inspect: warning: " << note << '\n';
+  shown.notes.push_back(note);
+}
+
+void finish(const picture_folder& folder, const json& numbers, page& shown) {
+  shown.numbers = rows_of(numbers);
+  write_numbers(folder, numbers);
+  write_page(folder, shown);
+}
+
+void inspect_fields(const render::scene& scene, const inspection& asked, std::ostream& log) {
+  log << "wfpg-inspect: learning\n";
+  const learnt_scene learnt(scene, asked.learning, shown_progress().callback());
+  const auto pixel = static_cast<std::uint32_t>(pixel_of(asked));
+
+  const picture_folder folder(asked.output);
+  page shown = page_of(scene, asked);
+  json numbers{{"scene", scene.name},
+               {"method", render::name_of(render::method_names(), asked.learning.method)},
+               {"fields", asked.learning.lifetime == render::fields::kept ? "kept" : "transient"}};
+  numbers.update(numbers_of_place(learnt, pixel));
+  show_octree(learnt, asked, folder, shown);
+  add_note(note_of(learnt, pixel), shown, log);
+  if (kind_of(learnt, pixel) == pixel_kind::surface) {
+    log << "wfpg-inspect: tracing the reference\n";
+    show_directions(learnt, asked, pixel, shown, numbers);
+  }
+  if (!asked.vdb.empty()) write_vdb(learnt, asked.vdb);
+  finish(folder, numbers, shown);
+}
+
+void inspect_both_ends(const render::scene& scene, const inspection& asked, std::ostream& log) {
+  log << "wfpg-inspect: rendering\n";
+  const both_ends found =
+      look_at(scene, asked.learning, {pixel_of(asked), asked.sample}, shown_progress().callback());
+
+  const picture_folder folder(asked.output);
+  page shown = page_of(scene, asked);
+  json numbers{{"scene", scene.name},
+               {"method", render::name_of(render::method_names(), asked.learning.method)},
+               {"techniques", render::names_of(render::techniques_of(asked.learning))},
+               {"pixel", {asked.x, asked.y}}};
+  numbers.update(numbers_of_both_ends(found));
+  if (found.dropped > 0)
+    add_note(std::to_string(found.dropped) +
+                 " vertices of light paths had no memory, and their light is missing; raise --light-memory.",
+             shown, log);
+  show_both_ends(found, asked.x, asked.y, scene.view.up, folder, shown);
+  finish(folder, numbers, shown);
+}
+
 }  // namespace
 
 void run(const render::scene& scene, const inspection& asked_of, std::ostream& log) {
@@ -198,31 +259,10 @@ void run(const render::scene& scene, const inspection& asked_of, std::ostream& l
   asked.learning = render::completed(scene, asked.learning);
   check(asked);
   check_files(asked);
-  log << "wfpg-inspect: learning\n";
-  const learnt_scene learnt(scene, asked.learning, shown_progress().callback());
-  const auto pixel = static_cast<std::uint32_t>(asked.y * asked.learning.width + asked.x);
-
-  const picture_folder folder(asked.output);
-  page shown;
-  shown.title = scene.name + ", pixel " + std::to_string(asked.x) + ", " + std::to_string(asked.y);
-  json numbers{{"scene", scene.name},
-               {"method", render::name_of(render::method_names(), asked.learning.method)},
-               {"fields", asked.learning.lifetime == render::fields::kept ? "kept" : "transient"}};
-  numbers.update(numbers_of_place(learnt, pixel));
-  show_octree(learnt, asked, folder, shown);
-  const std::string note = note_of(learnt, pixel);
-  if (!note.empty()) {
-    log << "wfpg-inspect: warning: " << note << '\n';
-    shown.notes.push_back(note);
-  }
-  if (kind_of(learnt, pixel) == pixel_kind::surface) {
-    log << "wfpg-inspect: tracing the reference\n";
-    show_directions(learnt, asked, pixel, shown, numbers);
-  }
-  if (!asked.vdb.empty()) write_vdb(learnt, asked.vdb);
-  shown.numbers = rows_of(numbers);
-  write_numbers(folder, numbers);
-  write_page(folder, shown);
+  if (render::is_bidirectional(asked.learning.method))
+    inspect_both_ends(scene, asked, log);
+  else
+    inspect_fields(scene, asked, log);
 }
 
 }  // namespace inspect

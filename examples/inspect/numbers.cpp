@@ -22,6 +22,8 @@ constexpr std::pair<const char*, const char*> names[] = {
     {"method", "method"},
     {"fields", "fields"},
     {"samples", "samples that were learnt from"},
+    {"techniques", "techniques"},
+    {"rendered", "samples"},
     {"pixel", "pixel, from the upper left"},
     {"hit", "hits"},
     {"position", "point"},
@@ -45,10 +47,20 @@ constexpr std::pair<const char*, const char*> names[] = {
     {"chi_square_p", "p of the chi-square test of samples against their pdf"},
     {"noise_bsdf", "relative deviation of a sample drawn from the BSDF alone"},
     {"noise_sampler", "relative deviation of a sample as it is drawn"},
+    {"radiance", "the pixel, mean, W/(m² sr)"},
+    {"deviation", "relative deviation of a sample"},
+    {"sample", "sample that is shown, from 1"},
+    {"sample_luminance", "its luminance, W/(m² sr)"},
+    {"photons_on_surfaces", "its photons on surfaces"},
+    {"photons_in_media", "its photons in media"},
+    {"beams", "its photon beams"},
+    {"dropped", "vertices of light paths without memory"},
     {"field_bytes", "bytes of a field"},
     {"persistent_bytes", "bytes of the guider, kept"},
     {"transient_bytes", "bytes of the guider, in flight"},
 };
+
+}  // namespace
 
 std::string words(const json& value) {
   if (value.is_null()) return "not defined";
@@ -63,8 +75,6 @@ std::string words(const json& value) {
   for (const json& element : value) list += (list.empty() ? "" : ", ") + words(element);
   return list;
 }
-
-}  // namespace
 
 pixel_kind kind_of(const learnt_scene& learnt, std::uint32_t pixel) {
   const auto& surface = learnt.hits()[pixel].surface;

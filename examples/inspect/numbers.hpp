@@ -26,7 +26,9 @@ json numbers_of(const findings& found, const pixel_sampler& sampler);
 /// The kind of the pixel's hit.
 pixel_kind kind_of(const learnt_scene& learnt, std::uint32_t pixel);
 
-/// The numbers in words. The object may have the members of both functions.
+/// A number, or a list of them, in words.
+std::string words(const json& value);
+/// The numbers in words. The object may have the members of both functions, and of numbers_of_both_ends().
 std::vector<number_row> rows_of(const json& numbers);
 
 }  // namespace inspect

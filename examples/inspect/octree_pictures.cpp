@@ -90,6 +90,19 @@ render::image level_picture(const learnt_scene& learnt, const colour_scale& scal
   return picture;
 }
 
+float exposure_of(const render::image& picture) {
+  std::vector<float> values;
+  for (const vec3& pixel : picture.pixels) values.push_back(wfpg::luminance(pixel));
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle > 0.0f && std::isfinite(*middle) ? 0.25f / *middle : 1.0f;
+}
+
+render::image exposed(render::image picture, float exposure) {
+  for (vec3& pixel : picture.pixels) pixel *= exposure;
+  return picture;
+}
+
 render::image marked(render::image picture, int x, int y) {
   for (int dy = -mark_radius; dy <= mark_radius; ++dy)
     for (int dx = -mark_radius; dx <= mark_radius; ++dx) {

@@ -26,6 +26,10 @@ render::image bin_picture(const learnt_scene& learnt);
 /// The level of the bins' nodes, on a scale that ends at the leaves' level. Blue where there is no bin.
 render::image level_picture(const learnt_scene& learnt, const colour_scale& scale);
 
+/// Exposure of a picture, by its median luminance.
+float exposure_of(const render::image& picture);
+render::image exposed(render::image picture, float exposure);
+
 /// A picture with a frame around a pixel. Coordinates are from the upper left.
 render::image marked(render::image picture, int x, int y);
 

@@ -22,16 +22,10 @@ constexpr const char* style =
     "h1{font-size:1.5rem}h2{font-size:1.15rem;margin:2.5rem 0 .3rem}p{max-width:50rem}"
     "figure{display:inline-block;margin:0 1rem 1rem 0;vertical-align:top}"
     "figcaption{font-size:.85rem;max-width:32rem}img{display:block;max-width:100%;image-rendering:pixelated}"
-    "td{padding:.1rem 1.5rem .1rem 0;border-bottom:1px solid #ddd}td+td{font-variant-numeric:tabular-nums}"
+    "td,th{padding:.1rem 1.5rem .1rem 0;border-bottom:1px solid #ddd;text-align:left}"
+    "td+td{font-variant-numeric:tabular-nums}"
     ".note{background:#fff3cd;padding:.5rem 1rem}.bar{width:512px;font-size:.8rem;margin:.5rem 0 1rem}"
     ".bar div{display:flex;justify-content:space-between}";
-
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text)
-    result += c == '<' ? "&lt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
-  return result;
-}
 
 std::string base64(const std::string& bytes) {
   static constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -51,7 +45,9 @@ std::string embedded(const picture_folder& folder, const std::string& name, cons
   std::ifstream file(path, std::ios::binary);
   const std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   if (bytes.empty()) throw std::runtime_error(path + ": cannot be read");
-  return "<img src=\"data:image/png;base64," + base64(bytes) + "\" alt=\"" + escaped(about) + "\">\n";
+  const bool is_svg = std::filesystem::path(name).extension() == ".svg";
+  return std::string("<img src=\"data:image/") + (is_svg ? "svg+xml" : "png") + ";base64," + base64(bytes) +
+         "\" alt=\"" + escaped(about) + "\">\n";
 }
 
 std::string bar(const picture_folder& folder, const colour_scale& scale, std::size_t number) {
@@ -68,6 +64,17 @@ std::string table(const std::vector<number_row>& rows) {
   return text + "</table>\n";
 }
 
+std::string table(const std::vector<std::vector<std::string>>& rows) {
+  std::string text = "<table>\n";
+  for (const std::vector<std::string>& row : rows) {
+    const std::string cell = &row == &rows.front() ? "th>" : "td>";
+    text += "<tr>";
+    for (const std::string& value : row) text += "<" + cell + escaped(value) + "</" + cell;
+    text += "</tr>\n";
+  }
+  return text + "</table>\n";
+}
+
 }  // namespace
 
 figure picture_folder::write(const std::string& name, const std::string& caption,
@@ -75,6 +82,11 @@ figure picture_folder::write(const std::string& name, const std::string& caption
   const int times = std::max(1, (least_side - 1) / std::max(picture.width, picture.height) + 1);
   render::write_png(file(name + ".png"), times > 1 ? render::enlarged(picture, times) : picture, exposure);
   return {name + ".png", caption, false};
+}
+
+figure picture_folder::write(const std::string& name, const std::string& caption, const svg& drawing) const {
+  render::write_file(file(name + ".svg"), drawing.content());
+  return {name + ".svg", caption, false};
 }
 
 std::vector<figure> picture_folder::write_cells(const std::string& name, const std::string& caption,
@@ -107,6 +119,7 @@ void write_page(const picture_folder& folder, const page& shown) {
     for (const figure& f : s.figures)
       body += std::string(f.starts_row ? "<br>" : "") + "<figure>" + embedded(folder, f.file, f.caption) +
               "<figcaption>" + escaped(f.caption) + "</figcaption></figure>\n";
+    if (!s.rows.empty()) body += table(s.rows);
   }
   render::write_file((folder.path() / "index.html").string(),
                      "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"><title>" +

@@ -3,6 +3,7 @@
 
 #include "colour_scale.hpp"
 #include "directions.hpp"
+#include "svg.hpp"
 
 #include <filesystem>
 #include <optional>
@@ -12,17 +13,18 @@
 
 namespace inspect {
 
-/// A picture's PNG in the page's folder, and its caption.
+/// A picture's PNG or SVG in the page's folder, and its caption.
 struct figure {
   std::string file, caption;
   bool starts_row = false;
 };
 
-/// Figures that share a scale.
+/// Figures that share a scale, and a table.
 struct section {
   std::string title, text;
   std::optional<colour_scale> scale;
   std::vector<figure> figures;
+  std::vector<std::vector<std::string>> rows = {};  ///< of the table below; the first has the columns' names
 };
 
 /// A number's name, and its value in words.
@@ -44,6 +46,8 @@ class picture_folder {
   /// Writes NAME.png. Small pictures are enlarged. Throws std::runtime_error.
   figure write(const std::string& name, const std::string& caption, const render::image& picture,
                float exposure = 1.0f) const;
+  /// Writes NAME.svg. Throws std::runtime_error.
+  figure write(const std::string& name, const std::string& caption, const svg& drawing) const;
   /// Writes cells as NAME-octahedral and NAME-latlong: .png with the scale's colours, and .exr with the
   /// values. Throws std::runtime_error.
   std::vector<figure> write_cells(const std::string& name, const std::string& caption,

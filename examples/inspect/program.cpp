@@ -37,6 +37,9 @@ void add_options(CLI::App& app, arguments& given) {
       ->required();
   app.add_option("-o,--output", given.output, "folder of the page and its pictures (default: inspection)")
       ->transform(render::file_path());
+  app.add_option("--sample", given.asked.sample,
+                 "number of the sample whose photons are shown (default: the one to which merges bring most)")
+      ->transform(render::whole_number(1, 1 << 30));
   app.add_option("--vdb", given.asked.vdb, "the octree's voxels, OpenVDB")->transform(render::file_path());
   app.add_option("--load-guide", given.asked.learning.load_guide,
                  "guide to begin with, of the same scene and options")
@@ -48,11 +51,23 @@ void add_options(CLI::App& app, arguments& given) {
       ->transform(render::whole_number(1, 1 << 30));
   render::render_options& options = given.asked.learning;
   render::add_method_options(app, options);
+  render::add_bidirectional_options(app, options);
   render::add_device_option(app, options);
   render::add_nee_option(app, options);
   render::add_budget_options(app, options);
   render::add_picture_options(app, options);
   render::add_guider_options(app, options);
+}
+
+/// Options of one kind of page alone.
+void check_options(const CLI::App& app, const render::render_options& options) {
+  const auto require = [&app](const char* name, bool holds, const std::string& what) {
+    if (app.get_option(name)->count() > 0 && !holds) throw CLI::RequiresError(name, what);
+  };
+  for (const char* const name : {"--reference-spp", "--histogram", "--vdb", "--load-guide", "--combine"})
+    require(name, !render::is_bidirectional(options.method), "--method wfpg or wfpg-product");
+  require("--sample", render::is_bidirectional(options.method), "--method bpt, vcm, upbp or lt");
+  require("--sample", options.seconds <= 0.0, "--spp, which tells how many samples there are");
 }
 
 void inspect_scene(arguments& given, std::ostream& out, std::ostream& log) {
@@ -66,12 +81,14 @@ void inspect_scene(arguments& given, std::ostream& out, std::ostream& log) {
 
 int run_program(int argc, const char* const* argv, std::ostream& out, std::ostream& log) {
   arguments given;
-  CLI::App app{"Shows the field that guides a pixel's samples, beside the light that arrives there."};
+  CLI::App app{
+      "Shows why a pixel is noisy: the field that guides its samples, or the photons in reach of its path."};
   render::report_in_one_line(app, "wfpg-inspect");
   add_options(app, given);
   try {
     app.parse(argc, argv);
     render::check_render_options(app, given.asked.learning);
+    check_options(app, given.asked.learning);
   } catch (const CLI::ParseError& error) {
     return app.exit(error, out, log) == 0 ? 0 : failure;
   }

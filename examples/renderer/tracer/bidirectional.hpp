@@ -29,14 +29,15 @@ namespace render {
 /// Renders samples of a scene. Caster: an inline caster as path_tracer's.
 ///
 /// One seed gives one picture on any number of threads: splats are added in the order of light paths.
-template <class Exec, class Caster>
-class bidirectional_tracer {
+/// Observer: as no_observer.
+template <class Exec, class Caster, class Observer>
+class observed_bidirectional_tracer {
   static_assert(wfpg::is_inline_caster_v<Caster>);
-  using world_type = bidirectional_world<Caster>;
+  using world_type = bidirectional_world<Caster, Observer>;
 
  public:
-  bidirectional_tracer(const Exec& exec, const tracer_settings& settings, const path_lights& world,
-                       const Caster& caster)
+  observed_bidirectional_tracer(const Exec& exec, const tracer_settings& settings, const path_lights& world,
+                                const Caster& caster, const Observer& observer = {})
       : exec_(exec),
         settings_(settings),
         count_(settings.pixels()),
@@ -57,6 +58,7 @@ class bidirectional_tracer {
         film_(exec, count_),
         by_technique_(exec, count_, settings.technique_pictures),
         clock_(exec) {
+    world_.observer = observer;
     exec_.for_each(around_lights_.size(), find_light_solids<world_type>{world_, around_lights_.view()});
   }
 
@@ -88,6 +90,14 @@ class bidirectional_tracer {
   std::vector<technique_picture> technique_pictures() const {
     return by_technique_.pictures(pictured(settings_.techniques));
   }
+  /// What one technique found for a pixel in the last sample. Precondition: settings ask for pictures.
+  technique_sum found_by(technique by, std::size_t pixel) const { return by_technique_.of_sample(by, pixel); }
+  /// Radii of a sample's merges, from 0.
+  wfpg::merge_radii radii_of(const pinhole& camera, std::uint32_t sample) const {
+    return wfpg::radii_of(light_.options(), sample + 1, extent(camera));
+  }
+  /// What light paths left in the last sample.
+  photon_gather photons() { return light_.gather(); }
   /// Vertices and beams of light paths that had no memory, over all samples. Their light is missing.
   std::uint64_t dropped() const { return dropped_; }
   /// Bytes of the vertices and beams of light paths, and of the maps over them.
@@ -237,5 +247,8 @@ class bidirectional_tracer {
   policy_clock<Exec> clock_;
   std::uint64_t dropped_ = 0;
 };
+
+template <class Exec, class Caster>
+using bidirectional_tracer = observed_bidirectional_tracer<Exec, Caster, no_observer>;
 
 }  // namespace render

@@ -5,6 +5,7 @@
 #include "lights/lights.hpp"
 #include "scene/camera.hpp"
 #include "tracer/media_ways.hpp"
+#include "tracer/path_observer.hpp"
 #include "tracer/path_state.hpp"
 
 #include <wfpg/host/phase.hpp>
@@ -197,8 +198,8 @@ struct passer {
   WFPG_HD void leave(const path_segment&) const {}
 };
 
-/// The scene and its lights for bidirectional kernels, with an inline caster.
-template <class Caster>
+/// The scene and its lights for bidirectional kernels, with an inline caster. Observer: as no_observer.
+template <class Caster, class Observer = no_observer>
 struct bidirectional_world {
   scene_view scene;
   light_view lights;
@@ -207,6 +208,7 @@ struct bidirectional_world {
   random_stream random = {};
   std::uint32_t max_depth = 1;       ///< most segments of a whole path
   std::uint32_t roulette_depth = 3;  ///< roulette begins at this vertex, from 0
+  Observer observer = {};            ///< of camera paths
 
   /// The weights of a path that has come as far as `s`, on a surface with that cosine or in a medium.
   WFPG_HD static wfpg::vertex_weights weights_at(const subpath& path, const path_segment& s, float cosine) {

@@ -44,8 +44,10 @@ struct trace_camera_paths {
     ++segment_counts[i];
     subpath_vertex vertex;
     visitor ahead{world.passer_of(static_cast<std::uint32_t>(i), segments, 0), *this, i, path};
+    const bool arrives = world.arrive(path, segments, vertex, ahead);
+    world.observer.follow(i, path, segments, arrives ? &vertex : nullptr);
     active[i] = 0;
-    if (!world.arrive(path, segments, vertex, ahead) || segments == world.max_depth) return;
+    if (!arrives || segments == world.max_depth) return;
     active[i] = 1;
     vertices.emplace(i, vertex);
     joins[i] = vertex.is_delta() ? 0 : 1;
@@ -96,7 +98,8 @@ struct trace_camera_paths {
   WFPG_HD void merge(std::size_t i, const subpath& path, const path_segment& before,
                      const medium_piece& piece) const {
     if (segments == world.max_depth) return;
-    const merge_along_piece<World> merge(world, photons, path, segments, before, piece);
+    const merge_along_piece<World> merge(world, photons, i, path, segments, before, piece);
+    world.observer.cross(i, segments, merge.along());
     if (world.techniques.beam_points > 0.0f) found.add(i, technique::pb2d, merge.with_points(), vec3(1.0f));
     if (world.techniques.beams > 0.0f) found.add(i, technique::bb1d, merge.with_beams(), vec3(1.0f));
   }
@@ -254,7 +257,7 @@ struct merge_vertices {
   WFPG_HD void operator()(std::size_t i) const {
     const subpath_vertex vertex = vertices[i];
     const scatterer f = vertex.seen_from(vertex.at.outgoing);
-    const merge_at_vertex<World> merge{world, photons, vertex, f};
+    const merge_at_vertex<World> merge{world, photons, i, vertex, f};
     if (f.in_medium)
       found.add(i, technique::pp3d, merge.in_medium(), vertex.throughput);
     else

@@ -42,12 +42,14 @@ template <class World>
 struct merge_at_vertex {
   const World& world;
   const photon_gather& photons;
+  std::size_t pixel;
   const subpath_vertex& vertex;
   const scatterer& f;
 
   WFPG_HD technique_sum on_surface() const {
     technique_sum found;
     photons.merge_on_surface(vertex.at.position, [&](const photon& light, const wfpg::photon_merge& at) {
+      world.observer.reach(pixel, {technique::surf, vertex.segments, at});
       if (light.segments + vertex.segments > world.max_depth) return;
       // The photon's flux is that of a surface with the geometric normal.
       add(found, light, wfpg::merge_technique::surface_points,
@@ -61,6 +63,7 @@ struct merge_at_vertex {
     const vec3 scattering = vertex.solids.medium_of(world.scene).scattering;
     technique_sum found;
     photons.merge_in_medium(vertex.at.position, [&](const photon& light, const wfpg::photon_merge& at) {
+      world.observer.reach(pixel, {technique::pp3d, vertex.segments, at});
       if (light.segments + vertex.segments > world.max_depth ||
           !have_one_medium(world.scene, light.solid, vertex.material))
         return;
@@ -75,8 +78,10 @@ struct merge_at_vertex {
  private:
   WFPG_HD void add(technique_sum& found, const photon& light, wfpg::merge_technique by, vec3 value) const {
     if (!(wfpg::luminance(value) > 0.0f)) return;
-    found.add(value,
-              light.weights.merge(world.techniques, by, vertex.weights, vertex.leave(f, light.incident)));
+    const float weight =
+        light.weights.merge(world.techniques, by, vertex.weights, vertex.leave(f, light.incident));
+    found.add(value, weight);
+    world.observer.merge(pixel, vertex.throughput * value, weight);
   }
 };
 
@@ -85,10 +90,12 @@ struct merge_at_vertex {
 template <class World>
 class merge_along_piece {
  public:
-  WFPG_HD merge_along_piece(const World& world, const photon_gather& photons, const subpath& path,
-                            std::uint32_t segments, const path_segment& before, const medium_piece& piece)
+  WFPG_HD merge_along_piece(const World& world, const photon_gather& photons, std::size_t pixel,
+                            const subpath& path, std::uint32_t segments, const path_segment& before,
+                            const medium_piece& piece)
       : world_(world),
         photons_(photons),
+        pixel_(pixel),
         path_(path),
         segments_(segments),
         before_(before),
@@ -102,9 +109,13 @@ class merge_along_piece {
     if (least > 0.0f) along_.end = glm::min(along_.end, piece.begin + 25.0f / least);
   }
 
+  /// What is merged: as far as light is left.
+  WFPG_HD const wfpg::path_beam& along() const { return along_; }
+
   WFPG_HD technique_sum with_points() const {
     technique_sum found;
     photons_.merge_points_along(along_, [&](const photon& light, const wfpg::photon_merge& at) {
+      world_.observer.reach(pixel_, {technique::pb2d, segments_, at});
       if (!may_merge(light.segments, light.solid)) return;
       const vec3 value = arriving(at.t_camera) * light.flux * (phase(light.incident) * at.scale);
       add(found, light.weights, wfpg::merge_technique::beam_points, at.t_camera, light.incident, value);
@@ -115,6 +126,7 @@ class merge_along_piece {
   WFPG_HD technique_sum with_beams() const {
     technique_sum found;
     photons_.merge_beams_along(along_, [&](const light_beam& light, const wfpg::photon_merge& at) {
+      world_.observer.reach(pixel_, {technique::bb1d, segments_, at});
       if (!may_merge(light.segments, light.solid)) return;
       const float length = at.t_light - light.beam.begin;
       // Short beams: a light path gets as far with this probability.
@@ -155,11 +167,14 @@ class merge_along_piece {
     const subpath_vertex vertex(path_.origin + distance * path_.direction, -path_.direction, piece_.around,
                                 solid_, s, segments_, World::weights_at(path_, s, 1.0f));
     const scatterer f = vertex.seen_from(incident);
-    found.add(value, light.merge(world_.techniques, by, vertex.weights, vertex.leave(f, incident)));
+    const float weight = light.merge(world_.techniques, by, vertex.weights, vertex.leave(f, incident));
+    found.add(value, weight);
+    world_.observer.merge(pixel_, value, weight);
   }
 
   const World& world_;
   const photon_gather& photons_;
+  std::size_t pixel_;
   const subpath& path_;
   std::uint32_t segments_;
   const path_segment& before_;

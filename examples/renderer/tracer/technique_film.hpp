@@ -61,6 +61,12 @@ class technique_film {
     if (is_on()) exec_.for_each(pixels_, copy_pixels{radiance.view(), of(weighted_, technique::splat)});
   }
 
+  /// What a technique found for a pixel in this sample, on the host. Precondition: is_on().
+  technique_sum of_sample(technique by, std::size_t pixel) const {
+    const std::size_t i = static_cast<std::size_t>(by) * pixels_ + pixel;
+    return {wfpg::read_element(exec_, weighted_.data() + i), wfpg::read_element(exec_, plain_.data() + i)};
+  }
+
   /// Adds the sample with `weight` >= 0.
   void add(float weight) {
     const auto factor = static_cast<double>(weight);

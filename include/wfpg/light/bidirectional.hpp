@@ -144,13 +144,6 @@ class bidirectional {
     std::size_t bytes() const { return map.bytes() + photons.bytes(); }
   };
 
-  /// Radii of an iteration, scene units.
-  struct merge_radii {
-    float on_surfaces = 0.0f, in_media = 0.0f, for_beams = 0.0f, of_beams = 0.0f;
-  };
-
-  /// Those of techniques that are on.
-  merge_radii radii_of(std::uint32_t iteration, float scene_radius) const;
   /// Samples a camera path, with the volumes of merges.
   path_techniques counts_of(const merge_radii& radii) const;
   /// Builds the map of beams.

@@ -71,7 +71,30 @@ inline void require_in_range(const bidirectional_options& options) {
   require_fraction(options.radius_alpha, "bidirectional_options.radius_alpha");
 }
 
-/// What an iteration's light paths have left. A technique that is off has no photons and the radius 0.
+/// Radii of an iteration's merges, scene units. 0 where a technique is off.
+struct merge_radii {
+  float surface = 0.0f;      ///< on surfaces
+  float volume = 0.0f;       ///< of points in media
+  float beam_points = 0.0f;  ///< of points with camera beams
+  float beams = 0.0f;        ///< of beams with camera beams
+};
+
+/// Returns the radii of an iteration, from 1. `scene_radius`: as bidirectional::begin_iteration() takes it.
+inline merge_radii radii_of(const bidirectional_options& options, std::uint32_t iteration,
+                            float scene_radius) {
+  const auto radius = [&](bool is_on, float first, int dimension) {
+    const radius_schedule schedule{first * scene_radius, options.radius_alpha, dimension};
+    return is_on ? std::max(schedule(iteration), least_merge_radius) : 0.0f;
+  };
+  merge_radii radii;
+  radii.surface = radius(options.surface_points, options.surface_radius, 2);
+  radii.volume = radius(options.volume_points, options.volume_radius, 3);
+  radii.beam_points = radius(options.beam_points, options.volume_radius, 2);
+  radii.beams = radius(options.beams, options.volume_radius, 1);
+  return radii;
+}
+
+/// What an iteration's light paths have left. A technique that is off has no photons.
 struct bidirectional_statistics {
   std::uint32_t vertices = 0;          ///< stored
   std::uint32_t dropped_vertices = 0;  ///< without memory: their light is missing
@@ -80,8 +103,7 @@ struct bidirectional_statistics {
   /// Photons of merges on surfaces, at points in media, and along camera beams.
   std::uint32_t surface_photons = 0, volume_photons = 0, beam_point_photons = 0;
   std::uint32_t beam_pieces = 0;  ///< of all beams
-  /// Radii, scene units.
-  float surface_radius = 0.0f, volume_radius = 0.0f, beam_point_radius = 0.0f, beam_radius = 0.0f;
+  merge_radii radii;              ///< of the iteration
 };
 
 /// Bytes that bidirectional holds: those of the largest iteration so far.

@@ -29,9 +29,10 @@ struct photon_merge {
   /// where beams merge. Unit: scene units to the power of -2 on surfaces and along camera beams, -3 at points
   /// in media, and -1 where beams merge.
   float scale = 0.0f;
-  float t_camera = 0.0f;  ///< where it is on the camera beam, scene units from its origin; 0 at points
-  float t_light = 0.0f;   ///< where it is on the photon beam; 0 for points
-  float sine = 1.0f;      ///< between two beams, in (0, 1]; 1 where one is a point
+  float t_camera = 0.0f;    ///< where it is on the camera beam, scene units from its origin; 0 at points
+  float t_light = 0.0f;     ///< where it is on the photon beam; 0 for points
+  float sine = 1.0f;        ///< between two beams, in (0, 1]; 1 where one is a point
+  std::uint32_t index = 0;  ///< of the photon in vertices(), of the beam in beams()
 };
 
 namespace detail {
@@ -57,6 +58,8 @@ class light_gather_view {
 
   /// The stored vertices, for connections.
   WFPG_HD const light_vertices_view<Vertex>& vertices() const { return vertices_; }
+  /// The stored beams.
+  WFPG_HD const light_vertices_view<Beam>& beams() const { return beams_; }
 
   /// Calls f(const Photon&, const photon_merge&) for each vertex on a surface that is within the radius of a
   /// point (P-P2D). Divide by the cosine between the photon's direction and the geometric normal.
@@ -77,7 +80,8 @@ class light_gather_view {
     const detail::placed_photons<Photon>& near = for_beams_;
     near.map.for_each_place_along(
         camera, merge_kernel::epanechnikov, [&](std::uint32_t place, const merge_geometry& at) {
-          f(near.photons[place], photon_merge{at.kernel * near.scale, at.t_camera, 0.0f, 1.0f});
+          f(near.photons[place],
+            photon_merge{at.kernel * near.scale, at.t_camera, 0.0f, 1.0f, near.map.index(place)});
         });
   }
   /// Calls f(const Beam&, const photon_merge&) for each photon beam along a camera beam (B-B1D). `camera`: as
@@ -86,7 +90,8 @@ class light_gather_view {
   WFPG_HD void merge_beams_along(const path_beam& camera, const F& f) const {
     beam_map_.for_each_beam_along(
         camera, merge_kernel::epanechnikov, [&](std::uint32_t beam, const merge_geometry& at) {
-          f(beams_[beam], photon_merge{at.kernel * beam_scale_ / at.sine, at.t_camera, at.t_light, at.sine});
+          f(beams_[beam],
+            photon_merge{at.kernel * beam_scale_ / at.sine, at.t_camera, at.t_light, at.sine, beam});
         });
   }
 
@@ -99,7 +104,7 @@ class light_gather_view {
   template <class F>
   WFPG_HD static void merge_at(const detail::placed_photons<Photon>& near, vec3 p, const F& f) {
     near.map.for_each_place(p, [&](std::uint32_t place) {
-      f(near.photons[place], photon_merge{near.scale, 0.0f, 0.0f, 1.0f});
+      f(near.photons[place], photon_merge{near.scale, 0.0f, 0.0f, 1.0f, near.map.index(place)});
     });
   }
 

@@ -123,6 +123,9 @@ WFPG_HD inline merge_geometry beam_beam_merge(merge_kernel shape, const path_bea
   return found;
 }
 
+/// Smallest radius of merges, scene units. Its square is a normal float.
+inline constexpr float least_merge_radius = 1.0e-15f;
+
 /// Radius of merges, which shrinks from iteration to iteration so that their blur goes to 0.
 struct radius_schedule {
   float initial = 0.0f;  ///< of the first iteration, scene units, positive

@@ -119,7 +119,7 @@ template <class Exec>
 class photon_map {
  public:
   /// Smallest radius, scene units. The largest is largest_coordinate. Squares of both are normal floats.
-  static constexpr float least_radius = 1.0e-15f;
+  static constexpr float least_radius = least_merge_radius;
 
   /// A map without photons or memory.
   photon_map() = default;

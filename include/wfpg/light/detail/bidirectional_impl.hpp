@@ -14,21 +14,6 @@
 namespace wfpg {
 
 template <class Exec, class Vertex, class Photon, class Beam>
-auto bidirectional<Exec, Vertex, Photon, Beam>::radii_of(std::uint32_t iteration, float scene_radius) const
-    -> merge_radii {
-  const auto radius = [&](bool is_on, float first, int dimension) {
-    const radius_schedule schedule{first * scene_radius, options_.radius_alpha, dimension};
-    return is_on ? std::max(schedule(iteration), photon_map<Exec>::least_radius) : 0.0f;
-  };
-  merge_radii radii;
-  radii.on_surfaces = radius(options_.surface_points, options_.surface_radius, 2);
-  radii.in_media = radius(options_.volume_points, options_.volume_radius, 3);
-  radii.for_beams = radius(options_.beam_points, options_.volume_radius, 2);
-  radii.of_beams = radius(options_.beams, options_.volume_radius, 1);
-  return radii;
-}
-
-template <class Exec, class Vertex, class Photon, class Beam>
 path_techniques bidirectional<Exec, Vertex, Photon, Beam>::counts_of(const merge_radii& radii) const {
   const auto on = [](bool is_on) { return is_on ? 1.0f : 0.0f; };
   const auto disc = [](float r) { return pi * r * r; };
@@ -38,10 +23,10 @@ path_techniques bidirectional<Exec, Vertex, Photon, Beam>::counts_of(const merge
   counts.next_event = on(options_.next_event);
   counts.connections = on(options_.connections);
   counts.splats = on(options_.splats) * paths;
-  counts.surface_points = paths * disc(radii.on_surfaces);
-  counts.volume_points = paths * disc(radii.in_media) * (4.0f / 3.0f) * radii.in_media;
-  counts.beam_points = paths * disc(radii.for_beams);
-  counts.beams = static_cast<float>(beam_paths()) * 2.0f * radii.of_beams;
+  counts.surface_points = paths * disc(radii.surface);
+  counts.volume_points = paths * disc(radii.volume) * (4.0f / 3.0f) * radii.volume;
+  counts.beam_points = paths * disc(radii.beam_points);
+  counts.beams = static_cast<float>(beam_paths()) * 2.0f * radii.beams;
   return counts;
 }
 
@@ -49,7 +34,7 @@ template <class Exec, class Vertex, class Photon, class Beam>
 void bidirectional<Exec, Vertex, Photon, Beam>::begin_iteration(std::uint32_t iteration, float scene_radius) {
   require(iteration > 0, "iteration", iteration, "at least 1");
   require(scene_radius > 0.0f, "scene_radius", scene_radius, "positive and finite");
-  radii_ = radii_of(iteration, scene_radius);
+  radii_ = radii_of(options_, iteration, scene_radius);
   techniques_ = counts_of(radii_);
   is_built_ = false;
   vertices_.begin(exec_);
@@ -62,9 +47,9 @@ template <class Exec, class Vertex, class Photon, class Beam>
 void bidirectional<Exec, Vertex, Photon, Beam>::build() {
   is_built_ = false;
   const light_vertices_view<Vertex> stored = vertices_.view();
-  if (options_.surface_points) on_surfaces_.build(exec_, positions(false), radii_.on_surfaces, stored);
-  if (options_.volume_points) in_media_.build(exec_, positions(true), radii_.in_media, stored);
-  if (options_.beam_points) for_beams_.build(exec_, positions(true), radii_.for_beams, stored);
+  if (options_.surface_points) on_surfaces_.build(exec_, positions(false), radii_.surface, stored);
+  if (options_.volume_points) in_media_.build(exec_, positions(true), radii_.volume, stored);
+  if (options_.beam_points) for_beams_.build(exec_, positions(true), radii_.beam_points, stored);
   if (beam_paths() > 0) build_beams();
   is_built_ = true;
 }
@@ -75,7 +60,7 @@ void bidirectional<Exec, Vertex, Photon, Beam>::build_beams() {
   if (copied_beams_.size() < beams) copied_beams_ = buffer<path_beam, Exec>(exec_, beams_.capacity());
   exec_.for_each(beams, detail::copy_beams<Beam>{beams_.view(), copied_beams_.view()});
   beam_map_options map;
-  map.radius = radii_.of_beams;
+  map.radius = radii_.beams;
   map.max_pieces = std::max<std::size_t>(pieces_a_beam * beams, 1);
   beam_map_.build(exec_, {copied_beams_.data(), beams}, map);
 }
@@ -102,10 +87,7 @@ bidirectional_statistics bidirectional<Exec, Vertex, Photon, Beam>::statistics()
   s.beams = beams_.size(exec_);
   const array_view<const std::uint32_t> lost = lost_.view();
   s.dropped_beams = ::thrust::reduce(exec_.thrust(), lost.begin(), lost.end(), beams_.dropped(exec_));
-  s.surface_radius = radii_.on_surfaces;
-  s.volume_radius = radii_.in_media;
-  s.beam_point_radius = radii_.for_beams;
-  s.beam_radius = radii_.of_beams;
+  s.radii = radii_;
   if (!is_built_) return s;
   s.surface_photons = on_surfaces_.map.view().size();
   s.volume_photons = in_media_.map.view().size();
