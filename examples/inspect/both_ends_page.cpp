@@ -131,10 +131,11 @@ render::image around(const render::image& picture, int x, int y, float exposure)
 }
 
 section pictures(const both_ends& found, int x, int y, const picture_folder& folder) {
-  section shown{"The picture, and what each technique brings to it",
-                "All have one exposure. The frame is around the pixel. Crops add up to the first one.",
-                {},
-                {}};
+  section shown{
+      "The picture, and what each technique brings to it",
+      "All have one exposure. The frame is around the pixel. The first crop is the sum of the others.",
+      {},
+      {}};
   const float exposure = exposure_of(found.picture);
   shown.figures.push_back(
       folder.write("picture", "rendered", marked(exposed(found.picture, exposure), x, y)));
@@ -333,13 +334,13 @@ json numbers_of_both_ends(const both_ends& found) {
 void show_both_ends(const both_ends& found, int x, int y, vec3 up, const picture_folder& folder,
                     page& shown) {
   shown.sections.push_back(techniques(found));
+  shown.sections.push_back(pictures(found, x, y, folder));
   shown.sections.push_back(path_of(found, up, folder));
   if (!found.radii.empty()) {
     shown.sections.push_back(photons(found));
     shown.sections.push_back(close_ups(found, up, folder));
     shown.sections.push_back(radii(found));
   }
-  shown.sections.push_back(pictures(found, x, y, folder));
 }
 
 }  // namespace inspect
