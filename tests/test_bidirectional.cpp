@@ -150,8 +150,8 @@ bidirectional_options all_techniques() {
   options.max_vertices = depths;
   options.max_beams = 64;
   options.volume_points = options.beam_points = options.beams = true;
-  options.radii.surface = 0.15f;
-  options.radii.volume = 0.1f;
+  options.surface_radius = 0.15f;
+  options.volume_radius = 0.1f;
   options.beam_paths = beam_paths;
   return options;
 }

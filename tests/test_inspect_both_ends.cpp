@@ -37,7 +37,7 @@ render::render_options options_of(render::sampling_method method) {
   options.spp = samples;
   options.max_depth = 6;
   options.seed = 5;
-  options.light.merge_radius = 0.05f;
+  options.light.surface_radius = 0.05f;
   options.light.volume_radius = 0.06f;
   options.light.beam_paths = side * side;
   return options;

@@ -197,7 +197,7 @@ void add_radii(const observed_scene& in, const render::technique_set& on, both_e
 }
 
 /// Takes the sample that is shown again, with the recorder.
-void record_sample(observed_scene& in, const render::technique_set& on, both_ends& found) {
+void record_sample(observed_scene& in, both_ends& found) {
   in.record.is_on = true;
   in.tracer.render_sample(render::no_guide(), in.camera, static_cast<std::uint32_t>(found.shown - 1), 0.0f);
   found.path = in.record.path;
@@ -248,7 +248,7 @@ both_ends look_at(const render::scene& scene, const render::render_options& give
   found.dropped = in.tracer.dropped();
   pixel.report(found);
   add_radii(in, on, found);
-  record_sample(in, on, found);
+  record_sample(in, found);
   return found;
 }
 
