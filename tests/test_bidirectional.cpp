@@ -100,9 +100,9 @@ struct sums {
   float chain = 0.0f;  ///< fluxes of one light path's vertices
 };
 
-/// Depends on all that a merge tells.
-WFPG_HD inline float term(float flux, const photon_merge& at) {
-  return flux * at.scale * (1.0f + at.t_camera + 2.0f * at.t_light) * at.sine;
+/// Depends on all that a merge tells. `stored`: the flux that it has in its store.
+WFPG_HD inline float term(float flux, const photon_merge& at, float stored) {
+  return stored * flux * at.scale * (1.0f + at.t_camera + 2.0f * at.t_light) * at.sine;
 }
 
 struct look {
@@ -112,16 +112,18 @@ struct look {
   array_view<sums> found;
   WFPG_HD void operator()(std::size_t i) const {
     sums s;
-    gather.merge_on_surface(points[i], [&](const photon& light, const photon_merge& at) {
-      s.on_surface += term(light.flux, at);
-    });
+    const auto add_point = [&](float& sum, const photon& light, const photon_merge& at) {
+      sum += term(light.flux, at, gather.vertices()[at.index].flux);
+    };
+    gather.merge_on_surface(
+        points[i], [&](const photon& light, const photon_merge& at) { add_point(s.on_surface, light, at); });
     gather.merge_in_medium(
-        points[i], [&](const photon& light, const photon_merge& at) { s.in_medium += term(light.flux, at); });
+        points[i], [&](const photon& light, const photon_merge& at) { add_point(s.in_medium, light, at); });
     gather.merge_points_along(cameras[i], [&](const photon& light, const photon_merge& at) {
-      s.points_along += term(light.flux, at);
+      add_point(s.points_along, light, at);
     });
     gather.merge_beams_along(cameras[i], [&](const beam& light, const photon_merge& at) {
-      s.beams_along += term(light.flux, at);
+      s.beams_along += term(light.flux, at, gather.beams()[at.index].flux);
     });
     const auto& vertices = gather.vertices();
     if (vertices.paths() > 0)
@@ -199,7 +201,7 @@ std::vector<sums> expected(const random_paths& paths, const bidirectional_statis
     const auto count = static_cast<float>(light_paths);
     const auto add = [&](float& sum, float flux, const wfpg::merge_geometry& at, float number) {
       if (at.kernel > 0.0f)
-        sum += term(flux, {at.kernel / (number * at.sine), at.t_camera, at.t_light, at.sine, 0});
+        sum += term(flux, {at.kernel / (number * at.sine), at.t_camera, at.t_light, at.sine, 0}, flux);
     };
     for (std::size_t path = 0; path < light_paths; ++path)
       for (std::uint32_t depth = 0; depth < depths; ++depth) {
