@@ -409,7 +409,7 @@ TEST_CASE("options and iterations out of range are refused by their names", "[bi
   const auto refuses = [&](const char* name, const auto& change) {
     bidirectional_options options = all_techniques();
     change(options);
-    CHECK_THROWS_WITH(light(exec, options), Catch::Contains(name));
+    CHECK_THROWS_WITH(light(exec, options), WFPG_TEST_CONTAINS(name));
     CHECK_THROWS_AS(light(exec, options), std::invalid_argument);
   };
   refuses("bidirectional_options.paths", [](bidirectional_options& o) { o.paths = 0; });
@@ -425,9 +425,9 @@ TEST_CASE("options and iterations out of range are refused by their names", "[bi
     refuses("radius_alpha", [&](bidirectional_options& o) { o.radius_alpha = wrong; });
   }
   light made(exec, all_techniques());
-  CHECK_THROWS_WITH(made.begin_iteration(0, 1.0f), Catch::Contains("iteration"));
+  CHECK_THROWS_WITH(made.begin_iteration(0, 1.0f), WFPG_TEST_CONTAINS("iteration"));
   for (const float wrong : {0.0f, -1.0f, nan})
-    CHECK_THROWS_WITH(made.begin_iteration(1, wrong), Catch::Contains("scene_radius"));
+    CHECK_THROWS_WITH(made.begin_iteration(1, wrong), WFPG_TEST_CONTAINS("scene_radius"));
 }
 
 WFPG_TEST_CASE("each allocation of an iteration may fail, and the next iteration goes on",

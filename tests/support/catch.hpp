@@ -4,8 +4,10 @@
 #if __has_include(<catch2/catch_all.hpp>)
 #include <catch2/catch_all.hpp>
 using Catch::Approx;
+#define WFPG_TEST_CONTAINS(text) Catch::Matchers::ContainsSubstring(text)
 #else
 #include <catch2/catch.hpp>
+#define WFPG_TEST_CONTAINS(text) Catch::Contains(text)
 #endif
 
 #if defined(__CUDACC__)
