@@ -260,7 +260,7 @@ TEST_CASE("both ends: radiance in an emitting box is right within 0.2%", "[.long
   for (const bool solids : {false, true})
     for (const measured_set& set : all_sets)
       DYNAMIC_SECTION(set.techniques << (solids ? " with" : " without") << " solids") {
-        const sample_mean found = radiance_of_furnace(set, solids, 30 * set.seeds);
+        const sample_mean found = radiance_of_furnace(set, solids, 40 * set.seeds);
         INFO(found.mean() << " +- " << found.error());
         CHECK(found.error() < 0.001);
         CHECK(found.mean() == Approx(2.0).epsilon(0.002));
