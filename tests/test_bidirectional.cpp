@@ -287,6 +287,59 @@ WFPG_TEST_CASE("nothing is merged before maps are built", "[bidirectional]") {
   for (const sums& s : found) CHECK(s.chain == 0.0f);
 }
 
+struct ask_for_places {
+  recorder record;
+  array_view<std::uint32_t> found;
+  WFPG_HD void operator()(std::size_t path) const { found[path] = record.has_place(path) ? 1 : 0; }
+};
+
+WFPG_TEST_CASE("paths have no places before places are found for them", "[bidirectional]") {
+  const Exec exec;
+  light_of<Exec> light(exec, all_techniques());
+  const auto places = [&] {
+    const wfpg::buffer<std::uint32_t, Exec> found(exec, light_paths);
+    exec.for_each(light_paths, ask_for_places{light.light_recorder(), found.view()});
+    std::uint32_t sum = 0;
+    for (const std::uint32_t one : found.to_host(exec)) sum += one;
+    return sum;
+  };
+  CHECK(places() == 0);
+  follow(exec, light, {1});
+  CHECK(places() > 0);  // those of the last depth
+  light.begin_iteration(2, 1.0f);
+  CHECK(places() == 0);
+}
+
+WFPG_TEST_CASE("beams of the last segment are stored with the maps", "[bidirectional]") {
+  const Exec exec;
+  light_of<Exec> light(exec, all_techniques());
+  const random_paths paths{4};
+  const wfpg::buffer<std::uint32_t, Exec> keeps(exec, light_paths);
+  exec.for_each(light_paths, trace{paths, 0, light.light_recorder(), keeps.view()});
+  light.build();
+  std::uint32_t beams = 0;
+  for (std::size_t path = 0; path < beam_paths; ++path) {
+    const std::uint32_t left = paths.beams(path, 0), most = light.options().segment_beams;
+    beams += left < most ? left : most;
+  }
+  CHECK(light.statistics().beams == beams);
+  CHECK(light.statistics().beam_pieces >= beams);
+}
+
+WFPG_TEST_CASE("radii too small for floats keep scales finite", "[bidirectional]") {
+  const Exec exec;
+  light_of<Exec> light(exec, all_techniques());
+  light.begin_iteration(1, 1e-30f);
+  follow(exec, light, {1});
+  light.build();
+  const wfpg::path_techniques& t = light.techniques();
+  for (const float volume : {t.surface_points, t.volume_points, t.beam_points, t.beams}) {
+    CHECK(volume > 0.0f);
+    CHECK(std::isfinite(1.0f / volume));
+  }
+  CHECK(are_empty(found_by(exec, light)));
+}
+
 WFPG_TEST_CASE("photons, beams and what had no memory are counted", "[bidirectional]") {
   const Exec exec;
   std::uint32_t vertices = 0, inside = 0, beams = 0, beyond = 0;
@@ -311,7 +364,8 @@ WFPG_TEST_CASE("photons, beams and what had no memory are counted", "[bidirectio
   CHECK(s.vertices == vertices);
   CHECK(s.dropped_vertices == 0);
   CHECK(s.beams == beams);
-  CHECK(s.dropped_beams == beyond);
+  CHECK(s.dropped_beams == 0);
+  CHECK(s.surplus_beams == beyond);
   CHECK(s.surface_photons == vertices - inside);
   CHECK(s.volume_photons == inside);
   CHECK(s.beam_point_photons == inside);
@@ -325,7 +379,8 @@ WFPG_TEST_CASE("photons, beams and what had no memory are counted", "[bidirectio
   const bidirectional_statistics few = small.statistics();
   CHECK(few.vertices == room);
   CHECK(few.dropped_vertices == vertices - room);
-  CHECK(few.beams + few.dropped_beams == beams + beyond);
+  CHECK(few.beams + few.dropped_beams == beams);
+  CHECK(few.surplus_beams == beyond);
   CHECK(few.beams == options.budget_bytes / (sizeof(beam) + 2 * sizeof(std::uint32_t)));
   CHECK(few.surface_photons + few.volume_photons == room);
   CHECK(small.memory().vertices < light.memory().vertices);
@@ -333,7 +388,7 @@ WFPG_TEST_CASE("photons, beams and what had no memory are counted", "[bidirectio
 
   small.begin_iteration(2, 1.0f);
   const bidirectional_statistics none = small.statistics();
-  CHECK(none.vertices + none.dropped_vertices + none.beams + none.dropped_beams == 0);
+  CHECK(none.vertices + none.dropped_vertices + none.beams + none.dropped_beams + none.surplus_beams == 0);
   CHECK(none.surface_photons + none.volume_photons + none.beam_pieces == 0);
 }
 
@@ -418,7 +473,7 @@ TEST_CASE("options and iterations out of range are refused by their names", "[bi
   refuses("max_beams", [](bidirectional_options& o) { o.max_beams = 0; });
   refuses("segment_beams", [](bidirectional_options& o) { o.segment_beams = 0; });
   refuses("bidirectional_options.beam_paths", [](bidirectional_options& o) { o.beam_paths = 0; });
-  refuses("budget_bytes", [](bidirectional_options& o) { o.budget_bytes = 7; });
+  refuses("bidirectional_options.budget_bytes", [](bidirectional_options& o) { o.budget_bytes = 7; });
   for (const float wrong : {0.0f, -1.0f, 1.1f, nan}) {
     refuses("surface_radius", [&](bidirectional_options& o) { o.surface_radius = wrong; });
     refuses("volume_radius", [&](bidirectional_options& o) { o.volume_radius = wrong; });
@@ -426,8 +481,11 @@ TEST_CASE("options and iterations out of range are refused by their names", "[bi
   }
   light made(exec, all_techniques());
   CHECK_THROWS_WITH(made.begin_iteration(0, 1.0f), WFPG_TEST_CONTAINS("iteration"));
-  for (const float wrong : {0.0f, -1.0f, nan})
+  for (const float wrong : {0.0f, -1.0f, nan, 2e9f})
     CHECK_THROWS_WITH(made.begin_iteration(1, wrong), WFPG_TEST_CONTAINS("scene_radius"));
+  using without_beams = wfpg::bidirectional<one_policy, vertex, photon>;
+  CHECK_THROWS_WITH(without_beams(exec, all_techniques()),
+                    WFPG_TEST_CONTAINS("bidirectional_options.beams is true"));
 }
 
 WFPG_TEST_CASE("each allocation of an iteration may fail, and the next iteration goes on",

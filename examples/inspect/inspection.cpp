@@ -246,7 +246,8 @@ void inspect_both_ends(const render::scene& scene, const inspection& asked, std:
   numbers.update(numbers_of_both_ends(found));
   if (found.dropped > 0)
     add_note(std::to_string(found.dropped) +
-                 " vertices of light paths had no memory, and their light is missing; raise --light-memory.",
+                 " vertices and beams of light paths had no memory, and their light is missing; raise "
+                 "--light-memory.",
              shown, log);
   show_both_ends(found, asked.x, asked.y, scene.view.up, folder, shown);
   finish(folder, numbers, shown);

@@ -11,8 +11,6 @@ const vec3 lamp(0.0f, 1.0f, 0.0f), eye(0.0f, 0.0f, -3.0f), ahead(0.0f, 0.0f, 1.0
 
 bidirectional_options merges(bool points, bool beams) {
   bidirectional_options options;
-  options.light_hits = options.next_event = options.connections = options.splats = false;
-  options.surface_points = false;
   options.beam_points = points;
   options.beams = beams;
   options.paths = 1 << 15;

@@ -140,9 +140,10 @@ struct render_report {
   slot_report slots;
   records_report records;
   std::size_t regions = 0;             ///< of Open PGL's field
-  std::size_t light_vertex_bytes = 0;  ///< memory of light paths' vertices
+  std::size_t light_vertex_bytes = 0;  ///< memory of light paths, of maps over them, and of connections
   /// Vertices of light paths that had no memory. The picture lacks their light.
   std::uint64_t dropped_light_vertices = 0;
+  std::uint64_t surplus_beams = 0;  ///< photon beams beyond the most media on a segment
   double cones_per_segment = 0.0;
 };
 

@@ -241,7 +241,8 @@ void add_bidirectional_options(CLI::App& app, render_options& options) {
              names_of(points_beams_and_paths()) + "; of vcm: without the last three; of bpt: without merges)")
       ->type_name("NAMES");
   app.add_option("--light-memory", options.light.budget_bytes,
-                 with_default("memory of light paths' vertices", options.light.budget_bytes))
+                 with_default("memory of light paths' vertices, and as much of their beams",
+                              options.light.budget_bytes))
       ->transform(byte_count());
   app.add_option("--radius", options.light.surface_radius,
                  with_default("of the first sample's merges on surfaces, over the scene's radius",

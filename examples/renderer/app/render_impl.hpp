@@ -338,6 +338,7 @@ void take_more(const bidirectional_tracer<Exec, Caster>& tracer, const render_op
                render_result& result) {
   result.report.light_vertex_bytes = tracer.light_bytes();
   result.report.dropped_light_vertices = tracer.dropped();
+  result.report.surplus_beams = tracer.surplus_beams();
   for (technique_picture& found : tracer.technique_pictures())
     result.by_technique.push_back({found.by,
                                    {options.width, options.height, std::move(found.weighted)},

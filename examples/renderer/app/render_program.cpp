@@ -185,7 +185,12 @@ int render_scene(arguments& given, std::ostream& out, std::ostream& log) {
   bar.finish();
   if (result.report.dropped_light_vertices > 0)
     log << "wfpg-render: warning: " << result.report.dropped_light_vertices
-        << " vertices of light paths had no memory, and their light is missing; raise --light-memory\n";
+        << " vertices and beams of light paths had no memory, and their light is missing; raise "
+           "--light-memory\n";
+  if (result.report.surplus_beams > 0)
+    log << "wfpg-render: warning: " << result.report.surplus_beams
+        << " photon beams are missing, since segments of light paths cross more than "
+        << wfpg::bidirectional_options().segment_beams << " media; leave bb1d out of --techniques\n";
   if (!write_all(given, result, reference, out, log)) return failure;
   return result.is_stopped ? interrupted : 0;
 }

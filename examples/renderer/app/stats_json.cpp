@@ -76,7 +76,8 @@ void write_stats(const std::string& path, const render_report& report,
   if (report.records.builds > 0) stats["records"] = records_of(report.records);
   if (report.light_vertex_bytes > 0)
     stats["light_vertices"] = {{"bytes", report.light_vertex_bytes},
-                               {"dropped", report.dropped_light_vertices}};
+                               {"dropped", report.dropped_light_vertices},
+                               {"surplus_beams", report.surplus_beams}};
   if (report.regions > 0) stats["regions"] = report.regions;
   stats["cones_per_segment"] = report.cones_per_segment;
   if (error) stats["error"] = to_json(*error);

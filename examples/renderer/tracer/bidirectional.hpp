@@ -79,6 +79,7 @@ class observed_bidirectional_tracer {
     // It waits, so that a look at the time sees the whole sample.
     const wfpg::bidirectional_statistics left = light_.statistics();
     dropped_ += std::uint64_t(left.dropped_vertices) + left.dropped_beams;
+    surplus_beams_ += left.surplus_beams;
     clock_.resolve();
   }
 
@@ -100,7 +101,9 @@ class observed_bidirectional_tracer {
   photon_gather photons() { return light_.gather(); }
   /// Vertices and beams of light paths that had no memory, over all samples. Their light is missing.
   std::uint64_t dropped() const { return dropped_; }
-  /// Bytes of the vertices and beams of light paths, and of the maps over them.
+  /// Photon beams beyond the most that a segment leaves, over all samples. Their light is missing.
+  std::uint64_t surplus_beams() const { return surplus_beams_; }
+  /// Bytes of the vertices and beams of light paths, of the maps over them, and of connections.
   std::size_t light_bytes() const { return light_.memory().total() + connections_.bytes(); }
   const named_seconds& seconds() const { return clock_.seconds(); }
 
@@ -169,7 +172,7 @@ class observed_bidirectional_tracer {
     const bool is_last = segments + 1 == settings_.max_depth;
     active_.for_each(exec_, extend_light_paths<world_type>{world_, is_last, paths_.view(), vertices_.view(),
                                                            active_.marks(), light_.light_recorder()});
-    active_.collect(exec_, count_);
+    if (!is_last) active_.collect(exec_, count_);
     connections_.end_segment(stored(), segments);
   }
 
@@ -224,7 +227,7 @@ class observed_bidirectional_tracer {
                      trace_camera_paths<world_type, merges>{
                          world_, segments, paths_.view(), vertices_.view(), active_.marks(), joined_.marks(),
                          light_.gather(), found(), film_.segment_counts(), film_.light_hit_counts()});
-    joined_.collect(exec_, count_);
+    if (segments < settings_.max_depth) joined_.collect(exec_, count_);
   }
 
   Exec exec_;
@@ -245,7 +248,7 @@ class observed_bidirectional_tracer {
   path_film<Exec> film_;
   technique_film<Exec> by_technique_;
   policy_clock<Exec> clock_;
-  std::uint64_t dropped_ = 0;
+  std::uint64_t dropped_ = 0, surplus_beams_ = 0;
 };
 
 template <class Exec, class Caster>

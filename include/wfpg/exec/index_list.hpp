@@ -53,18 +53,19 @@ class index_list {
  public:
   /// Has no elements.
   index_list() = default;
-  /// Allocates. The list is empty. Throws out_of_memory, and std::invalid_argument where `capacity` is 2³² or
-  /// more.
+  /// Allocates. The list is empty, and marks are not initialised. Throws out_of_memory, and
+  /// std::invalid_argument where `capacity` is 2³² or more.
   index_list(const Exec& exec, std::size_t capacity)
       : marks_(exec, checked(capacity)), places_(exec, capacity), indices_(exec, capacity), count_(exec, 1) {
     exec.fill_bytes(count_.data(), 0, count_.bytes());
   }
 
-  /// For kernels: 1 where the element is to be listed, and 0 elsewhere.
+  /// For kernels, which write each of them before collect(): 1 where the element is to be listed, else 0.
   array_view<std::uint32_t> marks() { return marks_.view(); }
-  /// Lists those of the first n elements that are marked. The marks stay. O(n). Throws out_of_memory.
-  /// Precondition: n is at most the capacity.
+  /// Lists those of the first n elements that are marked. The marks stay. O(n). Throws out_of_memory, and
+  /// std::invalid_argument where n is above the capacity.
   void collect(const Exec& exec, std::size_t n) {
+    require(n <= capacity(), "n", n, "at most the index_list's capacity");
     if (n == 0) return exec.fill_bytes(count_.data(), 0, count_.bytes());
     ::thrust::exclusive_scan(exec.thrust(), marks_.data(), marks_.data() + n, places_.data(), 0u);
     exec.for_each(n,
@@ -73,10 +74,10 @@ class index_list {
   /// Calls f(i) for each listed index, in no order.
   template <class F>
   void for_each(const Exec& exec, const F& f) const {
-    exec.for_each(count(), detail::call_at_index<F>{indices_.view(), f});
+    if (capacity() > 0) exec.for_each(count(), detail::call_at_index<F>{indices_.view(), f});
   }
 
-  /// The number of indices.
+  /// The number of indices. Precondition: the list was made with an execution policy.
   exec::device_count count() const { return {count_.data(), indices_.size()}; }
   /// The indices, ascending. As many as count() says are valid.
   array_view<const std::uint32_t> indices() const { return indices_.view(); }

@@ -18,6 +18,7 @@
 #include <cstddef>
 #include <new>
 #include <type_traits>
+#include <utility>
 
 namespace wfpg {
 
@@ -26,7 +27,7 @@ namespace wfpg {
 template <class T>
 class tiled_view {
  public:
-  static_assert(std::is_trivially_copyable_v<T>);
+  static_assert(std::is_trivially_copyable_v<T> && std::is_default_constructible_v<T>);
 #if defined(__CUDA_ARCH__)
   using element = T;  ///< what reading gives: on a GPU a copy, else a reference
 #else
@@ -93,22 +94,35 @@ template <class T, class Exec>
 class tiled_array {
  public:
   /// Has no elements.
+  /// Its view has none, either.
   tiled_array() = default;
   /// Allocates memory for `size` elements.
   /// Throws out_of_memory.
   tiled_array(const Exec& exec, std::size_t size)
       : elements_(exec, (size + tile - 1) / tile * tile), size_(size) {}
 
+  /// Move constructor. The moved-from array has no elements.
+  tiled_array(tiled_array&& other) noexcept
+      : elements_(std::move(other.elements_)), size_(std::exchange(other.size_, 0)) {}
+  /// Move assignment. The moved-from array has no elements.
+  tiled_array& operator=(tiled_array&& other) noexcept {
+    elements_ = std::move(other.elements_);
+    size_ = std::exchange(other.size_, 0);
+    return *this;
+  }
+
   /// View for kernels.
   /// Valid until the owner is destroyed or moved into.
   tiled_view<T> view() const { return {elements_.data(), size_}; }
   /// Number of elements.
+  /// Those that fill the last tile do not count.
   std::size_t size() const { return size_; }
   /// Bytes allocated, with those that fill the last tile.
   std::size_t bytes() const { return elements_.bytes(); }
 
  private:
-  // Elements of a tile. It is 1 where a GPU has no tiles.
+  // Elements of a tile.
+  // It is 1 where a GPU has no tiles.
   static constexpr std::size_t tile = detail::tiled_layout<T>::tile;
 
   buffer<T, Exec> elements_;  // whole tiles

@@ -92,7 +92,8 @@ class beam_map {
   /// Throws out_of_memory, after which the map has no beams. Throws std::invalid_argument that names the
   /// option out of range.
   void build(const Exec& exec, array_view<const path_beam> beams, const beam_map_options& options) {
-    require(is_finite(options.radius) && options.radius >= 1.0e-15f && options.radius <= largest_coordinate,
+    require(is_finite(options.radius) && options.radius >= least_merge_radius &&
+                options.radius <= largest_coordinate,
             "beam_map_options.radius", options.radius, "in [1e-15, 1e15]");
     require(options.max_pieces >= beams.size() && options.max_pieces < (std::size_t(1) << 28),
             "beam_map_options.max_pieces", options.max_pieces,

@@ -21,8 +21,9 @@
 //
 // Cost: a scan of paths a depth, and a tree for each photon technique.
 //
-// Memory: sizeof(Vertex) + 20 bytes a vertex, and for each technique of points sizeof(Photon) + 23 a photon.
-// A beam takes sizeof(Beam) + 40 bytes, and 46 for each of its 16 pieces.
+// Memory: sizeof(Vertex) + 8 bytes a vertex, 12 more where photons are merged, and for each technique of
+// points sizeof(Photon) + 23 a photon. A beam takes sizeof(Beam) + 40 bytes, and 46 for each of its 16
+// pieces. While a tree is built, it takes 133 bytes a photon or piece. A path takes 8 bytes.
 #pragma once
 
 #include <wfpg/base/types.hpp>
@@ -53,11 +54,12 @@ struct no_beam {
 /// order on every policy.
 ///
 /// Vertex: what connections and Photon read of a light path's vertex. It has two members:
-///   vec3 position() const;    world space, scene units
-///   bool in_medium() const;   the path has scattered in a medium there
-/// Photon: what merges read of a vertex. It has a constructor from a Vertex.
+///   WFPG_HD vec3 position() const;    world space, scene units
+///   WFPG_HD bool in_medium() const;   the path has scattered in a medium there
+/// Photon: what merges read of a vertex. It has a WFPG_HD constructor from a Vertex.
 /// Beam: what merges read of a photon beam. It has a member `path_beam beam`.
-/// All are trivially copyable. Where a part is missing, the compiler's message says which.
+/// All are trivially copyable, have a default constructor and can be assigned. Where a part is missing, the
+/// compiler's message says which.
 template <class Exec, class Vertex, class Photon = Vertex, class Beam = no_beam>
 class bidirectional {
   static_assert(exec::detail::require_policy<Exec>());
@@ -67,46 +69,49 @@ class bidirectional {
   using light_recorder_type = light_recorder_view<Vertex, Beam>;  ///< for kernels of light paths
   using gather_type = light_gather_view<Vertex, Photon, Beam>;    ///< for kernels of camera paths
 
-  /// Allocates stores of vertices and beams. Maps are allocated by build(). Throws std::invalid_argument that
-  /// names the option out of range, and out_of_memory.
+  /// Allocates stores of vertices and beams. Maps are allocated by build(). Where photons are merged, at most
+  /// 2^28 - 1 vertices and 2^24 - 1 beams are stored. Call begin_iteration() before all else. Throws
+  /// std::invalid_argument that names the option out of range, and out_of_memory.
   bidirectional(const Exec& exec, const bidirectional_options& options)
       : exec_(exec),
         options_(checked(options)),
-        vertices_(exec,
-                  {options.reads_vertices() ? options.paths : 0, options.budget_bytes, options.max_vertices}),
-        beams_(exec, {options.count_beam_paths(), options.budget_bytes, options.max_beams}),
+        vertices_(exec, {options.reads_vertices() ? options.paths : 0,
+                         budget_for<Vertex>(options, options.merges() ? most_photons : ~std::size_t(0)),
+                         options.max_vertices}),
+        beams_(exec, {options.count_beam_paths(), budget_for<Beam>(options, most_photons / pieces_a_beam),
+                      options.max_beams}),
         pending_(exec, options.count_beam_paths() * options.segment_beams),
         pending_counts_(exec, options.count_beam_paths()),
         lost_(exec, options.count_beam_paths()) {
     begin_iteration(1, 1.0f);
   }
 
-  /// Forgets all light paths, and sets the radii of an iteration. Writes 4 bytes a path.
+  /// Forgets all light paths, and sets the radii of an iteration. Writes 8 bytes a path.
   /// `iteration`: from 1. Radii shrink with it.
-  /// `scene_radius`: of a ball around what the camera sees, scene units. Radii are fractions of it.
-  /// Throws std::invalid_argument where either is not positive.
+  /// `scene_radius`: of a ball around what the camera sees, scene units, above 0 and at most 1e9. Radii are
+  /// fractions of it.
+  /// Throws std::invalid_argument where either is out of range.
   void begin_iteration(std::uint32_t iteration, float scene_radius);
 
   /// How many samples a camera path has of each technique in this iteration, for weights.
   const path_techniques& techniques() const { return techniques_; }
 
-  /// Returns the view with which kernels record light paths, valid for this iteration.
+  /// Returns the view with which kernels record light paths. It is valid for this iteration, before and after
+  /// reserve().
   light_recorder_type light_recorder() { return {vertices_.view(), pending()}; }
 
   /// Finds places for the paths' new vertices, and stores the beams that they have left. Call it once a
   /// depth. On a GPU it returns before the work is done. O(paths).
   /// `keeps`: for each path 1 where its new vertex is to be stored, else 0. It is not read where no technique
   /// reads vertices.
-  /// Throws as light_vertices::reserve().
+  /// Throws as light_vertices::reserve(). After out_of_memory, begin the iteration again.
   void reserve(array_view<const std::uint32_t> keeps) {
+    store_beams();
     if (options_.reads_vertices()) vertices_.reserve(exec_, keeps);
-    if (beam_paths() == 0) return;
-    beams_.reserve(exec_, pending_counts_.view());
-    exec_.for_each(beam_paths(), detail::store_beams<Beam>{pending(), beams_.view()});
   }
 
-  /// Builds the maps of all photon techniques, and waits. Throws out_of_memory, after which there are no
-  /// photons; begin the iteration again.
+  /// Stores beams that were added since the last reserve(), builds the maps of all photon techniques, and
+  /// waits. Throws out_of_memory, after which there are no photons: begin the iteration again.
   void build();
 
   /// Returns the view with which kernels find light, valid for this iteration. Before build() it finds no
@@ -153,9 +158,14 @@ class bidirectional {
   detail::pending_beams<Beam> pending() {
     return {pending_.view(), pending_counts_.view(), lost_.view(), options_.segment_beams};
   }
-  /// The positions of the stored vertices in media, or on surfaces.
-  array_view<const vec3> positions(bool in_media) {
-    const std::uint32_t vertices = vertices_.size(exec_);
+  /// Stores the beams that have no place yet.
+  void store_beams() {
+    if (beam_paths() == 0) return;
+    beams_.reserve(exec_, pending_counts_.view());
+    exec_.for_each(beam_paths(), detail::store_beams<Beam>{pending(), beams_.view()});
+  }
+  /// The positions of the stored vertices, as many, in media or on surfaces.
+  array_view<const vec3> positions(std::uint32_t vertices, bool in_media) {
     if (positions_.size() < vertices) positions_ = buffer<vec3, Exec>(exec_, vertices_.capacity());
     exec_.for_each(vertices,
                    detail::copy_photon_positions<Vertex>{vertices_.view(), in_media, positions_.view()});
@@ -164,11 +174,16 @@ class bidirectional {
 
   // Fewer leave boxes empty: 6 took up to 1.3 of the time on a GPU, and 2 took 2.8. 48 took up to 1.2.
   static constexpr std::size_t pieces_a_beam = 16;
+  // A map takes as many photons, or pieces of beams.
+  static constexpr std::size_t most_photons = (std::size_t(1) << 28) - 1;
 
   // Before memory is asked for.
-  static const bidirectional_options& checked(const bidirectional_options& options) {
-    require_in_range(options);
-    return options;
+  static const bidirectional_options& checked(const bidirectional_options& options);
+  /// The budget, or what `most` of T take where that is less.
+  template <class T>
+  static std::size_t budget_for(const bidirectional_options& options, std::size_t most) {
+    constexpr std::size_t each = sizeof(T) + 2 * sizeof(std::uint32_t);
+    return options.budget_bytes / each < most ? options.budget_bytes : most * each;
   }
 
   Exec exec_;

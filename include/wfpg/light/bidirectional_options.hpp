@@ -1,4 +1,4 @@
-// What bidirectional is told and tells: options, statistics and memory. Cheap to include.
+// Options, radii, statistics and memory of light/bidirectional.hpp. Cheap to include.
 //
 // Cost: none. Memory: that of a few numbers.
 #pragma once
@@ -14,14 +14,19 @@
 namespace wfpg {
 
 /// Options of bidirectional. Techniques are as in path_techniques. By default they are those of vertex
-/// connection and merging.
+/// connection and merging. The host must sample each technique that is on: weights leave a share of the
+/// light to it. Splats need a wfpg::splats of the host's own.
 struct bidirectional_options {
-  std::size_t paths = 0;           ///< light paths of an iteration, at least 1, below 2^32 - 1
-  std::uint32_t max_vertices = 8;  ///< most vertices of a path that are stored, at least 1
-  std::uint32_t max_beams = 16;    ///< most beams of a path that are stored, at least 1
-  /// Most beams that a path leaves between two calls of reserve(), at least 1: media on one segment.
+  std::size_t paths = 0;  ///< light paths of an iteration, at least 1, below 2^32 - 1
+  /// Vertices a path for which memory is allocated at most, at least 1. A path may have more where others
+  /// have fewer.
+  std::uint32_t max_vertices = 8;
+  std::uint32_t max_beams = 16;  ///< likewise of beams, a path that leaves any
+  /// Most beams that a path leaves between two calls of reserve(), at least 1: media on one segment. Each
+  /// takes sizeof(Beam) bytes for each path that leaves beams, beside the budget.
   std::uint32_t segment_beams = 8;
-  /// Memory for vertices, and as much for beams, bytes.
+  /// Memory for vertices, and as much for beams, bytes: room for one at least. What paths take, and maps, is
+  /// not counted.
   std::size_t budget_bytes = std::size_t(1) << 30;
 
   bool light_hits = true;      ///< camera paths hit lights
@@ -79,12 +84,14 @@ struct merge_radii {
   float beams = 0.0f;        ///< of beams with camera beams
 };
 
-/// Returns the radii of an iteration, from 1. `scene_radius`: as bidirectional::begin_iteration() takes it.
+/// Returns the radii of an iteration. They are kept above 1e-15 scene units, and above 1e-12 for points in
+/// media, so that their volumes are normal floats.
+/// `iteration`: from 1. `scene_radius`: as bidirectional::begin_iteration() takes it.
 inline merge_radii radii_of(const bidirectional_options& options, std::uint32_t iteration,
                             float scene_radius) {
   const auto radius = [&](bool is_on, float first, int dimension) {
     const radius_schedule schedule{first * scene_radius, options.radius_alpha, dimension};
-    return is_on ? std::max(schedule(iteration), least_merge_radius) : 0.0f;
+    return is_on ? std::max(schedule(iteration), dimension == 3 ? 1.0e-12f : least_merge_radius) : 0.0f;
   };
   merge_radii radii;
   radii.surface = radius(options.surface_points, options.surface_radius, 2);
@@ -99,18 +106,20 @@ struct bidirectional_statistics {
   std::uint32_t vertices = 0;          ///< stored
   std::uint32_t dropped_vertices = 0;  ///< without memory: their light is missing
   std::uint32_t beams = 0;             ///< stored
-  std::uint32_t dropped_beams = 0;     ///< without memory, or beyond segment_beams
+  std::uint32_t dropped_beams = 0;     ///< without memory: their light is missing
+  std::uint32_t surplus_beams = 0;     ///< beyond segment_beams: their light is missing
   /// Photons of merges on surfaces, at points in media, and along camera beams.
   std::uint32_t surface_photons = 0, volume_photons = 0, beam_point_photons = 0;
   std::uint32_t beam_pieces = 0;  ///< of all beams
   merge_radii radii;              ///< of the iteration
 };
 
-/// Bytes that bidirectional holds: those of the largest iteration so far.
+/// Bytes that bidirectional holds.
 struct bidirectional_memory {
-  std::size_t vertices = 0;  ///< stored vertices
-  std::size_t beams = 0;     ///< stored beams, and those without a place yet
-  std::size_t maps = 0;      ///< trees, and photons in their order
+  std::size_t vertices = 0;  ///< of the store of vertices
+  std::size_t beams = 0;     ///< of the store of beams, and of those without a place yet
+  /// Of trees, photons in their order, and copied positions and beams: those of the largest iteration so far.
+  std::size_t maps = 0;
 
   std::size_t total() const { return vertices + beams + maps; }  ///< of all three
 };

@@ -3,7 +3,8 @@
 // segments.
 //
 //   gather.merge_on_surface(p, [&](const Photon& photon, const photon_merge& at) {
-//     radiance += throughput * bsdf(photon) * photon.flux * at.scale * weight(photon);
+//     const float f = bsdf.eval(outgoing, photon.incident);    // with the cosine
+//     radiance += throughput * photon.flux * at.scale * weight(photon) * f / cosine(photon.incident);
 //   });
 //
 // Weights are those of light/path_weights.hpp, with the counts of bidirectional::techniques().
@@ -56,19 +57,21 @@ class light_gather_view {
   /// Finds nothing.
   light_gather_view() = default;
 
-  /// The stored vertices, for connections.
+  /// The stored vertices, for connections: those of a path from last(path) back by previous(i), to `none`.
   WFPG_HD const light_vertices_view<Vertex>& vertices() const { return vertices_; }
   /// The stored beams.
   WFPG_HD const light_vertices_view<Beam>& beams() const { return beams_; }
 
   /// Calls f(const Photon&, const photon_merge&) for each vertex on a surface that is within the radius of a
-  /// point (P-P2D). Divide by the cosine between the photon's direction and the geometric normal.
+  /// point (P-P2D). A BSDF that includes the cosine is to be divided by it: that of the geometric normal and
+  /// the photon's direction.
   template <class F>
   WFPG_HD void merge_on_surface(vec3 p, const F& f) const {
     merge_at(on_surfaces_, p, f);
   }
   /// Calls f(const Photon&, const photon_merge&) for each vertex in a medium that is within the radius of a
-  /// point in one (P-P3D). The photon may lie in another medium.
+  /// point in one (P-P3D). The photon may lie in another medium. Where both paths have the scattering
+  /// coefficient in what they carry, divide by it.
   template <class F>
   WFPG_HD void merge_in_medium(vec3 p, const F& f) const {
     merge_at(in_media_, p, f);
@@ -84,8 +87,8 @@ class light_gather_view {
             photon_merge{at.kernel * near.scale, at.t_camera, 0.0f, 1.0f, near.map.index(place)});
         });
   }
-  /// Calls f(const Beam&, const photon_merge&) for each photon beam along a camera beam (B-B1D). `camera`: as
-  /// above.
+  /// Calls f(const Beam&, const photon_merge&) for each photon beam along a camera beam (B-B1D).
+  /// `camera`: a part of the camera path in one medium, begin at least 0.
   template <class F>
   WFPG_HD void merge_beams_along(const path_beam& camera, const F& f) const {
     beam_map_.for_each_beam_along(

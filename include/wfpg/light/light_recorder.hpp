@@ -1,6 +1,6 @@
-// How kernels of light paths hand over vertices and photon beams: the view that
-// bidirectional::light_recorder() returns. A path tells of beams where it crosses a medium. It writes its new
-// vertex, where it keeps one, after bidirectional::reserve().
+// How kernels of light paths record vertices and photon beams: the view that bidirectional::light_recorder()
+// returns. A path adds a beam where it crosses a medium. It writes its new vertex, where it keeps one, after
+// bidirectional::reserve().
 //
 // Cost: a vertex or a beam is written once; a beam is copied once more. Memory: that of
 // light/bidirectional.hpp.
@@ -50,14 +50,15 @@ class light_recorder_view {
   /// Whether a path's new vertex has a place, after bidirectional::reserve(). False where the path keeps
   /// none, and where memory was used up.
   WFPG_HD bool has_place(std::size_t path) const { return stores_vertices() && vertices_.has_place(path); }
-  /// Stores a path's new vertex. O(1). Call it at most once after each reserve(). Precondition:
-  /// has_place(path).
+  /// Stores a path's new vertex. O(1). Precondition: has_place(path). Then call it exactly once after each
+  /// reserve(): the place counts as a vertex from then on.
   WFPG_HD void write(std::size_t path, const Vertex& vertex) const { vertices_.write(path, vertex); }
 
   /// Whether a path leaves beams: the first ones of an iteration do, as many as
   /// bidirectional_options::beam_paths says.
   WFPG_HD bool leaves_beams(std::size_t path) const { return path < beams_.paths(); }
-  /// Leaves a beam in a medium, before the next reserve(). O(1). Precondition: leaves_beams(path).
+  /// Adds a beam in a medium. O(1). The next reserve() or build() stores it. Precondition:
+  /// leaves_beams(path).
   WFPG_HD void add_beam(std::size_t path, const Beam& beam) const { beams_.add(path, beam); }
 
  private:

@@ -48,8 +48,8 @@ class light_vertices_view {
   WFPG_HD std::size_t paths() const { return last_.size(); }
   /// Most vertices that can be stored.
   WFPG_HD std::size_t capacity() const { return vertices_.size(); }
-  /// Number of vertices stored so far in this iteration.
-  WFPG_HD std::uint32_t size() const { return *size_; }
+  /// Number of vertices stored so far in this iteration. It is read from the policy's memory.
+  WFPG_HD std::uint32_t size() const { return size_ ? *size_ : 0; }
   /// A stored vertex, on a GPU a copy. Precondition: i < size().
   WFPG_HD typename tiled_view<Vertex>::element operator[](std::uint32_t i) const { return vertices_[i]; }
   /// The path of a stored vertex. Precondition: i < size().
@@ -59,10 +59,12 @@ class light_vertices_view {
   /// Index of a path's last stored vertex, or `none`.
   WFPG_HD std::uint32_t last(std::size_t path) const { return last_[path]; }
 
-  /// Whether the path's new vertex has a place, after light_vertices::reserve(). False where the path told of
-  /// no vertex to keep, and where memory was used up. `which`: of several new ones, from 0.
+  /// Whether the path's new vertex has a place, after light_vertices::reserve(). False where the path keeps
+  /// no vertex, where memory was used up, and before the iteration's first reserve(). `which`: of several new
+  /// ones, from 0.
   WFPG_HD bool has_place(std::size_t path, std::uint32_t which = 0) const {
-    return places_[path] != none && which < vertices_.size() - places_[path];
+    const std::uint32_t place = places_[path];
+    return place < vertices_.size() && which < vertices_.size() - place;
   }
   /// Stores the path's new vertex, which becomes its last. O(1). Precondition: has_place(path, which). Call
   /// it once for each new vertex after each reserve(), in order, from one thread for each path.
@@ -125,7 +127,8 @@ struct light_vertices_options {
   std::size_t paths = 0;  ///< light paths of an iteration, below 2^32 - 1
   /// Memory for vertices, bytes. What each path needs beside is not counted.
   std::size_t budget_bytes = std::size_t(1) << 30;
-  /// Most vertices of a path that are stored, at least 1. Memory for more than all paths' is not allocated.
+  /// Vertices a path for which memory is allocated at most, at least 1. A path may have more where others
+  /// have fewer.
   std::uint32_t max_vertices = 8;
 };
 
@@ -147,9 +150,10 @@ class light_vertices {
     begin(exec);
   }
 
-  /// Forgets all vertices, for a new iteration. Writes 4 bytes a path.
+  /// Forgets all vertices, for a new iteration. Writes 8 bytes a path.
   void begin(const Exec& exec) {
-    exec.fill_bytes(last_.data(), 0xff, last_.size() * sizeof(std::uint32_t));
+    exec.fill_bytes(last_.data(), 0xff, last_.bytes());
+    exec.fill_bytes(places_.data(), 0xff, places_.bytes());
     exec.fill_bytes(counts_.data(), 0, counts_.size() * sizeof(std::uint32_t));
   }
 
@@ -185,11 +189,9 @@ class light_vertices {
   /// Most vertices that it can store.
   std::size_t capacity() const { return vertices_.size(); }
   /// Number of vertices stored in this iteration. Waits for the work before it.
-  std::uint32_t size(const Exec& exec) const { return read_element(exec, counts_.data() + counter_stored); }
+  std::uint32_t size(const Exec& exec) const { return count(exec, counter_stored); }
   /// Number of vertices of this iteration that had no place, modulo 2^32. Waits for the work before it.
-  std::uint32_t dropped(const Exec& exec) const {
-    return read_element(exec, counts_.data() + counter_dropped);
-  }
+  std::uint32_t dropped(const Exec& exec) const { return count(exec, counter_dropped); }
   /// Bytes allocated, without the scan's temporaries.
   std::size_t bytes() const {
     return vertices_.bytes() + paths_.bytes() + previous_.bytes() + last_.bytes() + places_.bytes() +
@@ -200,6 +202,9 @@ class light_vertices {
   static constexpr std::uint32_t none = light_vertices_view<Vertex>::none;
   enum : std::uint32_t { counter_new, counter_stored, counter_dropped, counters };
 
+  std::uint32_t count(const Exec& exec, std::uint32_t which) const {
+    return counts_.size() > 0 ? read_element(exec, counts_.data() + which) : 0;
+  }
   static std::size_t capacity_of(const light_vertices_options& options) {
     require(options.paths < none, "light_vertices_options.paths", options.paths, "less than 2^32 - 1");
     require(options.max_vertices > 0, "light_vertices_options.max_vertices", options.max_vertices,

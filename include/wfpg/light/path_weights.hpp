@@ -51,7 +51,8 @@ struct basic_path_techniques {
   Real light_hits = 1;
   /// Light samples at each vertex of the camera path.
   Real next_event = 1;
-  /// Light paths with whose vertices each vertex of the camera path is connected.
+  /// Light paths with whose vertices each vertex of the camera path is connected. With 1, connect with all
+  /// vertices of one light path, such as the one of the pixel's index. Do not divide by the number of paths.
   Real connections = 1;
   /// Light paths whose vertices are connected to the camera: all those of an iteration, n_L.
   Real splats = 0;
@@ -71,7 +72,9 @@ struct basic_light_end {
   Real pdf_trace = 0;      ///< of the point, or a distant light's direction, where a light path begins
   Real pdf_connect = 0;    ///< of the same where next-event estimation chooses it
   Real pdf_direction = 0;  ///< with which a light path leaves it toward its next vertex
-  Real cosine = 1;         ///< between the light's normal and that direction, in (0, 1]; 1 for distant lights
+  /// Between the light's normal and that direction, in (0, 1]; 1 for distant lights. light_hit() does not
+  /// read it.
+  Real cosine = 1;
   /// A point, a spot, or a direction: no camera path hits it. Densities are then probabilities.
   bool is_delta = false;
   bool is_distant = false;  ///< at infinity: distances to it do not count

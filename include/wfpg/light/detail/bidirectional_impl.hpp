@@ -10,8 +10,22 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <string>
+#include <type_traits>
 
 namespace wfpg {
+
+template <class Exec, class Vertex, class Photon, class Beam>
+const bidirectional_options& bidirectional<Exec, Vertex, Photon, Beam>::checked(
+    const bidirectional_options& options) {
+  require_in_range(options);
+  require(!options.beams || !std::is_same_v<Beam, no_beam>, "bidirectional_options.beams",
+          std::string("true"), "false, since the host has no type of beams");
+  const std::size_t largest = options.beams ? std::max(sizeof(Vertex), sizeof(Beam)) : sizeof(Vertex);
+  require(options.budget_bytes >= largest + 2 * sizeof(std::uint32_t), "bidirectional_options.budget_bytes",
+          options.budget_bytes, "room for a vertex and for a beam");
+  return options;
+}
 
 template <class Exec, class Vertex, class Photon, class Beam>
 path_techniques bidirectional<Exec, Vertex, Photon, Beam>::counts_of(const merge_radii& radii) const {
@@ -33,7 +47,8 @@ path_techniques bidirectional<Exec, Vertex, Photon, Beam>::counts_of(const merge
 template <class Exec, class Vertex, class Photon, class Beam>
 void bidirectional<Exec, Vertex, Photon, Beam>::begin_iteration(std::uint32_t iteration, float scene_radius) {
   require(iteration > 0, "iteration", iteration, "at least 1");
-  require(scene_radius > 0.0f, "scene_radius", scene_radius, "positive and finite");
+  require(scene_radius > 0.0f && scene_radius <= 1.0e9f, "scene_radius", scene_radius,
+          "above 0, at most 1e9");
   radii_ = radii_of(options_, iteration, scene_radius);
   techniques_ = counts_of(radii_);
   is_built_ = false;
@@ -46,10 +61,15 @@ void bidirectional<Exec, Vertex, Photon, Beam>::begin_iteration(std::uint32_t it
 template <class Exec, class Vertex, class Photon, class Beam>
 void bidirectional<Exec, Vertex, Photon, Beam>::build() {
   is_built_ = false;
+  store_beams();
   const light_vertices_view<Vertex> stored = vertices_.view();
-  if (options_.surface_points) on_surfaces_.build(exec_, positions(false), radii_.surface, stored);
-  if (options_.volume_points) in_media_.build(exec_, positions(true), radii_.volume, stored);
-  if (options_.beam_points) for_beams_.build(exec_, positions(true), radii_.beam_points, stored);
+  const std::uint32_t vertices = options_.reads_vertices() ? vertices_.size(exec_) : 0;
+  if (options_.surface_points) on_surfaces_.build(exec_, positions(vertices, false), radii_.surface, stored);
+  if (options_.volume_points || options_.beam_points) {
+    const array_view<const vec3> photons = positions(vertices, true);
+    if (options_.volume_points) in_media_.build(exec_, photons, radii_.volume, stored);
+    if (options_.beam_points) for_beams_.build(exec_, photons, radii_.beam_points, stored);
+  }
   if (beam_paths() > 0) build_beams();
   is_built_ = true;
 }
@@ -85,8 +105,9 @@ bidirectional_statistics bidirectional<Exec, Vertex, Photon, Beam>::statistics()
   s.vertices = vertices_.size(exec_);
   s.dropped_vertices = vertices_.dropped(exec_);
   s.beams = beams_.size(exec_);
+  s.dropped_beams = beams_.dropped(exec_);
   const array_view<const std::uint32_t> lost = lost_.view();
-  s.dropped_beams = ::thrust::reduce(exec_.thrust(), lost.begin(), lost.end(), beams_.dropped(exec_));
+  s.surplus_beams = ::thrust::reduce(exec_.thrust(), lost.begin(), lost.end(), 0u);
   s.radii = radii_;
   if (!is_built_) return s;
   s.surface_photons = on_surfaces_.map.view().size();

@@ -36,6 +36,11 @@ constexpr bool require_light_types() {
   static_assert(
       is_light_vertex<Vertex>::value,
       "Vertex: needs vec3 position() const and bool in_medium() const, and to be trivially copyable");
+  static_assert(std::is_default_constructible_v<Vertex> && std::is_default_constructible_v<Photon> &&
+                    std::is_default_constructible_v<Beam>,
+                "Vertex, Photon and Beam: need a default constructor");
+  static_assert(std::is_copy_assignable_v<Photon> && std::is_copy_assignable_v<Beam>,
+                "Photon and Beam: need to be assignable");
   static_assert(std::is_constructible_v<Photon, const Vertex&> && std::is_trivially_copyable_v<Photon>,
                 "Photon: needs a constructor from a Vertex, and to be trivially copyable");
   static_assert(is_photon_beam<Beam>::value,
