@@ -483,6 +483,9 @@ TEST_CASE("options and iterations out of range are refused by their names", "[bi
   CHECK_THROWS_WITH(made.begin_iteration(0, 1.0f), WFPG_TEST_CONTAINS("iteration"));
   for (const float wrong : {0.0f, -1.0f, nan, 2e9f})
     CHECK_THROWS_WITH(made.begin_iteration(1, wrong), WFPG_TEST_CONTAINS("scene_radius"));
+  bidirectional_options no_merges = all_techniques();
+  no_merges.surface_points = no_merges.volume_points = no_merges.beam_points = no_merges.beams = false;
+  CHECK_NOTHROW(light(exec, no_merges).begin_iteration(1, 1e14f));
   using without_beams = wfpg::bidirectional<one_policy, vertex, photon>;
   CHECK_THROWS_WITH(without_beams(exec, all_techniques()),
                     WFPG_TEST_CONTAINS("bidirectional_options.beams is true"));

@@ -88,8 +88,8 @@ class bidirectional {
 
   /// Forgets all light paths, and sets the radii of an iteration. Writes 8 bytes a path.
   /// `iteration`: from 1. Radii shrink with it.
-  /// `scene_radius`: of a ball around what the camera sees, scene units, above 0 and at most 1e9. Radii are
-  /// fractions of it.
+  /// `scene_radius`: of a ball around what the camera sees, scene units. Radii are fractions of it. Above 0
+  /// and at most 1e9 where photons are merged.
   /// Throws std::invalid_argument where either is out of range.
   void begin_iteration(std::uint32_t iteration, float scene_radius);
 

@@ -47,7 +47,7 @@ path_techniques bidirectional<Exec, Vertex, Photon, Beam>::counts_of(const merge
 template <class Exec, class Vertex, class Photon, class Beam>
 void bidirectional<Exec, Vertex, Photon, Beam>::begin_iteration(std::uint32_t iteration, float scene_radius) {
   require(iteration > 0, "iteration", iteration, "at least 1");
-  require(scene_radius > 0.0f && scene_radius <= 1.0e9f, "scene_radius", scene_radius,
+  require(!options_.merges() || (scene_radius > 0.0f && scene_radius <= 1.0e9f), "scene_radius", scene_radius,
           "above 0, at most 1e9");
   radii_ = radii_of(options_, iteration, scene_radius);
   techniques_ = counts_of(radii_);
