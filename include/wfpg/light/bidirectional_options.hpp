@@ -103,15 +103,16 @@ inline merge_radii radii_of(const bidirectional_options& options, std::uint32_t 
 
 /// What an iteration's light paths have left. A technique that is off has no photons.
 struct bidirectional_statistics {
-  std::uint32_t vertices = 0;          ///< stored
-  std::uint32_t dropped_vertices = 0;  ///< without memory: their light is missing
-  std::uint32_t beams = 0;             ///< stored
-  std::uint32_t dropped_beams = 0;     ///< without memory: their light is missing
-  std::uint32_t surplus_beams = 0;     ///< beyond segment_beams: their light is missing
-  /// Photons of merges on surfaces, at points in media, and along camera beams.
-  std::uint32_t surface_photons = 0, volume_photons = 0, beam_point_photons = 0;
-  std::uint32_t beam_pieces = 0;  ///< of all beams
-  merge_radii radii;              ///< of the iteration
+  std::uint32_t vertices = 0;            ///< stored
+  std::uint32_t dropped_vertices = 0;    ///< without memory: their light is missing
+  std::uint32_t beams = 0;               ///< stored
+  std::uint32_t dropped_beams = 0;       ///< without memory: their light is missing
+  std::uint32_t surplus_beams = 0;       ///< beyond segment_beams: their light is missing
+  std::uint32_t surface_photons = 0;     ///< of merges on surfaces
+  std::uint32_t volume_photons = 0;      ///< of merges at points in media
+  std::uint32_t beam_point_photons = 0;  ///< of merges along camera beams
+  std::uint32_t beam_pieces = 0;         ///< of all beams
+  merge_radii radii;                     ///< of the iteration
 };
 
 /// Bytes that bidirectional holds.
