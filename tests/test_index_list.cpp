@@ -76,17 +76,11 @@ TEST_CASE("index lists have fewer than 2^32 elements", "[index_list]") {
 WFPG_TEST_CASE("index lists free what they have where memory runs out", "[index_list]") {
   failing_resource resource;
   const Exec exec = Exec().with_resource(&resource);
-  std::size_t failures = 0;
-  for (std::size_t k = 1;; ++k) {
-    resource.fail_at(k);
-    const bool out = runs_out(resource, [&] {
-      wfpg::index_list<Exec> list(exec, 100);
-      exec.for_each(100, mark_some{1, 2, list.marks()});
-      list.collect(exec, 100);
-    });
-    CHECK(resource.live() == 0);
-    if (!out) break;
-    ++failures;
-  }
+  const std::size_t failures = fail_at_each(resource, [&] {
+    wfpg::index_list<Exec> list(exec, 100);
+    exec.for_each(100, mark_some{1, 2, list.marks()});
+    list.collect(exec, 100);
+  });
   CHECK(failures >= 4);
+  CHECK(resource.live() == 0);
 }

@@ -155,16 +155,10 @@ TEST_CASE("light vertices' options have ranges", "[light_vertices]") {
 WFPG_TEST_CASE("light vertices free what they have where memory runs out", "[light_vertices]") {
   failing_resource resource;
   const Exec exec = Exec().with_resource(&resource);
-  std::size_t failures = 0;
-  for (std::size_t k = 1;; ++k) {
-    resource.fail_at(k);
-    const bool out = runs_out(resource, [&] {
-      wfpg::light_vertices<Exec, test_vertex> vertices(exec, {50, 1 << 20, 2});
-      store_all(exec, vertices, random_paths{1}, 2);
-    });
-    CHECK(resource.live() == 0);
-    if (!out) break;
-    ++failures;
-  }
+  const std::size_t failures = fail_at_each(resource, [&] {
+    wfpg::light_vertices<Exec, test_vertex> vertices(exec, {50, 1 << 20, 2});
+    store_all(exec, vertices, random_paths{1}, 2);
+  });
   CHECK(failures >= 5);
+  CHECK(resource.live() == 0);
 }
