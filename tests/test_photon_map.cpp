@@ -148,7 +148,7 @@ WFPG_TEST_CASE("clustered and far photons, and many in one place, are found once
   CHECK(check_map(exec, map, joined(on_faces(500, vec3(-1e4f), 1.0f, 3), on_faces(500, vec3(1e4f), 1.0f, 4)),
                   0.05f) > 200);
   CHECK(check_map(exec, map, points(600, vec3(0.5f, -7.0f, 0.0f)), 0.1f) > 600 * 67);
-  CHECK(check_map(exec, map, points(600, vec3(0.0f)), photon_map<Exec>::least_radius) >= 600 * 67);
+  CHECK(check_map(exec, map, points(600, vec3(0.0f)), wfpg::least_merge_radius) >= 600 * 67);
 }
 
 WFPG_TEST_CASE("a photon is found at the radius, and not beyond", "[photon_map]") {

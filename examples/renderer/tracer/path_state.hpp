@@ -3,12 +3,15 @@
 
 #include "lights/lights.hpp"
 #include "tracer/rng.hpp"
-#include "tracer/tiled_array.hpp"
 
 #include <wfpg/bins/partitioner.hpp>
+#include <wfpg/exec/tiled_array.hpp>
 #include <wfpg/guides/octree/light_guide.hpp>
 
 namespace render {
+
+using wfpg::tiled_array;
+using wfpg::tiled_view;
 
 /// A path between two vertices.
 struct path_state {

@@ -118,7 +118,8 @@ class bidirectional {
   /// photons, and vertices alone.
   gather_type gather();
 
-  /// What light paths have left so far. Photons are counted by build(). Waits for the work before it.
+  /// Numbers of vertices, beams and photons so far, and radii. build() counts photons. Waits for the work
+  /// before it.
   bidirectional_statistics statistics() const;
   /// Bytes held, without scratch memory of sorts and scans.
   bidirectional_memory memory() const {

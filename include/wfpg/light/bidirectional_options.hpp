@@ -101,7 +101,8 @@ inline merge_radii radii_of(const bidirectional_options& options, std::uint32_t 
   return radii;
 }
 
-/// What an iteration's light paths have left. A technique that is off has no photons.
+/// Numbers of an iteration's vertices, beams and photons, and its radii. A technique that is off has no
+/// photons.
 struct bidirectional_statistics {
   std::uint32_t vertices = 0;            ///< stored
   std::uint32_t dropped_vertices = 0;    ///< without memory: their light is missing

@@ -26,7 +26,7 @@ namespace wfpg {
 
 /// How a photon counts where it merges with a camera path.
 struct photon_merge {
-  /// What the photon's flux is multiplied with: the kernel over the number of light paths, and over the sine
+  /// Factor of the photon's flux: the kernel over the number of light paths, and over the sine
   /// where beams merge. Unit: scene units to the power of -2 on surfaces and along camera beams, -3 at points
   /// in media, and -1 where beams merge.
   float scale = 0.0f;

@@ -123,7 +123,8 @@ WFPG_HD inline merge_geometry beam_beam_merge(merge_kernel shape, const path_bea
   return found;
 }
 
-/// Smallest radius of merges, scene units. Its square is a normal float.
+/// Smallest radius of merges, scene units. The largest is largest_coordinate. Squares of both are normal
+/// floats.
 inline constexpr float least_merge_radius = 1.0e-15f;
 
 /// Radius of merges, which shrinks from iteration to iteration so that their blur goes to 0.

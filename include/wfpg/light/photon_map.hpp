@@ -118,9 +118,6 @@ class photon_map_view {
 template <class Exec>
 class photon_map {
  public:
-  /// Smallest radius, scene units. The largest is largest_coordinate. Squares of both are normal floats.
-  static constexpr float least_radius = least_merge_radius;
-
   /// A map without photons or memory.
   photon_map() = default;
 
@@ -130,10 +127,10 @@ class photon_map {
   /// Memory of the map before is used again if it suffices. Other memory is as box_tree::build() says.
   ///
   /// Throws out_of_memory, after which the map has no photons. Throws std::invalid_argument for a radius that
-  /// is not in [least_radius, largest_coordinate], and for 2^28 photons or more.
+  /// is not in [least_merge_radius, largest_coordinate], and for 2^28 photons or more.
   void build(const Exec& exec, array_view<const vec3> positions, float radius) {
-    require(is_finite(radius) && radius >= least_radius && radius <= largest_coordinate, "radius", radius,
-            "in [1e-15, 1e15]");
+    require(is_finite(radius) && radius >= least_merge_radius && radius <= largest_coordinate, "radius",
+            radius, "in [1e-15, 1e15]");
     radius_ = 0.0f;
     // The tree's margins, 1/1000 of the radius here, are larger than what rounding adds to a distance.
     tree_.build(exec, positions.size(), detail::photon_boxes{positions, radius}, leaf_photons);

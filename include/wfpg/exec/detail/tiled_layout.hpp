@@ -12,7 +12,7 @@ namespace wfpg::detail {
 /// Reads and writes elements in tiles. A tile has pieces of 16 bytes: first the elements' first ones.
 template <class T>
 struct tiled_layout {
-  /// What a thread reads or writes at a time.
+  /// Sixteen bytes, which a thread reads or writes at a time.
   struct alignas(16) piece {
     std::uint32_t words[4];
   };
