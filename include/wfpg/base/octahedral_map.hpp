@@ -159,7 +159,7 @@ WFPG_HD inline vec3 octahedron_to_direction(vec2 p) {
 }  // namespace detail
 
 /// Packs a unit direction into 32 bits, 16 a coordinate of the octahedron's square.
-/// The stored direction is at most 0.01 degrees off; the axes are exact.
+/// The stored direction is at most 0.01 degrees off; the axes are exact, but for fast maths.
 /// x is in the low half. The steps are 1/32767, so that -1, 0 and 1 are among the values.
 WFPG_HD inline std::uint32_t pack_direction(vec3 d) {
   const vec2 p = detail::direction_to_octahedron(d);
