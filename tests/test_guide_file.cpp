@@ -270,9 +270,9 @@ TEST_CASE("truncated, altered and foreign guide files have different errors", "[
   for (const std::string& foreign : {std::string(), std::string("\x89PNG\r\n\x1a\n................"),
                                      std::string(1000, '\0'), std::string("glTF"), bytes.substr(1)})
     CHECK(fault(foreign, options) == "wfpg: the guide is not a guide file");
-  CHECK(fault(with_version(bytes, 4), options) ==
-        "wfpg: the guide is of version 4, expected 3 or older: a newer wfpg wrote it");
-  CHECK(fault(with_version(bytes, 2), options) == "wfpg: the guide is of version 2, expected 3");
+  CHECK(fault(with_version(bytes, 5), options) ==
+        "wfpg: the guide is of version 5, expected 4 or older: a newer wfpg wrote it");
+  CHECK(fault(with_version(bytes, 2), options) == "wfpg: the guide is of version 2, expected 4");
   for (const std::size_t at : {8u, 11u, 12u}) {
     std::string altered = bytes;
     altered[at] = static_cast<char>(altered[at] ^ 1);
@@ -308,7 +308,8 @@ TEST_CASE("truncated, altered and foreign guide files have different errors", "[
     names_it(with_payload(bytes, place.name, payload_of(bytes, place.name).substr(0, place.size - 1)),
              "section " + place.name + " is too ");
   }
-  CHECK(names == std::vector<std::string>{"options", "octree", "cache", "counts", "levels", "fields", "end"});
+  CHECK(names ==
+        std::vector<std::string>{"options", "octree", "cache", "counts", "levels", "fields", "paths", "end"});
   // A length beyond all memory, with a correct checksum.
   const section_place octree = section_of(bytes, "octree");
   std::string endless = bytes;
@@ -392,6 +393,11 @@ TEST_CASE("the content of a guide file is checked, even if its checksums are rig
           "has radiance that is negative or not finite");
   refused("counts", 0, 4, 0x80000000u, "has samples without end");
   refused("counts", 4, 4, 36, "warms up until after samples that are to come");
+  refused("counts", 8, 4, 6, "rests in samples that are to come");
+  refused("counts", 12, 4, 5, "rests in samples that are to come");
+  refused("paths", 0, 4, 2 * nodes, "has paths from no node");
+  refused("paths", 4, 4, infinity, "has radiance that is not finite");
+  refused("paths", section_of(bytes, "paths").size - 4, 4, infinity, "has radiance that is not finite");
   refused("levels", 0, 4, 4, "has more samples than there were");
   refused("levels", 4, 4, 36, "has more samples than there were");
   refused("levels", 8 + 5 * leaves - 1, 1, 4, "has a level below the leaves");

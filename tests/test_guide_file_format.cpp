@@ -95,7 +95,8 @@ std::map<std::string, std::size_t> units_of(const wfpg::path_guider<one_policy>&
           {"field", live},
           {"cell", built * cells},
           {"row", built * options.kept.resolution},
-          {"mean", payload_of(bytes, "lights").size() / 4}};
+          {"mean", payload_of(bytes, "lights").size() / 4},
+          {"path that is compared", payload_of(bytes, "paths").size() / 12}};
 }
 
 TEST_CASE("the table in guide_file.hpp matches what is written", "[guide_file]") {
@@ -109,6 +110,7 @@ TEST_CASE("the table in guide_file.hpp matches what is written", "[guide_file]")
   auto units = units_of(guider, options, bytes);
   REQUIRE(units["cell"] > 0);
   REQUIRE(units["mean"] > 0);
+  REQUIRE(units["path that is compared"] > 0);
   std::map<std::string, std::size_t> sizes;
   for (const format_row& row : table_of(text)) {
     INFO(row.section << ": " << row.content << ", a " << row.unit);

@@ -41,8 +41,8 @@ WFPG_TEST_CASE("path guider: memory() is what it allocated, by part", "[path_gui
       CHECK(memory.persistent() + memory.transient() == resource.bytes_in_use - mesh_bytes);
       std::set<std::string> names;
       for (const wfpg::memory_part& part : memory.parts) names.insert(part.name);
-      std::set<std::string> expected{"octree", "cache",   "lights", "deposits",
-                                     "paths",  "binning", "fields", "scratch"};
+      std::set<std::string> expected{"octree",  "cache",  "lights",  "deposits",      "paths",
+                                     "binning", "fields", "scratch", "compared paths"};
       if (lifetime == field_lifetime::kept) expected.insert({"kept fields", "levels"});
       CHECK(names == expected);
       CHECK(memory.persistent() <= most_persistent(guider));

@@ -98,6 +98,7 @@ TEST_CASE("values out of range are refused by a line that names the range", "[re
       {"--guide-fraction", "1.5", fraction, "wfpg"},
       {"--guide-fraction", "nan", fraction, "wfpg"},
       {"--guided-depths", "0", count, "wfpg"},
+      {"--least-gain", "-1", "a number from 0 to 1e+06", "wfpg"},
       {"--octree-resolution", "100", octree, "wfpg"},
       {"--octree-resolution", "8192", octree, "wfpg"},
       {"--octree-resolution", "4294967424", octree, "wfpg"},
@@ -300,7 +301,7 @@ TEST_CASE("options of fields are refused for methods without fields", "[renderer
        {"--guiding plain", "--fields kept", "--octree-resolution 64",
         "--fields transient --field-resolution 16", "--slot-resolution 16", "--recast 4", "--learn off",
         "--light-groups 4", "--field-budget 1MiB", "--rays-per-bin 32", "--min-bin-level 2",
-        "--deposits-per-leaf 0", "--cones march"})
+        "--deposits-per-leaf 0", "--least-gain 0", "--cones march"})
     for (const char* const method : {"pt", "sarsa", "records", "openpgl-vmm"}) {
       INFO(option << ", " << method);
       CHECK_THROWS_AS(parse(option + std::string(" --method ") + method), CLI::RequiresError);

@@ -6,7 +6,7 @@
 // Source: wfpg's own. Cost: O(bytes), and loading builds the octree. Memory: a file has about 40 bytes a leaf
 // and 10 F² a kept field.
 //
-// A guide file of version 3, little-endian; state/section_file.hpp has what is around the sections.
+// A guide file of version 4, little-endian; state/section_file.hpp has what is around the sections.
 //
 //   section  content                                              bytes
 //   options  scene_tag                                            8
@@ -21,6 +21,8 @@
 //            deposits dropped, by reason                          12
 //   counts   samples                                              4
 //            sample from which on fewer paths are recorded        4
+//            unguided sample that is compared                     4
+//            samples rested, and whether the guide rests          8
 //            triangles left out, by reason                        12
 //            vertices dropped                                     4
 //            bins, rays, unbinned rays, cones                     32 a depth
@@ -39,6 +41,7 @@
 //            cone's hit                                           4 a cell
 //            learnt radiance, where fields learn                  2 a cell
 //   lights   learnt mean: of learning nodes, faces and groups     4 a mean
+//   paths    place, what unguided and guided paths brought        12 a path that is compared
 //
 // Cells and rows are those of fields with a fraction above 0. All else that a guider has follows from these.
 // detail/guide_sections.hpp says what is checked.

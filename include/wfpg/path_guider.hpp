@@ -27,6 +27,7 @@
 #include <wfpg/guide/guide.hpp>
 #include <wfpg/guide/path_recorder.hpp>
 #include <wfpg/guide/recorded_surfaces.hpp>
+#include <wfpg/guide/rest_schedule.hpp>
 #include <wfpg/guide/sample_rays.hpp>
 #include <wfpg/guide/statistics.hpp>
 #include <wfpg/guides/octree/kept_guide.hpp>
@@ -124,14 +125,23 @@ class path_guider {
   /// Geometry moved inside `bounds`, world space, which hold its old and its new place. Kept fields that may
   /// see it are cast anew when they are next used. The octree and its cache keep the old geometry; make a new
   /// guider to change them.
-  void invalidate(const bounds3& bounds) { guide_.invalidate(exec_, bounds); }
-  /// Geometry moved anywhere: every kept field is cast anew when it is next used.
-  void invalidate_all() { guide_.invalidate_all(exec_); }
+  /// A guide that rests wakes up.
+  void invalidate(const bounds3& bounds) {
+    guide_.invalidate(exec_, bounds);
+    rests_.restart(samples_);
+  }
+  /// Geometry moved anywhere: every kept field is cast anew when it is next used. A guide that rests wakes
+  /// up.
+  void invalidate_all() {
+    guide_.invalidate_all(exec_);
+    rests_.restart(samples_);
+  }
   /// Lights moved: the guide forgets all radiance that it learnt. Kept fields take up the change without
-  /// being cast anew. The next 32 samples are all recorded, as at the beginning.
+  /// being cast anew. The next 32 samples are all recorded, as at the beginning. A guide that rests wakes up.
   void forget_light() {
     guide_.forget_light(exec_);
-    warm_up_end_ = samples_ + recording_needs::warm_up_samples;
+    warm_up_end_ = samples_ - rests_.rested() + recording_needs::warm_up_samples;
+    rests_.restart(samples_);
   }
 
   /// Returns the view with which the renderer's kernels record their paths. It is valid for the current
@@ -150,8 +160,11 @@ class path_guider {
   const Guide& guide() const { return guide_; }
   /// The options that the constructor got. An unset max_rays is replaced by max_paths.
   const options_type& options() const { return options_; }
-  /// Whether the current sample is guided: unguided_samples are over, and the guide is not empty.
+  /// Whether the current sample is guided: unguided_samples are over, the guide is not empty, and it does not
+  /// rest.
   bool guided() const { return is_guided(samples_); }
+  /// Whether the guide rests in the current sample, since guiding gained less than least_gain.
+  bool resting() const { return rests_now_; }
 
   /// Returns counts and times since construction; see statistics.hpp. Waits for the work before it, so that
   /// calling it for each sample slows a device down. `dropped_vertices` and `deposits` tell of calls out of
@@ -178,6 +191,7 @@ class path_guider {
                           options_.include_emission, needs_.fraction_shift, needs_.directions,
                           Guide::records_paths && options_.records_waves, options_.silent_escapes}) {
     require(needs_.sample_stride >= 1, "sample_stride", needs_.sample_stride, "at least 1");
+    if (Guide::measures_gain) rests_ = rest_schedule(options_.least_gain, options_.unguided_samples);
   }
 
   /// Checks the options that all guides have, and sets max_rays. The guide checks its own. Runs before any
@@ -193,17 +207,24 @@ class path_guider {
   /// Random seed of a sample; all that the guider draws for the sample follows from it.
   std::uint64_t seed_of(std::uint32_t sample) const { return hash(options_.seed, sample); }
   /// Whether the guide takes part in a sample, counted from 1.
-  bool is_guided(std::uint32_t sample) const { return sample > options_.unguided_samples && !guide_.empty(); }
+  bool is_guided(std::uint32_t sample) const {
+    return sample > options_.unguided_samples && !guide_.empty() && !rests_now_ &&
+           !rests_.is_unguided(sample);
+  }
+  /// Number of a sample among those that the guide takes part in. Where it rests, that of the one before.
+  std::uint32_t number_of(std::uint32_t sample) const { return sample - rests_.rested(); }
   /// All samples of the warm-up, then one of every `sample_stride`, at random. A fixed one could fall in step
-  /// with a period of the renderer's, such as that of its tiles.
+  /// with a period of the renderer's, such as that of its tiles. `sample`: its number_of().
   bool is_recorded(std::uint32_t sample) const {
     const std::uint32_t stride = needs_.sample_stride, round = (sample - 1) / stride;
     return sample <= warm_up_end_ || (sample - 1) % stride == hash(~options_.seed, round) % stride;
   }
   /// Context of a sample, for the guide's calls. It refers to members of this guider.
   sample_context<Exec> at(std::uint32_t sample) {
-    return {exec_, sample, seed_of(sample), is_guided(sample), recorded_, clock_};
+    return {exec_, number_of(sample), seed_of(sample), is_guided(sample), recorded_, clock_};
   }
+  /// Keeps the recorded paths of an unguided sample, or compares those of a guided one with them.
+  void measure();
   /// Context of the current sample.
   sample_context<Exec> now() { return at(samples_); }
   /// Context of a wave of the current sample: it is not guided from guided_depths on.
@@ -222,151 +243,15 @@ class path_guider {
   Guide guide_;                   // keeps its learnt state in the caller's policy
   recording_needs needs_;         // of the guide, asked once
   path_recorder<Exec> recorder_;  // of no paths where the guide reads none
-  // A guide file holds the first two; begin_sample() sets the third.
+  // A guide file holds the first three; begin_sample() sets the others.
+  rest_schedule rests_;
   std::uint32_t samples_ = 0;                                     // number of the current sample
   std::uint32_t warm_up_end_ = recording_needs::warm_up_samples;  // the last sample of the warm-up
   bool recorded_ = true;                                          // the current sample
+  bool rests_now_ = false;                                        // the current sample
+  guiding_gain gain_;                                             // the last that was measured
 };
 
-// Moves this guider's members to a local one first, which destroys them as a whole. The memory resource must
-// outlive its buffers. Assigning member by member would free the resource before them.
-template <class Exec, class Guide>
-path_guider<Exec, Guide>& path_guider<Exec, Guide>::operator=(path_guider&& other) {
-  if (this == &other) return *this;
-  const path_guider old(std::move(*this));
-  options_ = std::move(other.options_);
-  clock_ = other.clock_;
-  working_memory_ = std::move(other.working_memory_);
-  exec_ = other.exec_;
-  guide_ = std::move(other.guide_);
-  needs_ = other.needs_;
-  recorder_ = std::move(other.recorder_);
-  samples_ = other.samples_;
-  warm_up_end_ = other.warm_up_end_;
-  recorded_ = other.recorded_;
-  return *this;
-}
-
-// Three numbers decide which paths are recorded: the sample's number, the seed, and the end of the warm-up. A
-// guide file has them all but the seed. So a loaded guider with the saved one's seed records the paths that
-// the saved one would have recorded.
-template <class Exec, class Guide>
-void path_guider<Exec, Guide>::begin_sample() {
-  const std::uint32_t sample = samples_ + 1;
-  recorded_ = is_recorded(sample);
-  recorder_.begin_sample(exec_, static_cast<std::uint32_t>(seed_of(sample)), recorded_);
-  guide_.begin_sample(at(sample));
-  samples_ = sample;  // last: a call that threw is made again for the same sample
-}
-
-// The guide reads and clears the recorder. A sample that is not recorded has nothing to learn from, but the
-// guide may still have values of earlier samples to publish.
-template <class Exec, class Guide>
-void path_guider<Exec, Guide>::end_sample() {
-  if (recorded_) {
-    // The stage ends with this block, before the next one begins.
-    const auto timed = clock_.time(stage::record);
-    recorder_.close_paths(exec_);
-    guide_.learn(now(), recorder_);
-  }
-  const auto timed = clock_.time(stage::cache);
-  guide_.update(now());
-}
-
-// Checks what prepare() and sample_directions() have in common. The latter checks `Random` and its outputs,
-// too.
-template <class Exec, class Guide>
-template <class Surfaces, class Random, class Caster>
-void path_guider<Exec, Guide>::check(const wave<Surfaces, Random>& w, const Caster&) const {
-  static_assert(is_surfaces_v<Surfaces>,
-                "surfaces: needs wfpg::surface<Bsdf> operator()(std::uint32_t) const");
-  static_assert(is_ray_caster_v<Caster, Exec>,
-                "caster: needs ray_hit operator()(const ray&) const, or cast(exec, rays, hits) const");
-  require(w.ray_count <= *options_.max_rays, "ray_count", w.ray_count, "at most max_rays");
-}
-
-// Checks sizes on the host before it launches anything. There are three ways to sample a wave: by the guide's
-// own kernels, from its view, or from BSDFs alone. The last is chosen on the host, so that unguided waves run
-// a kernel without the guide's code.
-template <class Exec, class Guide>
-template <class Surfaces, class Random, class Caster, class Queries>
-void path_guider<Exec, Guide>::sample_directions(const wave<Surfaces, Random>& w, const Caster& caster,
-                                                 array_view<sampled_direction> directions,
-                                                 const Queries& queries) {
-  check(w, caster);
-  static_assert(is_bsdf_v<bsdf_of_t<Surfaces>>,
-                "the BSDF needs eval, pdf, sample, is_delta and transmits, all const");
-  static_assert(is_random_v<Random>, "random: needs vec2 operator()(std::uint32_t, std::uint32_t) const");
-  require(directions.size() >= w.ray_count, "size of directions", directions.size(), "ray_count or more");
-  if constexpr (!std::is_same_v<Queries, no_queries>)
-    require(queries.densities.size() >= w.ray_count, "size of densities", queries.densities.size(),
-            "ray_count or more");
-
-  // The sampler samples one ray from any mixture. A guide with `samples_waves` calls it in its own kernels.
-  const sample_ray<Surfaces, Random, Queries> sampler{w.surfaces, w.random, queries, directions};
-  if constexpr (Guide::samples_waves)
-    guide_.sample_wave(now(w.depth), w, caster, sampler);
-  else {
-    const view_type view = prepare(w, caster);
-    const auto timed = clock_.time(stage::sample);
-    if (now(w.depth).guided)
-      exec_.for_each(w.ray_count, sample_guide_view<decltype(sampler), view_type>{sampler, view});
-    else
-      exec_.for_each(w.ray_count, sample_bsdf<decltype(sampler)>{sampler, {}});
-  }
-}
-
-// Counts as the stage "fields"; the guide may time stages of its own inside, such as "bin".
-template <class Exec, class Guide>
-template <class Surfaces, class Random, class Caster>
-typename path_guider<Exec, Guide>::view_type path_guider<Exec, Guide>::prepare(
-    const wave<Surfaces, Random>& w, const Caster& caster) {
-  check(w, caster);
-  const auto timed = clock_.time(stage::fields);
-  return guide_.prepare(now(w.depth), w, caster);
-}
-
-// A wave of as many rays as there are paths, so that a ray's index is its path's. Rays may be inactive: that
-// costs 4 bytes each. A vertex is used once, since a stale one would make fields that no ray samples.
-template <class Exec, class Guide>
-template <class Caster>
-typename path_guider<Exec, Guide>::view_type path_guider<Exec, Guide>::prepare(std::uint32_t depth,
-                                                                               const Caster& caster) {
-  static_assert(Guide::records_paths, "Guide: prepare(depth, caster) needs a guide that reads paths");
-  // Without it the recorder has no place for vertices, and every wave would be empty.
-  require(options_.records_waves, "records_waves", "false",
-          "true, for prepare(depth, caster) to know the wave");
-  wave_recorder<Exec>& vertices = recorder_.wave();
-  const auto view = prepare(
-      wave<recorded_surfaces, no_random>{
-          depth, vertices.paths(), recorded_surfaces{vertices.states(), vertices.places(), depth}, {}},
-      caster);
-  vertices.forget(exec_, depth);
-  return view;
-}
-
-// Fills in the facade's own counts. The guide adds those of its fields and its cache in report().
-template <class Exec, class Guide>
-guider_statistics path_guider<Exec, Guide>::statistics() const {
-  guider_statistics result;
-  result.samples = samples_;
-  // Counted from unguided_samples on: the guide is empty in all samples or in none.
-  result.guided_samples = guided() ? samples_ - options_.unguided_samples : 0;
-  result.dropped_vertices = recorder_.dropped(exec_);
-  result.path_gaps = recorder_.gaps(exec_);
-  result.seconds = clock_.report();
-  guide_.report(exec_, result);
-  return result;
-}
-
-// Two parts beside the guide's. "paths" is the recorder; "scratch" is retained memory that no buffer uses
-// now.
-template <class Exec, class Guide>
-memory_report path_guider<Exec, Guide>::memory() const {
-  memory_report report{guide_.memory()};
-  report.parts.push_back({"paths", recorder_.bytes(), false});
-  report.parts.push_back({"scratch", working_memory_->bytes() - working_memory_->used_bytes(), false});
-  return report;
-}
-
 }  // namespace wfpg
+
+#include <wfpg/detail/path_guider_impl.hpp>

@@ -26,6 +26,7 @@
 #include <wfpg/guide/recorded_runs.hpp>
 #include <wfpg/guide/recorded_surfaces.hpp>
 #include <wfpg/guide/recorded_wave.hpp>
+#include <wfpg/guide/rest_schedule.hpp>
 #include <wfpg/guide/sample_rays.hpp>
 #include <wfpg/guide/sampling_options.hpp>
 #include <wfpg/guide/statistics.hpp>
@@ -36,6 +37,7 @@
 #include <wfpg/guides/octree/field_sinks.hpp>
 #include <wfpg/guides/octree/field_slots.hpp>
 #include <wfpg/guides/octree/field_store.hpp>
+#include <wfpg/guides/octree/gain_meter.hpp>
 #include <wfpg/guides/octree/guide_view.hpp>
 #include <wfpg/guides/octree/kept_field.hpp>
 #include <wfpg/guides/octree/kept_guide.hpp>

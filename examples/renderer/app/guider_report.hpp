@@ -37,6 +37,7 @@ void report_records(const wfpg::path_guider<Exec, wfpg::irradiance_records<Exec,
 /// Subtracts statistics of an earlier time from `counted`.
 inline void subtract(wfpg::guider_statistics& counted, const wfpg::guider_statistics& before) {
   counted.guided_samples -= before.guided_samples;
+  counted.rested_samples -= before.rested_samples;
   for (std::size_t depth = 0; depth < before.depths.size(); ++depth) {
     counted.depths[depth].bins -= before.depths[depth].bins;
     counted.depths[depth].rays -= before.depths[depth].rays;
@@ -75,6 +76,8 @@ void report_guider(const wfpg::path_guider<Exec, Guide>& guider, std::uint64_t s
     const double bins = static_cast<double>(depth.bins);
     report.bins.push_back({bins / samples, bins > 0.0 ? static_cast<double>(depth.rays) / bins : 0.0});
   }
+  report.rest.rested = statistics.rested_samples;
+  if (statistics.gain.is_known()) report.rest.last_gain = statistics.gain.value();
   const wfpg::kept_field_statistics& kept = statistics.kept;
   report.slots.capacity = kept.capacity;
   report.slots.live = kept.live;

@@ -68,6 +68,8 @@ struct render_options {
   std::optional<std::uint32_t> deposits_per_leaf = wfpg::kept_guide_options().deposits_per_leaf;
   /// Fraction of directions drawn from the guide, in (0, 1]. Unset: the method's own default.
   std::optional<float> guide_fraction;
+  /// Gain below which a guide of wfpg or wfpg-product rests, at least 1. Unset: it never rests.
+  std::optional<float> least_gain = wfpg::sampling_options().least_gain;
   /// Of a path, from its first vertex on, at least 1; with next-event estimation never the last of several.
   std::uint32_t guided_depths = wfpg::sampling_options().guided_depths;
   std::uint32_t light_groups = 32;  ///< that guided paths learn to choose lights from, in [1, 255]
@@ -102,6 +104,12 @@ struct slot_report {
   double allocated = 0.0;  ///< a guided sample
   double freed = 0.0;      ///< a guided sample
   double refreshed = 0.0;  ///< a guided sample
+};
+
+/// What a guide found out about its worth.
+struct rest_report {
+  std::uint32_t rested = 0;         ///< samples in which the guide rested
+  std::optional<double> last_gain;  ///< of the last comparison, in variance; unset: none, or not known
 };
 
 struct octree_report {
@@ -139,6 +147,7 @@ struct render_report {
   std::vector<bin_report> bins;  ///< by depth
   slot_report slots;
   records_report records;
+  rest_report rest;
   std::size_t regions = 0;             ///< of Open PGL's field
   std::size_t light_vertex_bytes = 0;  ///< memory of light paths, of maps over them, and of connections
   /// Vertices of light paths that had no memory. The picture lacks their light.

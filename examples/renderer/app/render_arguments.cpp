@@ -126,7 +126,8 @@ const std::vector<requirement>& requirements() {
   static const std::vector<requirement> all = {
       {{"--guiding", "--fields", "--octree-resolution", "--field-resolution", "--slot-resolution", "--recast",
         "--learn", "--light-groups", "--field-budget", "--rays-per-bin", "--min-bin-level",
-        "--deposits-per-leaf", "--cones", "--octree", "--caster-buffer", "--load-guide", "--save-guide"},
+        "--deposits-per-leaf", "--least-gain", "--cones", "--octree", "--caster-buffer", "--load-guide",
+        "--save-guide"},
        "--method wfpg or wfpg-product",
        [](options o) { return is_wfpg(o.method); }},
       {{"--field-resolution"},
@@ -334,6 +335,11 @@ void add_guider_options(CLI::App& app, render_options& options) {
                   with_default("deposits a leaf of the octree in a sample that is recorded; 0: all, in each",
                                *options.deposits_per_leaf))
       ->transform(whole_number(0, largest_count));
+  add_unless_zero(app, "--least-gain", options.least_gain,
+                  with_default("guides rest where they lower the variance by less than this factor, at least "
+                               "1; 0: they never rest",
+                               *options.least_gain))
+      ->transform(number(0.0, 1.0e6));
   add_unless_zero(app, "--guide-fraction", options.guide_fraction,
                   "fraction of directions drawn from the guide (default: the mode's, as 0)")
       ->transform(number(0.0, 1.0));

@@ -116,6 +116,7 @@ inline wfpg::octree_guide_options octree_options_of(const render_options& option
   if (options.method == sampling_method::wfpg_product) guided.product_resolution = options.product_resolution;
   guided.binning = options.binning;
   guided.deposits_per_leaf = options.deposits_per_leaf;
+  guided.least_gain = options.least_gain;
   guided.mode = options.mode == guiding::plain ? wfpg::guiding_mode::plain : wfpg::guiding_mode::oriented;
   return guided;
 }

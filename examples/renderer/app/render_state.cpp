@@ -30,8 +30,9 @@ std::string hexadecimal(std::uint64_t value) {
 
 void add_guider_values(const render_options& o, named_values& values) {
   using std::to_string;
-  char fraction[32];
+  char fraction[32], gain[32];
   std::snprintf(fraction, sizeof fraction, "%.9g", static_cast<double>(o.guide_fraction.value_or(0.0f)));
+  std::snprintf(gain, sizeof gain, "%.9g", static_cast<double>(o.least_gain.value_or(0.0f)));
   values.insert(values.end(), {{"--guiding", o.mode == guiding::plain ? "plain" : "oriented"},
                                {"--fields", o.lifetime == fields::kept ? "kept" : "transient"},
                                {"--cones", name_of(cones_names(), o.through)},
@@ -54,6 +55,7 @@ void add_guider_values(const render_options& o, named_values& values) {
   if (o.method == sampling_method::wfpg_product)
     values.emplace_back("--product-resolution", to_string(o.product_resolution));
   if (o.nee) values.emplace_back("--light-groups", to_string(o.light_groups));
+  if (is_wfpg(o.method)) values.emplace_back("--least-gain", gain);
 }
 
 named_values values_of(const render_options& o) {

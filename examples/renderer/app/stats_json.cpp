@@ -39,6 +39,12 @@ json slots_of(const slot_report& slots) {
           {"freed_per_sample", slots.freed}, {"refreshed_per_sample", slots.refreshed}};
 }
 
+json rest_of(const rest_report& rest) {
+  json result{{"samples", rest.rested}, {"last_gain", nullptr}};
+  if (rest.last_gain) result["last_gain"] = *rest.last_gain;
+  return result;
+}
+
 json records_of(const records_report& records) {
   return {{"builds", records.builds},   {"build_seconds", records.build_seconds},
           {"rays", records.rays},       {"cones", records.cones},
@@ -73,6 +79,7 @@ void write_stats(const std::string& path, const render_report& report,
   for (const bin_report& depth : report.bins)
     stats["bins"].push_back({{"count", depth.count}, {"mean_rays", depth.mean_rays}});
   if (report.slots.capacity > 0) stats["slots"] = slots_of(report.slots);
+  if (report.octree.nodes > 0) stats["rest"] = rest_of(report.rest);
   if (report.records.builds > 0) stats["records"] = records_of(report.records);
   if (report.light_vertex_bytes > 0)
     stats["light_vertices"] = {{"bytes", report.light_vertex_bytes},

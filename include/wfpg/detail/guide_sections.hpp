@@ -30,7 +30,7 @@ namespace wfpg::detail {
 
 /// Magic, version and name of guide files. The magic has bytes that text conversion would change, so such
 /// damage is detected.
-inline constexpr file_kind guide_file_kind{{"\x89wfpgG\n\x1a", 8}, 3, "a guide file"};
+inline constexpr file_kind guide_file_kind{{"\x89wfpgG\n\x1a", 8}, 4, "a guide file"};
 
 /// An option that decides how a guide's state is laid out. A file is refused where one differs.
 struct shaping_option {
@@ -290,6 +290,36 @@ struct guide_sections {
   template <class Exec>
   static void load_lights(const Exec& exec, file_reader& file, octree_scene<Exec>& scene) {
     if (!scene.lights_.view().empty()) light_state::restore(exec, file.section("lights"), scene.lights_);
+  }
+  /// Writes section "paths": what earlier paths brought, for comparisons.
+  template <class Exec>
+  static void save_paths(const Exec& exec, const octree_scene<Exec>& scene, file_writer& file) {
+    section_writer bytes;
+    for (const earlier_paths& path : scene.meter_.kept_.to_host(exec)) {
+      bytes.put(path.place);
+      bytes.put(path.unguided);
+      bytes.put(path.guided);
+    }
+    file.section("paths", bytes);
+  }
+  /// Reads section "paths". Drops paths that the guide has no room for. Throws file_error for radiance that
+  /// is not finite, and for places that are none.
+  template <class Exec>
+  static void load_paths(const Exec& exec, file_reader& file, octree_scene<Exec>& scene) {
+    section_reader bytes = file.section("paths");
+    std::vector<earlier_paths> paths(bytes.left() / sizeof(earlier_paths));
+    const std::uint32_t places = 2 * scene.octree_.node_count();
+    for (earlier_paths& path : paths) {
+      path.place = bytes.get<std::uint32_t>();
+      bytes.require(path.place < places || path.place == earlier_paths::nowhere, "has paths from no node");
+      path.unguided = bytes.get<float>();
+      path.guided = bytes.get<float>();
+      bytes.require(is_finite(path.unguided) && is_finite(path.guided), "has radiance that is not finite");
+    }
+    bytes.end();
+    const buffer<earlier_paths, Exec>& kept = scene.meter_.kept_;
+    paths.resize(kept.size());
+    exec.copy_from_host(kept.data(), paths.data(), kept.bytes());
   }
 };
 

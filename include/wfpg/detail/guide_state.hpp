@@ -13,6 +13,9 @@ struct state_access {
     section_writer bytes;
     bytes.put(guider.samples_);
     bytes.put(guider.warm_up_end_);
+    bytes.put(guider.rests_.unguided_sample());
+    bytes.put(guider.rests_.rested());
+    bytes.put(static_cast<std::uint32_t>(guider.rests_.resting()));
     guide_sections::put_build(guider.guide_, bytes);
     bytes.put(guider.recorder_.dropped(guider.exec_));
     guide_sections::put_depths(guider.exec_, guider.guide_, bytes);
@@ -26,6 +29,10 @@ struct state_access {
     guider.warm_up_end_ = bytes.get<std::uint32_t>();
     bytes.require(guider.warm_up_end_ <= guider.samples_ + recording_needs::warm_up_samples,
                   "warms up until after samples that are to come");
+    const auto unguided = bytes.get<std::uint32_t>(), rested = bytes.get<std::uint32_t>(),
+               resting = bytes.get<std::uint32_t>();
+    bytes.require(guider.rests_.restore(guider.samples_, unguided, rested, resting != 0),
+                  "rests in samples that are to come");
     guide_sections::take_build(bytes, guider.guide_);
     const auto dropped = bytes.get<std::uint32_t>();
     guide_sections::take_depths(guider.exec_, bytes, guider.guide_);
@@ -40,6 +47,7 @@ struct state_access {
     file.section("counts", counts_to_bytes(guider));
     guide_sections::save_fields(exec, guider.guide_, file);
     guide_sections::save_lights(exec, guider.guide_, file);
+    guide_sections::save_paths(exec, guider.guide_, file);
     file.end();
   }
 
@@ -56,8 +64,9 @@ struct state_access {
     path_guider<Exec, Guide> guider(exec, std::move(fragments), options);
     guide_sections::load_scene(guider.exec_, file, guider.guide_);
     restore_counts(file.section("counts"), guider);
-    guide_sections::load_fields(guider.exec_, file, guider.samples_, guider.guide_);
+    guide_sections::load_fields(guider.exec_, file, guider.number_of(guider.samples_), guider.guide_);
     guide_sections::load_lights(guider.exec_, file, guider.guide_);
+    guide_sections::load_paths(guider.exec_, file, guider.guide_);
     file.end();
     return guider;
   }

@@ -51,9 +51,10 @@ template <class Exec>
 struct sample_context {
   /// Policy that runs the guide's loops. Its memory resource retains freed blocks for later samples.
   const Exec& exec;
-  std::uint32_t number;  ///< number of the sample, counted from 1; 0 before the first
-  std::uint64_t seed;    ///< random seed that differs between samples
-  /// False: rays must sample their BSDFs alone. So in the first unguided_samples, and from guided_depths on.
+  /// Number of the sample, counted from 1; 0 before the first. Samples that the guide rests in do not count.
+  std::uint32_t number;
+  std::uint64_t seed;  ///< random seed that differs between samples
+  /// False: rays must sample their BSDFs alone. So in unguided samples, and from guided_depths on.
   bool guided;
   bool recorded;       ///< whether paths of this sample are recorded: only then path_guider calls learn()
   stage_clock& clock;  ///< times stages of the guide's own; prepare, learn and update are timed already
@@ -118,6 +119,18 @@ struct guide_base {
   void report(const Exec&, guider_statistics&) const {}
   /// Parts of the guide's memory, for path_guider::memory(). This base holds none.
   std::vector<memory_part> memory() const { return {}; }
+
+  /// Whether the guide compares guided samples with an unguided one, so that it can rest. It then has
+  ///   void keep_unguided(const Exec&, const path_recorder<Exec>&);
+  ///   guiding_gain gain(const Exec&, const path_recorder<Exec>&);
+  /// and a default view_type guides no ray. Both run before learn(), the former after an unguided sample.
+  static constexpr bool measures_gain = false;
+  /// Runs in place of begin_sample() before a sample that the guide rests in.
+  template <class Exec>
+  void begin_rest(const sample_context<Exec>&) {}
+  /// Runs in place of learn() and update() after a sample that the guide rested in.
+  template <class Exec>
+  void end_rest(const sample_context<Exec>&) {}
 
   /// Whether the guide samples a whole wave in one call:
   ///   void sample_wave(const sample_context<Exec>&, const wave<Surfaces, Random>&, const Caster&, const

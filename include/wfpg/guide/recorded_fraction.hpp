@@ -43,6 +43,9 @@ class recorded_fraction {
     return count;
   }
 
+  /// Most paths that a recorded sample can have.
+  std::size_t paths() const { return recorded_runs{shift(wanted_)}.size(paths_); }
+
  private:
   // A shift is log2 of a divisor: recorded_runs records so many paths fewer.
 

@@ -45,10 +45,39 @@ struct kept_field_statistics {
   std::uint32_t refused = 0;
 };
 
+/// What guiding gains at equal numbers of samples, measured over pixels whose paths were recorded. Radiance
+/// and variances are relative to what the cache expects of a pixel.
+struct guiding_gain {
+  /// Paths that are needed, for a variance to about a tenth.
+  static constexpr std::uint64_t least_paths = 4096;
+  /// Part of the guided paths' light that unguided paths have to find. Where they miss more, their variance
+  /// is not known: it lies in the paths that they seldom find.
+  static constexpr double least_light = 0.9;
+
+  std::uint64_t paths = 0;         ///< pixels with paths in all samples that were compared
+  double unguided_mean = 0.0;      ///< mean of what paths bring that sample their BSDFs
+  double guided_mean = 0.0;        ///< mean of what guided paths bring
+  double unguided_variance = 0.0;  ///< variance of a path that samples its BSDFs
+  double guided_variance = 0.0;    ///< variance of a guided path
+
+  /// Whether value() means something.
+  bool is_known() const { return paths >= least_paths && unguided_mean >= least_light * guided_mean; }
+  /// Unguided variance over guided variance, at most 1e6; 1 where both are 0.
+  double value() const {
+    if (!(guided_variance > 1.0e-6 * unguided_variance)) return unguided_variance > 0.0 ? 1.0e6 : 1.0;
+    return unguided_variance / guided_variance;
+  }
+};
+
 /// Returned by path_guider::statistics(). A guide that makes no fields leaves theirs at 0.
 struct guider_statistics {
-  std::uint32_t samples = 0;             ///< samples begun
-  std::uint32_t guided_samples = 0;      ///< samples begun after unguided_samples, where the guide can guide
+  std::uint32_t samples = 0;         ///< samples begun
+  std::uint32_t guided_samples = 0;  ///< samples begun after unguided_samples, where the guide can guide and
+                                     ///< did not rest
+  /// Samples begun in which the guide rested, since guiding gained less than least_gain.
+  std::uint32_t rested_samples = 0;
+  /// The last comparison of a guided sample with an unguided one; a guide file has none.
+  guiding_gain gain;
   std::vector<depth_statistics> depths;  ///< one element a depth, max_depth of them; empty without fields
   kept_field_statistics kept;            ///< all 0 where fields are transient
   dropped_deposits deposits;             ///< deposits that the exitance cache dropped, by reason

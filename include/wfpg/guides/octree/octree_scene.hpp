@@ -14,6 +14,7 @@
 #include <wfpg/guide/recorded_fraction.hpp>
 #include <wfpg/guides/octree/deposit_paths.hpp>
 #include <wfpg/guides/octree/field_sinks.hpp>
+#include <wfpg/guides/octree/gain_meter.hpp>
 #include <wfpg/guides/octree/light_guide.hpp>
 #include <wfpg/guides/octree/options.hpp>
 #include <wfpg/octree/exitance_cache.hpp>
@@ -43,6 +44,22 @@ class octree_scene : public guide_base {
   /// The octree over the scene's surfaces. Its view goes to an svo_ray_caster. The guide must outlive that
   /// view.
   const sparse_voxel_octree<Exec>& octree() const { return octree_; }
+
+  /// True: path_guider calls the members below, and the guide may rest.
+  static constexpr bool measures_gain = true;
+  /// Keeps what the paths of an unguided sample brought. O(recorded paths).
+  void keep_unguided(const Exec& exec, const path_recorder<Exec>& paths) {
+    meter_.keep_unguided(exec, paths, cache_.view());
+  }
+  /// Compares the paths of a guided sample with those that keep_unguided() kept, and with those of the call
+  /// before. Waits for the work before it. O(recorded paths).
+  guiding_gain gain(const Exec& exec, const path_recorder<Exec>& paths) {
+    return meter_.gain(exec, paths, cache_.view());
+  }
+  /// Begins a sample without the guide: light choices go on.
+  void begin_rest(const sample_context<Exec>& at) { begin_scene_sample(at); }
+  /// Ends a sample without the guide: light choices learn from it.
+  void end_rest(const sample_context<Exec>& at) { end_scene_sample(at); }
 
  protected:
   /// Builds octree and cache from fragments. `exec` allocates what is kept; `working` what each sample needs
@@ -117,6 +134,7 @@ class octree_scene : public guide_base {
   void forget_scene_light(const Exec& exec) {
     cache_.clear(exec);
     lights_.forget(exec);
+    meter_.forget(exec);
   }
 
   /// Fills in counts by depth, dropped deposits, and the build's report. Waits for the work before it.
@@ -145,6 +163,7 @@ class octree_scene : public guide_base {
   sparse_voxel_octree<Exec> octree_;
   exitance_cache<Exec> cache_;
   light_guide<Exec> lights_;
+  gain_meter<Exec> meter_;
   // P² points over the hemisphere, then P² over the sphere.
   buffer<product_point, Exec> product_points_;  // P² over the hemisphere, then P² over the sphere
   // One element a depth, since the guide was made.

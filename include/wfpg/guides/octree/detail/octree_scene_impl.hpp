@@ -30,6 +30,7 @@ octree_scene<Exec>::octree_scene(const Exec& exec, const Exec& working, voxel_fr
       build_(fragments.report),
       octree_(exec, fragments),
       cache_(exec, octree_, fragments, deposits_of_sample()),
+      meter_(working, options_.least_gain && options_.unguided_samples > 0 ? recorded().paths() : 0),
       product_points_(working, std::size_t(2) * product_resolution(options) * product_resolution(options)),
       counts_(working, options_.max_depth) {
   // The cache has read the sorted fragments: they are not needed any more.
@@ -75,6 +76,7 @@ std::vector<memory_part> octree_scene<Exec>::scene_memory(const std::vector<memo
                                  {"cache", cache_.persistent_bytes(), true}};
   parts.insert(parts.end(), kept.begin(), kept.end());
   parts.push_back({"lights", lights_.persistent_bytes(), true});
+  parts.push_back({"compared paths", meter_.bytes(), true});
   parts.push_back({"deposits", cache_.transient_bytes() + values + lights_.transient_bytes(), false});
   parts.push_back({"binning", binning + counts_.bytes() + product_points_.bytes(), false});
   parts.push_back({"fields", fields, false});

@@ -1,0 +1,123 @@
+// Kernels of gain_meter.hpp, and what it keeps of paths.
+#pragma once
+
+#include <wfpg/base/math.hpp>
+#include <wfpg/guide/path_recorder.hpp>
+#include <wfpg/guide/recorded_path.hpp>
+#include <wfpg/octree/exitance_cache.hpp>
+
+#include <cstddef>
+#include <cstdint>
+
+namespace wfpg::detail {
+
+/// What paths of one index brought to the camera in earlier samples: luminance, W/(m² sr). 12 bytes.
+struct earlier_paths {
+  /// Marks paths that hit no surface of the octree first.
+  static constexpr std::uint32_t nowhere = 0xffffffffu;
+
+  std::uint32_t place = nowhere;  ///< of the unguided path's first surface: 2 * node + side
+  float unguided = -1.0f;         ///< in the unguided sample; negative where it is not known
+  /// In the last guided sample that was measured; negative where it is not known, or began at another place.
+  float guided = -1.0f;
+};
+
+/// Sums over paths, in units of 2^-20. Integers, so that any order of additions gives the same bits.
+struct path_sums {
+  std::uint64_t paths = 0;           ///< not in units
+  std::uint64_t unguided = 0;        ///< values of unguided paths
+  std::uint64_t guided = 0;          ///< values of guided paths
+  std::uint64_t from_unguided = 0;   ///< squared differences of guided paths from unguided ones
+  std::uint64_t between_guided = 0;  ///< squared differences of guided paths from earlier guided ones
+
+  WFPG_HD path_sums operator+(const path_sums& other) const {
+    return {paths + other.paths, unguided + other.unguided, guided + other.guided,
+            from_unguided + other.from_unguided, between_guided + other.between_guided};
+  }
+};
+
+/// Recorded paths that are measured: every `stride`-th.
+struct measured_paths {
+  path_recorder_view recorded;
+  exitance_cache_view cache;
+  std::size_t stride = 1;
+
+  /// What path i brought to the camera, or -1.
+  WFPG_HD float radiance(std::size_t i) const {
+    const recorded_path path(recorded, i * stride);
+    if (path.surfaces() == 0 || path.is_gap(0)) return -1.0f;
+    vec3 arriving(0.0f);
+    for (std::uint32_t depth = path.vertices(); depth-- > 0;) arriving += path.contribution(depth);
+    const float sum = luminance(arriving);
+    return is_finite(sum) && sum >= 0.0f ? sum : -1.0f;
+  }
+  /// Where path i hit a surface first: 2 * node + side, or nowhere. Precondition: it has a radiance.
+  WFPG_HD std::uint32_t place(std::size_t i) const {
+    const recorded_path path(recorded, i * stride);
+    const sparse_voxel_octree_view& tree = cache.octree();
+    const vec3 position = path.position(0);
+    node_id node = is_finite(position) ? tree.nearest_leaf(position) : invalid_node;
+    if (node == invalid_node) return earlier_paths::nowhere;
+    std::uint32_t side = cache.side_facing(node, path.outgoing(0));
+    for (int up = 0; up < levels_up && node != 0; ++up) {
+      const node_id parent = tree.parent(node);
+      side = cache.matching_side(parent, node - tree.first_child(parent), side);
+      node = parent;
+    }
+    return 2 * node + side;
+  }
+  /// Unit of differences at a place that is not nowhere.
+  WFPG_HD float scale(std::uint32_t place) const {
+    return cache.read(place / 2, place % 2) + 0.5f * (cache.read(0, 0u) + cache.read(0, 1u));
+  }
+
+ private:
+  // Above a leaf: nodes with some hundred times its deposits.
+  static constexpr int levels_up = 2;
+};
+
+/// Kernel: keeps what paths brought, of an unguided sample or of a guided one.
+struct keep_paths {
+  measured_paths paths;
+  array_view<earlier_paths> kept;
+  bool unguided;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const float radiance = paths.radiance(i);
+    const std::uint32_t place = radiance < 0.0f ? earlier_paths::nowhere : paths.place(i);
+    if (unguided)
+      kept[i] = {place, radiance, -1.0f};
+    else
+      kept[i].guided = place == kept[i].place ? radiance : -1.0f;
+  }
+};
+
+/// What a guided path adds to the sums: nothing where one of the three paths is missing, or began elsewhere.
+struct measure_path {
+  measured_paths paths;
+  array_view<const earlier_paths> kept;
+
+  WFPG_HD path_sums operator()(std::size_t i) const {
+    const earlier_paths before = kept[i];
+    if (before.place == earlier_paths::nowhere || before.unguided < 0.0f || before.guided < 0.0f) return {};
+    const float now = paths.radiance(i);
+    if (now < 0.0f || paths.place(i) != before.place) return {};
+    const float scale = paths.scale(before.place);
+    if (!(scale > 0.0f) || !is_finite(scale)) return {};
+    return {1, units(before.unguided / scale), units(now / scale),
+            squared_units((before.unguided - now) / scale), squared_units((before.guided - now) / scale)};
+  }
+
+ private:
+  static constexpr float most = 8.0f, unit = 0x1p20f;
+
+  WFPG_HD static std::uint64_t units(float value) {
+    return static_cast<std::uint64_t>(min(value, most) * unit);
+  }
+  WFPG_HD static std::uint64_t squared_units(float difference) {
+    const float cut = min(fabsf(difference), most);
+    return static_cast<std::uint64_t>(cut * cut * unit);
+  }
+};
+
+}  // namespace wfpg::detail

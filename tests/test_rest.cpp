@@ -1,0 +1,392 @@
+// When a guide rests: the schedule, the gain that decides, and a guider whose paths gain much, little or
+// nothing.
+#include "support/evaluate.hpp"
+#include "support/guiding.hpp"
+#include "support/policies.hpp"
+#include "support/scenes.hpp"
+
+#include <wfpg/guide_file.hpp>
+#include <wfpg/path_guider.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+using namespace wfpg_test;
+using wfpg::guiding_gain;
+using wfpg::rest_schedule;
+
+namespace {
+
+/// A gain that is known.
+guiding_gain gain_of(double value) {
+  guiding_gain gain;
+  gain.paths = 4096;
+  gain.unguided_mean = gain.guided_mean = 1.0;
+  gain.unguided_variance = value;
+  gain.guided_variance = 1.0;
+  return gain;
+}
+
+/// Numbers of the first `n` samples for which f(sample) is true.
+template <class F>
+std::vector<std::uint32_t> samples_where(std::uint32_t n, const F& f) {
+  std::vector<std::uint32_t> found;
+  for (std::uint32_t sample = 1; sample <= n; ++sample)
+    if (f(sample)) found.push_back(sample);
+  return found;
+}
+
+using numbers = std::vector<std::uint32_t>;
+
+TEST_CASE("rest: samples 3, 4, 8, 16 and so on are measured, and count from the unguided one", "[rest]") {
+  const rest_schedule one(1.25f, 1), three(1.25f, 3);
+  CHECK(samples_where(70, [&](std::uint32_t s) { return one.is_unguided(s); }) == numbers{1});
+  CHECK(samples_where(70, [&](std::uint32_t s) { return one.compares(s); }) == numbers{3, 4, 8, 16, 32, 64});
+  CHECK(samples_where(70, [&](std::uint32_t s) { return three.is_unguided(s); }) == numbers{3});
+  CHECK(samples_where(70, [&](std::uint32_t s) { return three.compares(s); }) ==
+        numbers{5, 6, 10, 18, 34, 66});
+}
+
+TEST_CASE("rest: without the option, or without an unguided sample, nothing is measured", "[rest]") {
+  for (const rest_schedule& never :
+       {rest_schedule(), rest_schedule(std::nullopt, 1), rest_schedule(1.25f, 0)}) {
+    CHECK(samples_where(70, [&](std::uint32_t s) {
+            return never.compares(s) || never.is_unguided(s);
+          }).empty());
+    CHECK(samples_where(70, [&](std::uint32_t s) { return never.rests(s); }).empty());
+  }
+}
+
+TEST_CASE("rest: the least gain grows to the option's in 32 samples", "[rest]") {
+  const rest_schedule schedule(1.25f, 1);
+  CHECK(schedule.threshold(4) == Approx(1.0f + 0.25f / 8.0f));
+  CHECK(schedule.threshold(16) == Approx(1.125f));
+  CHECK(schedule.threshold(32) == Approx(1.25f));
+  CHECK(schedule.threshold(1024) == Approx(1.25f));
+}
+
+TEST_CASE("rest: a guide rests between comparisons, and only where its gain is known and too small",
+          "[rest]") {
+  rest_schedule schedule(1.25f, 1);
+  schedule.decide(8, gain_of(1.05));
+  CHECK(samples_where(40, [&](std::uint32_t s) { return s > 8 && !schedule.rests(s); }) == numbers{16, 32});
+  for (std::uint32_t sample = 9; sample <= 16; ++sample) schedule.count(sample);
+  CHECK(schedule.rested() == 7);
+  schedule.decide(16, gain_of(1.13));
+  CHECK(!schedule.resting());
+  schedule.decide(32, gain_of(1.13));
+  CHECK(schedule.resting());
+
+  guiding_gain few = gain_of(0.5), dark = gain_of(0.5);
+  few.paths = 4095;
+  dark.unguided_mean = 0.89;  // unguided paths miss light: their variance lies there
+  for (const guiding_gain& unknown : {few, dark, guiding_gain()}) {
+    schedule.decide(64, gain_of(0.5));
+    REQUIRE(schedule.resting());
+    schedule.decide(64, unknown);
+    CHECK(!schedule.resting());
+  }
+}
+
+TEST_CASE("rest: gains have bounds where variances are 0", "[rest]") {
+  guiding_gain gain = gain_of(3.0);
+  CHECK(gain.value() == 3.0);
+  gain.guided_variance = 0.0;
+  CHECK(gain.value() == 1.0e6);
+  gain.unguided_variance = 0.0;
+  CHECK(gain.value() == 1.0);
+}
+
+TEST_CASE("rest: after light or geometry moved a guide that rests begins again, another one goes on",
+          "[rest]") {
+  rest_schedule resting(1.25f, 1), guiding(1.25f, 1);
+  resting.decide(8, gain_of(0.9));
+  resting.restart(20);
+  guiding.restart(20);
+  CHECK(samples_where(60, [&](std::uint32_t s) { return resting.is_unguided(s); }) == numbers{21});
+  CHECK(samples_where(60, [&](std::uint32_t s) { return resting.compares(s); }) ==
+        numbers{23, 24, 28, 36, 52});
+  CHECK(samples_where(60, [&](std::uint32_t s) { return resting.rests(s); }).empty());
+  CHECK(samples_where(60, [&](std::uint32_t s) { return guiding.compares(s) || guiding.rests(s); }).empty());
+}
+
+TEST_CASE("rest: a state that no schedule has is refused", "[rest]") {
+  rest_schedule schedule(1.25f, 1);
+  CHECK(schedule.restore(20, 1, 12, true));
+  CHECK(schedule.rests(21));
+  CHECK(!schedule.restore(20, 1, 21, true));
+  CHECK(!schedule.restore(20, 22, 3, false));
+  CHECK(!schedule.restore(20, 0, 3, true));
+}
+
+// A host whose paths have one vertex on a wall. A path brings 0, or its pixel's mean over the probability of
+// not bringing 0: that probability sets the variance.
+
+constexpr std::uint32_t path_count = 6000;
+
+struct wall_path {
+  vec3 position, normal;
+  float mean;  ///< luminance
+
+  WFPG_HD static wall_path of(std::uint32_t path) {
+    const vec2 u = wfpg::unit_vec2(wfpg::hash(7u, path)) * 0.6f + 0.2f;
+    const std::uint32_t face = path % 6;
+    return {face_point(face, u.x, u.y), face_normal(face), 1.0f + static_cast<float>(face)};
+  }
+  /// What path `path` brings in a sample, with this probability.
+  WFPG_HD static float radiance(std::uint32_t path, std::uint32_t sample, float probability) {
+    const bool lit = wfpg::unit_vec2(wfpg::hash(wfpg::hash(sample, path), 11u)).x < probability;
+    return lit ? of(path).mean / probability : 0.0f;
+  }
+};
+
+struct record_wall_paths {
+  wfpg::path_recorder_view recorder;
+  std::uint32_t sample;
+  float probability;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const auto path = static_cast<std::uint32_t>(i);
+    const wall_path at = wall_path::of(path);
+    recorder.vertex(i, 0, at.position, at.normal, 1.0f);
+    recorder.radiance(i, 0, wall_path::radiance(path, sample, probability));
+  }
+};
+
+wfpg::kept_guide_options rest_options() {
+  wfpg::kept_guide_options options;
+  options.octree_resolution = 32;
+  options.max_paths = path_count;
+  options.max_depth = 2;
+  options.kept.budget_bytes = std::size_t(1) << 20;
+  return options;
+}
+
+/// Probabilities of unguided and of guided paths. The variance of a pixel is its squared mean times
+/// 1 / probability - 1.
+struct chances {
+  float unguided, guided;
+};
+constexpr chances gains_much{0.25f, 0.5f}, loses{0.5f, 0.4f};
+
+template <class Exec, class Guide>
+void take_sample(const Exec& exec, wfpg::path_guider<Exec, Guide>& guider, std::uint32_t sample, chances p) {
+  guider.begin_sample();
+  const float probability = guider.guided() ? p.guided : p.unguided;
+  exec.for_each(path_count, record_wall_paths{guider.recorder(), sample, probability});
+  guider.end_sample();
+}
+
+/// Numbers of the samples from `first` to `last` that are guided.
+template <class Exec, class Guide>
+numbers guided_samples(const Exec& exec, wfpg::path_guider<Exec, Guide>& guider, std::uint32_t first,
+                       std::uint32_t last, chances p) {
+  numbers found;
+  for (std::uint32_t sample = first; sample <= last; ++sample) {
+    take_sample(exec, guider, sample, p);
+    if (guider.guided()) found.push_back(sample);
+    if (guider.guided() == guider.resting()) found.push_back(0);  // the first sample is neither
+  }
+  return found;
+}
+
+/// The unit of a path's differences, by other functions than the meter's.
+struct scale_of_path {
+  wfpg::exitance_cache_view cache;
+
+  WFPG_HD float operator()(std::size_t i) const {
+    const wall_path at = wall_path::of(static_cast<std::uint32_t>(i));
+    const wfpg::sparse_voxel_octree_view& tree = cache.octree();
+    const wfpg::node_id above = tree.ancestor(tree.leaf_at(at.position), tree.depth() - 2);
+    return cache.read(above, at.normal) + (cache.read(0, 0u) + cache.read(0, 1u)) / 2.0f;
+  }
+};
+
+/// The variances by definition, in doubles. `bias`: multiplies guided differences.
+guiding_gain brute_force(const std::vector<float>& scales, std::uint32_t earlier, std::uint32_t now,
+                         chances p, double bias = 1.0) {
+  double from_unguided = 0.0, between = 0.0;
+  for (std::uint32_t path = 0; path < path_count; ++path) {
+    const double scale = static_cast<double>(scales[path]);
+    const double b = static_cast<double>(wall_path::radiance(path, 1, p.unguided));
+    const double g = static_cast<double>(wall_path::radiance(path, earlier, p.guided));
+    const double h = static_cast<double>(wall_path::radiance(path, now, p.guided));
+    from_unguided += std::pow(std::min(std::abs(b - h) / scale, 8.0), 2.0);
+    between += bias * std::pow(std::min(std::abs(g - h) / scale, 8.0), 2.0);
+  }
+  guiding_gain result;
+  result.guided_variance = 0.5 * between / path_count;
+  result.unguided_variance = from_unguided / path_count - result.guided_variance;
+  return result;
+}
+
+WFPG_TEST_CASE("rest: a guider measures the variances of its paths", "[rest]") {
+  const Exec exec;
+  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), rest_options());
+  guided_samples(exec, guider, 1, 7, gains_much);
+  const std::vector<float> scales =
+      evaluate(exec, std::size_t(path_count), scale_of_path{guider.guide().cache()});
+  take_sample(exec, guider, 8, gains_much);
+  const guiding_gain measured = guider.statistics().gain;
+  const guiding_gain expected = brute_force(scales, 4, 8, gains_much);
+  CHECK(measured.paths == path_count);
+  CHECK(measured.guided_variance == Approx(expected.guided_variance).epsilon(1.0e-4));
+  CHECK(measured.unguided_variance == Approx(expected.unguided_variance).epsilon(1.0e-4));
+  // 3 by the probabilities, and less by the radiance that is cut off.
+  CHECK(std::abs(measured.value() - 3.0) < 0.3);
+  CHECK(std::abs(measured.unguided_mean / measured.guided_mean - 1.0) < 0.1);
+  // The check above would notice 1% of bias.
+  const guiding_gain biased = brute_force(scales, 4, 8, gains_much, 1.01);
+  CHECK(measured.guided_variance != Approx(biased.guided_variance).epsilon(1.0e-4));
+  CHECK(measured.unguided_variance != Approx(biased.unguided_variance).epsilon(1.0e-4));
+}
+
+/// Records a path as another index in each sample.
+struct record_shuffled_paths {
+  record_wall_paths record;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const auto path = static_cast<std::uint32_t>((i + 997u * record.sample) % path_count);
+    const wall_path at = wall_path::of(path);
+    record.recorder.vertex(i, 0, at.position, at.normal, 1.0f);
+    record.recorder.radiance(i, 0, wall_path::radiance(path, record.sample, record.probability));
+  }
+};
+
+WFPG_TEST_CASE("rest: a host that gives pixels other indices in each sample is not compared", "[rest]") {
+  const Exec exec;
+  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), rest_options());
+  for (std::uint32_t sample = 1; sample <= 16; ++sample) {
+    guider.begin_sample();
+    const float probability = guider.guided() ? loses.guided : loses.unguided;
+    exec.for_each(path_count, record_shuffled_paths{{guider.recorder(), sample, probability}});
+    guider.end_sample();
+  }
+  CHECK(guider.statistics().gain.paths < 600);
+  CHECK(guider.statistics().rested_samples == 0);
+}
+
+template <class Exec, class Options>
+numbers guided_of_40(const Exec& exec, const Options& options, chances p, std::uint32_t* rested = nullptr) {
+  using guide = wfpg::octree_guide_for<Exec, Options>;
+  wfpg::path_guider<Exec, guide> guider(exec, box_mesh<Exec>(exec).view(), options);
+  take_sample(exec, guider, 1, p);
+  CHECK(!guider.guided());
+  const numbers found = guided_samples(exec, guider, 2, 40, p);
+  if (rested) *rested = guider.statistics().rested_samples;
+  CHECK(guider.statistics().guided_samples + guider.statistics().rested_samples == 39);
+  return found;
+}
+
+WFPG_TEST_CASE("rest: a guide that gains nothing guides only what is compared", "[rest]") {
+  const Exec exec;
+  std::uint32_t rested = 0;
+  CHECK(guided_of_40(exec, rest_options(), loses, &rested) == numbers{2, 3, 4, 8, 16, 32});
+  CHECK(rested == 33);
+  wfpg::transient_guide_options transient;
+  static_cast<wfpg::octree_guide_options&>(transient) = rest_options();
+  CHECK(guided_of_40(exec, transient, loses) == numbers{2, 3, 4, 8, 16, 32});
+}
+
+WFPG_TEST_CASE("rest: a guide that gains, one that must not rest, and one of few paths guide all samples",
+               "[rest]") {
+  const Exec exec;
+  CHECK(guided_of_40(exec, rest_options(), gains_much).size() == 39);
+  wfpg::kept_guide_options never = rest_options(), few = rest_options();
+  never.least_gain.reset();
+  CHECK(guided_of_40(exec, never, loses).size() == 39);
+  few.max_paths = 4000;
+  CHECK(guided_of_40(exec, few, loses).size() == 39);
+}
+
+WFPG_TEST_CASE("rest: a gain below the option's lets a guide rest once it is settled", "[rest]") {
+  const Exec exec;
+  wfpg::kept_guide_options options = rest_options();
+  options.least_gain =
+      8.0f;  // 3 is more than the 1.875 of sample 4, and less than the 2.75 of sample 8 and 4.5
+  const numbers found = guided_of_40(exec, options, gains_much);
+  CHECK(found == numbers{2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 32});
+}
+
+WFPG_TEST_CASE("rest: directions of samples that rest are the BSDF's, and lights are still chosen",
+               "[rest]") {
+  const Exec exec;
+  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), rest_options());
+  guided_samples(exec, guider, 1, 4, loses);
+  guider.begin_sample();
+  REQUIRE(guider.resting());
+  std::vector<test_surface> surfaces;
+  for (std::uint32_t path = 0; path < 500; ++path)
+    surfaces.push_back(
+        make_surface(wall_path::of(path).position, wall_path::of(path).normal, wall_path::of(path).normal));
+  const wave_of_surfaces<Exec> wave(exec, surfaces);
+  const wfpg::buffer<wfpg::sampled_direction, Exec> drawn(exec, surfaces.size());
+  guider.sample_directions(wave.get(), box_caster(), drawn.view());
+  for (const wfpg::sampled_direction& d : drawn.to_host(exec)) {
+    CHECK(d.technique == wfpg::sampling_technique::bsdf);
+    CHECK(d.field == wfpg::no_field);
+  }
+  const wfpg::guide_view view = guider.prepare(wave.get(), box_caster());
+  CHECK(count_guided(exec, view, surfaces.size()) == 0);
+  CHECK(guider.recorder().recorded() == 0);
+  guider.end_sample();
+}
+
+WFPG_TEST_CASE("rest: a guide wakes up where light or geometry moved", "[rest]") {
+  const Exec exec;
+  using guider_type = wfpg::path_guider<Exec>;
+  for (const auto move :
+       {+[](guider_type& g) { g.forget_light(); }, +[](guider_type& g) { g.invalidate_all(); },
+        +[](guider_type& g) {
+          g.invalidate({vec3(0.4f), vec3(0.6f)});
+        }}) {
+    guider_type guider(exec, box_mesh<Exec>(exec).view(), rest_options());
+    guided_samples(exec, guider, 1, 10, loses);
+    move(guider);
+    take_sample(exec, guider, 11, gains_much);  // the new unguided sample
+    CHECK(!guider.guided());
+    CHECK(!guider.resting());
+    CHECK(guided_samples(exec, guider, 12, 40, gains_much).size() == 29);
+  }
+}
+
+template <class Exec>
+std::string saved(const wfpg::path_guider<Exec>& guider) {
+  std::ostringstream out;
+  wfpg::save_guide(guider, out);
+  return out.str();
+}
+
+WFPG_TEST_CASE("rest: a guide that is saved and loaded goes on as it would have", "[rest]") {
+  const Exec exec;
+  for (const std::uint32_t until : {1u, 3u, 6u, 8u, 20u}) {
+    wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), rest_options());
+    guided_samples(exec, guider, 1, until, loses);
+    const std::string bytes = saved(guider);
+    std::istringstream in(bytes);
+    wfpg::path_guider<Exec> loaded = wfpg::load_guide(exec, in, rest_options());
+    CHECK(saved(loaded) == bytes);
+    CHECK(guided_samples(exec, loaded, until + 1, 40, loses) ==
+          guided_samples(exec, guider, until + 1, 40, loses));
+    CHECK(saved(loaded) == saved(guider));
+  }
+}
+
+TEST_CASE("rest: a least gain below 1 is refused", "[rest]") {
+  const wfpg::exec::seq exec;
+  wfpg::kept_guide_options options = rest_options();
+  for (const float bad : {0.99f, 2.0e6f, std::numeric_limits<float>::quiet_NaN()}) {
+    options.least_gain = bad;
+    const box_mesh<wfpg::exec::seq> mesh(exec);
+    CHECK(refusal([&] {
+            wfpg::path_guider<wfpg::exec::seq>(exec, mesh.view(), options);
+          }).find("least_gain") != std::string::npos);
+  }
+}
+
+}  // namespace
