@@ -115,6 +115,15 @@ TEST_CASE("rest: after light or geometry moved a guide that rests begins again, 
   CHECK(samples_where(60, [&](std::uint32_t s) { return guiding.compares(s) || guiding.rests(s); }).empty());
 }
 
+TEST_CASE("rest: what moves before the unguided sample changes nothing", "[rest]") {
+  rest_schedule schedule(1.25f, 2);
+  schedule.restart(0);
+  schedule.restart(1);
+  CHECK(samples_where(20, [&](std::uint32_t s) { return schedule.compares(s); }) == numbers{4, 5, 9, 17});
+  schedule.restart(2);
+  CHECK(samples_where(20, [&](std::uint32_t s) { return schedule.compares(s); }).empty());
+}
+
 TEST_CASE("rest: a state that no schedule has is refused", "[rest]") {
   rest_schedule schedule(1.25f, 1);
   CHECK(schedule.restore(20, 1, 12, true));

@@ -62,7 +62,9 @@ class rest_schedule {
   void count(std::uint32_t sample) { rested_ += rests(sample) ? 1u : 0u; }
   /// Forgets what was measured, after `sample`: light or geometry moved. A guide that rests wakes up. The
   /// next sample is then the unguided one. A guide that does not rest goes on, and is not compared again.
+  /// Changes nothing before the unguided sample.
   void restart(std::uint32_t sample) {
+    if (sample < unguided_) return;
     unguided_ = resting_ ? sample + 1 : 0;
     resting_ = false;
   }
