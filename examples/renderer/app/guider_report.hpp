@@ -77,7 +77,7 @@ void report_guider(const wfpg::path_guider<Exec, Guide>& guider, std::uint64_t s
     report.bins.push_back({bins / samples, bins > 0.0 ? static_cast<double>(depth.rays) / bins : 0.0});
   }
   report.rest.rested = statistics.rested_samples;
-  if (statistics.gain.is_known()) report.rest.last_gain = statistics.gain.value();
+  report.rest.gain = statistics.gain;
   const wfpg::kept_field_statistics& kept = statistics.kept;
   report.slots.capacity = kept.capacity;
   report.slots.live = kept.live;

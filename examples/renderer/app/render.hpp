@@ -6,6 +6,7 @@
 #include "tracer/stage_clock.hpp"
 #include "tracer/technique_set.hpp"
 
+#include <wfpg/guide/statistics.hpp>
 #include <wfpg/guides/octree/options.hpp>
 #include <wfpg/guides/records/options.hpp>
 #include <wfpg/guides/sarsa/options.hpp>
@@ -108,8 +109,8 @@ struct slot_report {
 
 /// What a guide found out about its worth.
 struct rest_report {
-  std::uint32_t rested = 0;         ///< samples in which the guide rested
-  std::optional<double> last_gain;  ///< of the last comparison, in variance; unset: none, or not known
+  std::uint32_t rested = 0;  ///< samples in which the guide rested
+  wfpg::guiding_gain gain;   ///< of the last comparison
 };
 
 struct octree_report {

@@ -40,8 +40,15 @@ json slots_of(const slot_report& slots) {
 }
 
 json rest_of(const rest_report& rest) {
-  json result{{"samples", rest.rested}, {"last_gain", nullptr}};
-  if (rest.last_gain) result["last_gain"] = *rest.last_gain;
+  const wfpg::guiding_gain& gain = rest.gain;
+  json result{{"samples", rest.rested},
+              {"compared_paths", gain.paths},
+              {"unguided_mean", gain.unguided_mean},
+              {"guided_mean", gain.guided_mean},
+              {"unguided_variance", gain.unguided_variance},
+              {"guided_variance", gain.guided_variance},
+              {"gain", nullptr}};
+  if (gain.is_known()) result["gain"] = gain.value();
   return result;
 }
 
