@@ -393,8 +393,8 @@ TEST_CASE("the content of a guide file is checked, even if its checksums are rig
           "has radiance that is negative or not finite");
   refused("counts", 0, 4, 0x80000000u, "has samples without end");
   refused("counts", 4, 4, 36, "warms up until after samples that are to come");
-  refused("counts", 8, 4, 6, "rests in samples that are to come");
-  refused("counts", 12, 4, 5, "rests in samples that are to come");
+  refused("counts", 12, 4, 6, "rests in samples that are to come");
+  refused("counts", 16, 4, 5, "rests in samples that are to come");
   refused("paths", 0, 4, 2 * nodes, "has paths from no node");
   refused("paths", 4, 4, infinity, "has radiance that is not finite");
   refused("paths", section_of(bytes, "paths").size - 4, 4, infinity, "has radiance that is not finite");

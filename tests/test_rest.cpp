@@ -82,10 +82,11 @@ TEST_CASE("rest: a guide rests between comparisons, and only where its gain is k
   schedule.decide(32, gain_of(1.13));
   CHECK(schedule.resting());
 
-  guiding_gain few = gain_of(0.5), dark = gain_of(0.5);
+  guiding_gain few = gain_of(0.5), dark = gain_of(0.5), bright = gain_of(0.5);
   few.paths = 4095;
-  dark.unguided_mean = 0.89;  // unguided paths miss light: their variance lies there
-  for (const guiding_gain& unknown : {few, dark, guiding_gain()}) {
+  dark.unguided_mean = 0.94;    // unguided paths miss light: their variance lies there
+  bright.cut_off_mean = 0.011;  // it lies in few and bright paths
+  for (const guiding_gain& unknown : {few, dark, bright, guiding_gain()}) {
     schedule.decide(64, gain_of(0.5));
     REQUIRE(schedule.resting());
     schedule.decide(64, unknown);
@@ -124,6 +125,12 @@ TEST_CASE("rest: what moves before the unguided sample changes nothing", "[rest]
   CHECK(samples_where(20, [&](std::uint32_t s) { return schedule.compares(s); }).empty());
 }
 
+TEST_CASE("rest: comparisons are at most 512 samples apart", "[rest]") {
+  const rest_schedule schedule(1.25f, 1);
+  const numbers late = samples_where(2100, [&](std::uint32_t s) { return s > 200 && schedule.compares(s); });
+  CHECK(late == numbers{256, 512, 1024, 1536, 2048});
+}
+
 TEST_CASE("rest: a state that no schedule has is refused", "[rest]") {
   rest_schedule schedule(1.25f, 1);
   CHECK(schedule.restore(20, 1, 12, true));
@@ -131,6 +138,8 @@ TEST_CASE("rest: a state that no schedule has is refused", "[rest]") {
   CHECK(!schedule.restore(20, 1, 21, true));
   CHECK(!schedule.restore(20, 22, 3, false));
   CHECK(!schedule.restore(20, 0, 3, true));
+  CHECK(rest_schedule(1.25f, 3).restore(1, 3, 0, false));  // before the unguided sample
+  CHECK(rest_schedule(1.25f, 1).restore(20, 21, 3, false));
 }
 
 // A host whose paths have one vertex on a wall. A path brings 0, or its pixel's mean over the probability of
@@ -216,21 +225,24 @@ struct scale_of_path {
   }
 };
 
-/// The variances by definition, in doubles. `bias`: multiplies guided differences.
+/// The variances by definition, in doubles. `bias`: multiplies squared differences of guided paths.
 guiding_gain brute_force(const std::vector<float>& scales, std::uint32_t earlier, std::uint32_t now,
                          chances p, double bias = 1.0) {
-  double from_unguided = 0.0, between = 0.0;
+  double first_now = 0.0, first_earlier = 0.0, between = 0.0;
   for (std::uint32_t path = 0; path < path_count; ++path) {
-    const double scale = static_cast<double>(scales[path]);
-    const double b = static_cast<double>(wall_path::radiance(path, 1, p.unguided));
-    const double g = static_cast<double>(wall_path::radiance(path, earlier, p.guided));
-    const double h = static_cast<double>(wall_path::radiance(path, now, p.guided));
-    from_unguided += std::pow(std::min(std::abs(b - h) / scale, 8.0), 2.0);
-    between += bias * std::pow(std::min(std::abs(g - h) / scale, 8.0), 2.0);
+    const auto square = [&](float a, float b) {
+      return std::pow(std::min(std::abs(double(a) - double(b)) / double(scales[path]), 8.0), 2.0);
+    };
+    const float b = wall_path::radiance(path, 1, p.unguided);
+    const float g = wall_path::radiance(path, earlier, p.guided),
+                h = wall_path::radiance(path, now, p.guided);
+    first_now += square(b, h) / path_count;
+    first_earlier += square(b, g) / path_count;
+    between += bias * square(g, h) / path_count;
   }
   guiding_gain result;
-  result.guided_variance = 0.5 * between / path_count;
-  result.unguided_variance = from_unguided / path_count - result.guided_variance;
+  result.unguided_variance = (first_now + first_earlier - between) / 2.0;
+  result.guided_variance = (first_now + between - first_earlier) / 2.0;
   return result;
 }
 
@@ -346,6 +358,86 @@ WFPG_TEST_CASE("rest: directions of samples that rest are the BSDF's, and lights
   guider.end_sample();
 }
 
+struct find_lights {
+  wfpg::light_guide_view lights;
+  std::uint32_t group;
+  WFPG_HD float operator()() const {
+    const wall_path at = wall_path::of(0);
+    return lights.probability(lights.find(at.position, at.normal), group);
+  }
+};
+
+struct deposit_lights {
+  wfpg::light_guide_view lights;
+  WFPG_HD void operator()(std::size_t i) const {
+    const auto path = static_cast<std::uint32_t>(i);
+    const wall_path at = wall_path::of(path);
+    const wfpg::light_choice choice =
+        lights.choose(lights.find(at.position, at.normal), wfpg::unit_vec2(wfpg::hash(5u, path)).x);
+    lights.deposit(path, choice.key, choice.group == 1 ? 5.0f : 0.0f);
+  }
+};
+
+WFPG_TEST_CASE("rest: choices of lights learn while the guide rests", "[rest]") {
+  const Exec exec;
+  wfpg::kept_guide_options options = rest_options();
+  options.lights.weights = {1.0f, 1.0f};
+  options.lights.resolution = 4;
+  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
+  guided_samples(exec, guider, 1, 4, loses);
+  const float before = evaluate(exec, find_lights{guider.lights(), 1});
+  for (int sample = 5; sample < 8; ++sample) {
+    guider.begin_sample();
+    REQUIRE(guider.resting());
+    exec.for_each(path_count, deposit_lights{guider.lights()});
+    guider.end_sample();
+  }
+  CHECK(before == Approx(0.5f));
+  CHECK(evaluate(exec, find_lights{guider.lights(), 1}) > 0.7f);
+}
+
+WFPG_TEST_CASE("rest: a sample that is ended again is not compared with itself", "[rest]") {
+  const Exec exec;
+  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), rest_options());
+  guided_samples(exec, guider, 1, 4, loses);
+  const guiding_gain measured = guider.statistics().gain;
+  guider.end_sample();
+  CHECK(guider.statistics().gain.guided_variance == measured.guided_variance);
+  CHECK(guider.statistics().gain.paths == measured.paths);
+  guider.begin_sample();
+  CHECK(guider.resting());
+}
+
+/// A host of `paths` paths. They are recorded in part where `deposits_per_leaf` is set.
+template <class Exec>
+guiding_gain gain_of_many(const Exec& exec, std::uint32_t paths,
+                          std::optional<std::uint32_t> deposits_per_leaf) {
+  wfpg::kept_guide_options options = rest_options();
+  options.max_paths = paths;
+  options.deposits_per_leaf = deposits_per_leaf;
+  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
+  for (std::uint32_t sample = 1; sample <= 4; ++sample) {
+    guider.begin_sample();
+    const float probability = guider.guided() ? gains_much.guided : gains_much.unguided;
+    exec.for_each(paths, record_wall_paths{guider.recorder(), sample, probability});
+    guider.end_sample();
+  }
+  return guider.statistics().gain;
+}
+
+WFPG_TEST_CASE("rest: paths that are recorded or measured in part are the same ones in each sample",
+               "[rest]") {
+  const Exec exec;
+  const guiding_gain recorded = gain_of_many(exec, 60000, 1),
+                     measured = gain_of_many(exec, 150000, std::nullopt);
+  CHECK(recorded.paths > 3000);
+  CHECK(recorded.paths < 20000);
+  CHECK(measured.paths > 40000);
+  CHECK(measured.paths <= 65536);
+  CHECK(std::abs(recorded.value() - 3.0) < 0.5);
+  CHECK(std::abs(measured.value() - 3.0) < 0.1);
+}
+
 WFPG_TEST_CASE("rest: a guide wakes up where light or geometry moved", "[rest]") {
   const Exec exec;
   using guider_type = wfpg::path_guider<Exec>;
@@ -384,6 +476,30 @@ WFPG_TEST_CASE("rest: a guide that is saved and loaded goes on as it would have"
           guided_samples(exec, guider, until + 1, 40, loses));
     CHECK(saved(loaded) == saved(guider));
   }
+}
+
+WFPG_TEST_CASE("rest: a guide that is loaded with other options never rests", "[rest]") {
+  const Exec exec;
+  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), rest_options());
+  guided_samples(exec, guider, 1, 10, loses);
+  const std::string bytes = saved(guider);
+  for (const auto change : {+[](wfpg::kept_guide_options& o) { o.seed = 1; },
+                            +[](wfpg::kept_guide_options& o) { o.unguided_samples = 0; },
+                            +[](wfpg::kept_guide_options& o) { o.least_gain.reset(); }}) {
+    wfpg::kept_guide_options options = rest_options();
+    change(options);
+    std::istringstream in(bytes);
+    wfpg::path_guider<Exec> loaded = wfpg::load_guide(exec, in, options);
+    CHECK(guided_samples(exec, loaded, 11, 40, loses).size() == 30);
+  }
+  wfpg::kept_guide_options late = rest_options();
+  late.unguided_samples = 3;
+  wfpg::path_guider<Exec> begun(exec, box_mesh<Exec>(exec).view(), late);
+  take_sample(exec, begun, 1, loses);
+  std::istringstream in(saved(begun));
+  wfpg::path_guider<Exec> loaded = wfpg::load_guide(exec, in, late);
+  guided_samples(exec, loaded, 2, 3, loses);
+  CHECK(guided_samples(exec, loaded, 4, 20, loses) == numbers{4, 5, 6, 10, 18});
 }
 
 TEST_CASE("rest: a least gain below 1 is refused", "[rest]") {

@@ -23,8 +23,9 @@ using guider_type = std::variant<kept_guider, transient_guider>;
 
 constexpr std::uint64_t reference_seed = 0x5eed0fed;
 
-const render::render_options& checked(const render::render_options& options) {
+render::render_options checked(render::render_options options) {
   require_fields(options);
+  options.least_gain.reset();  // a guide that rests has no fields to show
   return options;
 }
 

@@ -21,7 +21,7 @@
 //            deposits dropped, by reason                          12
 //   counts   samples                                              4
 //            sample from which on fewer paths are recorded        4
-//            unguided sample that is compared                     4
+//            options and unguided sample of comparisons           8
 //            samples rested, and whether the guide rests          8
 //            triangles left out, by reason                        12
 //            vertices dropped                                     4

@@ -128,20 +128,26 @@ class path_guider {
   /// A guide that rests wakes up.
   void invalidate(const bounds3& bounds) {
     guide_.invalidate(exec_, bounds);
-    rests_.restart(samples_);
+    compare_anew();
   }
   /// Geometry moved anywhere: every kept field is cast anew when it is next used. A guide that rests wakes
   /// up.
   void invalidate_all() {
     guide_.invalidate_all(exec_);
-    rests_.restart(samples_);
+    compare_anew();
   }
   /// Lights moved: the guide forgets all radiance that it learnt. Kept fields take up the change without
   /// being cast anew. The next 32 samples are all recorded, as at the beginning. A guide that rests wakes up.
   void forget_light() {
     guide_.forget_light(exec_);
     warm_up_end_ = samples_ - rests_.rested() + recording_needs::warm_up_samples;
+    compare_anew();
+  }
+  /// The camera moved, or samples differ from those before for another reason. A guide that rests wakes up,
+  /// and is compared anew. One that does not rest goes on, and is not compared again. O(1).
+  void compare_anew() {
     rests_.restart(samples_);
+    gain_ = {};
   }
 
   /// Returns the view with which the renderer's kernels record their paths. It is valid for the current
@@ -221,7 +227,9 @@ class path_guider {
   }
   /// Context of a sample, for the guide's calls. It refers to members of this guider.
   sample_context<Exec> at(std::uint32_t sample) {
-    return {exec_, number_of(sample), seed_of(sample), is_guided(sample), recorded_, clock_};
+    // A sample that rests, and has not begun, is not counted yet.
+    const std::uint32_t uncounted = rests_now_ && sample > samples_ ? 1 : 0;
+    return {exec_, number_of(sample) - uncounted, seed_of(sample), is_guided(sample), recorded_, clock_};
   }
   /// Keeps the recorded paths of an unguided sample, or compares those of a guided one with them.
   void measure();
@@ -249,6 +257,7 @@ class path_guider {
   std::uint32_t warm_up_end_ = recording_needs::warm_up_samples;  // the last sample of the warm-up
   bool recorded_ = true;                                          // the current sample
   bool rests_now_ = false;                                        // the current sample
+  bool measured_ = false;                                         // the current sample, in end_sample()
   guiding_gain gain_;                                             // the last that was measured
 };
 

@@ -13,13 +13,40 @@ struct state_access {
     section_writer bytes;
     bytes.put(guider.samples_);
     bytes.put(guider.warm_up_end_);
-    bytes.put(guider.rests_.unguided_sample());
-    bytes.put(guider.rests_.rested());
-    bytes.put(static_cast<std::uint32_t>(guider.rests_.resting()));
+    put_rests(guider, bytes);
     guide_sections::put_build(guider.guide_, bytes);
     bytes.put(guider.recorder_.dropped(guider.exec_));
     guide_sections::put_depths(guider.exec_, guider.guide_, bytes);
     return bytes;
+  }
+
+  /// Options that decide which paths are compared, and when: where one differs, a loaded guide never rests.
+  template <class Options>
+  static std::uint32_t comparison_key(const Options& o) {
+    const auto key = [](std::uint64_t known, std::uint64_t value) { return hash(known, value); };
+    std::uint64_t known = key(0, o.max_paths);
+    known = key(known, o.max_depth);
+    known = key(known, o.deposits_per_leaf.value_or(0));
+    known = key(known, o.seed);
+    known = key(known, o.unguided_samples);
+    return static_cast<std::uint32_t>(key(known, float_bits(o.least_gain.value_or(0.0f))));
+  }
+  template <class Exec, class Guide>
+  static void put_rests(const path_guider<Exec, Guide>& guider, section_writer& bytes) {
+    bytes.put(comparison_key(guider.options_));
+    bytes.put(guider.rests_.unguided_sample());
+    bytes.put(guider.rests_.rested());
+    bytes.put(static_cast<std::uint32_t>(guider.rests_.resting()));
+  }
+  template <class Exec, class Guide>
+  static void take_rests(section_reader& bytes, path_guider<Exec, Guide>& guider) {
+    const auto key = bytes.get<std::uint32_t>(), unguided = bytes.get<std::uint32_t>(),
+               rested = bytes.get<std::uint32_t>(), resting = bytes.get<std::uint32_t>();
+    bytes.require(rested <= guider.samples_, "rests in samples that are to come");
+    if (key != comparison_key(guider.options_)) return guider.rests_.restore_other(rested);
+    bytes.require(guider.rests_.restore(guider.samples_, unguided, rested, resting != 0),
+                  "rests in samples that are to come");
+    guider.rests_now_ = guider.rests_.rests(guider.samples_);
   }
 
   template <class Exec, class Guide>
@@ -29,10 +56,7 @@ struct state_access {
     guider.warm_up_end_ = bytes.get<std::uint32_t>();
     bytes.require(guider.warm_up_end_ <= guider.samples_ + recording_needs::warm_up_samples,
                   "warms up until after samples that are to come");
-    const auto unguided = bytes.get<std::uint32_t>(), rested = bytes.get<std::uint32_t>(),
-               resting = bytes.get<std::uint32_t>();
-    bytes.require(guider.rests_.restore(guider.samples_, unguided, rested, resting != 0),
-                  "rests in samples that are to come");
+    take_rests(bytes, guider);
     guide_sections::take_build(bytes, guider.guide_);
     const auto dropped = bytes.get<std::uint32_t>();
     guide_sections::take_depths(guider.exec_, bytes, guider.guide_);

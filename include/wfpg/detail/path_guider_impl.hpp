@@ -23,6 +23,7 @@ path_guider<Exec, Guide>& path_guider<Exec, Guide>::operator=(path_guider&& othe
   warm_up_end_ = other.warm_up_end_;
   recorded_ = other.recorded_;
   rests_now_ = other.rests_now_;
+  measured_ = other.measured_;
   gain_ = other.gain_;
   return *this;
 }
@@ -43,6 +44,7 @@ void path_guider<Exec, Guide>::begin_sample() {
     guide_.begin_rest(at(sample));
   else
     guide_.begin_sample(at(sample));
+  measured_ = false;
   samples_ = sample;  // last, with the count: a call that threw is made again for the same sample
   rests_.count(sample);
 }
@@ -65,13 +67,18 @@ void path_guider<Exec, Guide>::end_sample() {
     guide_.update(now());
 }
 
-// Runs before the guide learns, so that the cache does not have the paths that are measured.
+// Runs before the guide learns, so that the cache does not have the paths that are measured. Once a sample:
+// an end_sample() that threw is called again, and would compare the sample with itself.
 template <class Exec, class Guide>
 void path_guider<Exec, Guide>::measure() {
-  if (rests_.is_unguided(samples_)) return guide_.keep_unguided(exec_, recorder_);
-  if (!rests_.compares(samples_) || guide_.empty()) return;
-  gain_ = guide_.gain(exec_, recorder_);
-  rests_.decide(samples_, gain_);
+  if (measured_ || guide_.empty()) return;
+  if (rests_.is_unguided(samples_)) {
+    guide_.keep_unguided(exec_, recorder_);
+  } else if (rests_.compares(samples_) && is_guided(samples_)) {
+    gain_ = guide_.gain(exec_, recorder_);
+    rests_.decide(samples_, gain_);
+  }
+  measured_ = true;
 }
 
 // Checks what prepare() and sample_directions() have in common. The latter checks `Random` and its outputs,
@@ -160,7 +167,8 @@ guider_statistics path_guider<Exec, Guide>::statistics() const {
   result.samples = samples_;
   // Counted from unguided_samples on: the guide is empty in all samples or in none.
   const bool begun = samples_ > options_.unguided_samples && !guide_.empty();
-  result.guided_samples = begun ? samples_ - options_.unguided_samples - rests_.rested() : 0;
+  const std::uint32_t after = begun ? samples_ - options_.unguided_samples : 0;
+  result.guided_samples = after - min(after, rests_.rested());
   result.rested_samples = rests_.rested();
   result.gain = gain_;
   result.dropped_vertices = recorder_.dropped(exec_);

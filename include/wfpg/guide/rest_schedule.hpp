@@ -2,8 +2,8 @@
 // tracing costs. Pure functions of counters, and of what was measured; every constant is here.
 //
 // The first sample is not guided. Its paths are kept, and compared with those of guided samples 4, 8, 16 and
-// so on, which are also compared with each other. Each time the guide goes on, rests, or wakes up. A guide
-// that rests guides these samples alone.
+// so on, which are also compared with each other. After each comparison the guide goes on, or it rests until
+// the next one. Comparisons are at most 512 samples apart.
 //
 // Source: wfpg's own. Costs of guiding are weighed against what it saves in Rath et al., "EARS" (2022), too.
 // Cost: O(1) a call. Memory: a few numbers on the host.
@@ -20,9 +20,11 @@ namespace wfpg {
 struct rest_constants {
   /// The first sample that is compared, counted from the unguided one. Guides have learnt little before.
   static constexpr std::uint32_t first_comparison = 4;
-  /// From this sample on the whole of least_gain is asked for. Before, guides still learn: the sample's part
-  /// of what exceeds 1 is.
+  /// From this sample on the whole of least_gain is asked for. Before, guides still learn. Sample i then asks
+  /// for i / 32 of what least_gain exceeds 1 by.
   static constexpr std::uint32_t settled_samples = 32;
+  /// Most samples between two comparisons, a power of two: what the camera sees may change.
+  static constexpr std::uint32_t longest_rest = 512;
 };
 
 /// When a guider's samples rest. Ages count samples from the last unguided one on, which has age 1.
@@ -39,11 +41,12 @@ class rest_schedule {
   bool rests(std::uint32_t sample) const { return resting_ && !compares(sample); }
   /// Whether a sample is not guided so that others can be compared with it.
   bool is_unguided(std::uint32_t sample) const { return unguided_ > 0 && sample == unguided_; }
-  /// Whether a sample is guided, recorded, and measured: at the ages 3, 4, 8, 16, ... Each is compared with
-  /// the unguided sample, and with the one that was measured before.
+  /// Whether a sample is guided, recorded, and measured: at the ages 3, 4, 8, ..., 512, 1024, 1536, ... Each
+  /// is compared with the unguided sample, and with the one that was measured before.
   bool compares(std::uint32_t sample) const {
     if (unguided_ == 0 || sample <= unguided_) return false;
     const std::uint32_t age = sample - unguided_ + 1, first = rest_constants::first_comparison;
+    if (age > rest_constants::longest_rest) return age % rest_constants::longest_rest == 0;
     return age == first - 1 || (age >= first && (age & (age - 1)) == 0);
   }
 
@@ -76,13 +79,23 @@ class rest_schedule {
   /// Whether samples rest, but for those that are compared.
   bool resting() const { return resting_; }
 
-  /// Takes a saved state. Returns false where it cannot have come from `samples` samples.
+  /// Takes the state of a guider that had made `samples` samples, under the same options. Returns false where
+  /// it has no such state.
   bool restore(std::uint32_t samples, std::uint32_t unguided, std::uint32_t rested, bool resting) {
-    unguided_ = least_gain_ > 0.0f ? unguided : 0;
+    const bool is_to_come = unguided == unguided_ || unguided == samples + 1;
+    if (rested > samples || (unguided > samples && !is_to_come)) return false;
+    if (resting && (unguided == 0 || unguided > samples)) return false;
+    unguided_ = unguided;
     rested_ = rested;
-    resting_ = resting && unguided_ > 0;
-    return rested <= samples && (unguided == 0 || unguided <= samples + 1 || samples == 0) &&
-           (!resting || unguided > 0);
+    resting_ = resting;
+    return true;
+  }
+  /// Takes only the number of samples that a guider rested in. Its other options differ, so that its samples
+  /// are not to be compared with this one's. Such a guide never rests.
+  void restore_other(std::uint32_t rested) {
+    unguided_ = 0;
+    rested_ = rested;
+    resting_ = false;
   }
 
  private:

@@ -31,7 +31,8 @@ struct sampling_options {
   /// rests until the next comparison. A sample that rests costs what path tracing costs.
   ///
   /// The default pays on GPUs, where a guided sample takes 1.26 times path tracing's time. On CPUs it takes
-  /// more. Needs unguided_samples of at least 1, pictures of at least 4096 pixels, and a guide that measures.
+  /// more. Needs unguided_samples of at least 1, and a guide that measures. It also needs 4096 paths that are
+  /// recorded, and go through the same surfaces in all samples that are compared.
   std::optional<float> least_gain = 1.25f;
   std::uint64_t seed = 0;  ///< seed of the guider's own random numbers; the renderer's come with each wave
   /// Most paths of a sample that the recorder has room for, less than 2^32 - 1. 0 records nothing. Times

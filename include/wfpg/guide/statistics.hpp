@@ -48,20 +48,26 @@ struct kept_field_statistics {
 /// What guiding gains at equal numbers of samples, measured over pixels whose paths were recorded. Radiance
 /// and variances are relative to what the cache expects of a pixel.
 struct guiding_gain {
-  /// Paths that are needed, for a variance to about a tenth.
+  /// Paths that are needed, for a variance to about a fifth.
   static constexpr std::uint64_t least_paths = 4096;
   /// Part of the guided paths' light that unguided paths have to find. Where they miss more, their variance
   /// is not known: it lies in the paths that they seldom find.
-  static constexpr double least_light = 0.9;
+  static constexpr double least_light = 0.95;
+  /// Part of the unguided paths' light that may be cut off, since it comes from few and very bright paths.
+  static constexpr double most_cut_off = 0.01;
 
-  std::uint64_t paths = 0;         ///< pixels with paths in all samples that were compared
-  double unguided_mean = 0.0;      ///< mean of what paths bring that sample their BSDFs
-  double guided_mean = 0.0;        ///< mean of what guided paths bring
+  std::uint64_t paths = 0;     ///< pixels with paths in all samples that were compared
+  double unguided_mean = 0.0;  ///< mean radiance of paths that sample their BSDFs, without what is cut off
+  double cut_off_mean = 0.0;   ///< mean of what is cut off of these paths
+  double guided_mean = 0.0;    ///< mean radiance of guided paths
   double unguided_variance = 0.0;  ///< variance of a path that samples its BSDFs
   double guided_variance = 0.0;    ///< variance of a guided path
 
   /// Whether value() means something.
-  bool is_known() const { return paths >= least_paths && unguided_mean >= least_light * guided_mean; }
+  bool is_known() const {
+    return paths >= least_paths && unguided_mean >= least_light * guided_mean &&
+           cut_off_mean <= most_cut_off * unguided_mean;
+  }
   /// Unguided variance over guided variance, at most 1e6; 1 where both are 0.
   double value() const {
     if (!(guided_variance > 1.0e-6 * unguided_variance)) return unguided_variance > 0.0 ? 1.0e6 : 1.0;

@@ -51,8 +51,11 @@ class gain_meter {
  private:
   friend struct detail::guide_sections;
 
-  // Where differences of moments become variances.
+  // Variances and means from the sums over paths.
   static guiding_gain gain_of(const detail::path_sums& sums);
+  // Sum of what measure(i) adds, for i in [0, n).
+  template <class Measure>
+  static detail::path_sums sum(const Exec& exec, std::size_t n, const Measure& measure);
   void keep(const Exec& exec, const detail::measured_paths& paths, std::size_t n, bool unguided);
 
   // Every stride-th recorded path is measured, so that there is room.

@@ -56,7 +56,8 @@ class octree_scene : public guide_base {
   guiding_gain gain(const Exec& exec, const path_recorder<Exec>& paths) {
     return meter_.gain(exec, paths, cache_.view());
   }
-  /// Begins a sample without the guide: light choices go on.
+  /// Begins a sample that the guide rests in. Choices of lights go on.
+  /// Neither fields nor cache take part.
   void begin_rest(const sample_context<Exec>& at) { begin_scene_sample(at); }
   /// Ends a sample without the guide: light choices learn from it.
   void end_rest(const sample_context<Exec>& at) { end_scene_sample(at); }
@@ -87,6 +88,10 @@ class octree_scene : public guide_base {
     return options.product_resolution.value_or(0);
   }
 
+  /// Whether samples are compared. Not where a host deposits by itself: a guide that rests reads no deposits.
+  static bool is_compared(const octree_guide_options& options) {
+    return options.least_gain && options.unguided_samples > 0 && options.deposit_capacity.value_or(0) == 0;
+  }
   /// Which fraction of paths the recorder stores. `directions`: also directions and their fields.
   recording_needs recording(bool directions) const { return recorded().needs(directions); }
   /// Capacity of a sample's deposits: the option, or all vertices that the recorder stores. Throws
@@ -157,12 +162,14 @@ class octree_scene : public guide_base {
   }
 
   // As given to the constructor.
+  //
   // In the order of construction: the cache is built from the fragments that the octree sorted.
   octree_guide_options options_;
   build_report build_;
   sparse_voxel_octree<Exec> octree_;
   exitance_cache<Exec> cache_;
   light_guide<Exec> lights_;
+  // Paths of samples that are compared. Empty where none is: is_compared().
   gain_meter<Exec> meter_;
   // P² points over the hemisphere, then P² over the sphere.
   buffer<product_point, Exec> product_points_;  // P² over the hemisphere, then P² over the sphere

@@ -22,17 +22,25 @@ struct earlier_paths {
   float guided = -1.0f;
 };
 
-/// Sums over paths, in units of 2^-20. Integers, so that any order of additions gives the same bits.
+/// Sums over paths. Integers, so that any order of additions gives the same bits. Values are in units of
+/// 2^-30, squared differences in units of 2^-40.
 struct path_sums {
-  std::uint64_t paths = 0;           ///< not in units
-  std::uint64_t unguided = 0;        ///< values of unguided paths
-  std::uint64_t guided = 0;          ///< values of guided paths
-  std::uint64_t from_unguided = 0;   ///< squared differences of guided paths from unguided ones
-  std::uint64_t between_guided = 0;  ///< squared differences of guided paths from earlier guided ones
+  std::uint64_t paths = 0;
+  std::uint64_t unguided = 0;       ///< values of unguided paths
+  std::uint64_t cut_off = 0;        ///< what is cut off of them
+  std::uint64_t guided = 0;         ///< values of guided paths
+  std::uint64_t now_first = 0;      ///< squared differences of guided paths from unguided ones
+  std::uint64_t now_earlier = 0;    ///< squared differences of guided paths from earlier guided ones
+  std::uint64_t earlier_first = 0;  ///< squared differences of earlier guided paths from unguided ones
 
   WFPG_HD path_sums operator+(const path_sums& other) const {
-    return {paths + other.paths, unguided + other.unguided, guided + other.guided,
-            from_unguided + other.from_unguided, between_guided + other.between_guided};
+    return {paths + other.paths,
+            unguided + other.unguided,
+            cut_off + other.cut_off,
+            guided + other.guided,
+            now_first + other.now_first,
+            now_earlier + other.now_earlier,
+            earlier_first + other.earlier_first};
   }
 };
 
@@ -104,20 +112,29 @@ struct measure_path {
     if (now < 0.0f || paths.place(i) != before.place) return {};
     const float scale = paths.scale(before.place);
     if (!(scale > 0.0f) || !is_finite(scale)) return {};
-    return {1, units(before.unguided / scale), units(now / scale),
-            squared_units((before.unguided - now) / scale), squared_units((before.guided - now) / scale)};
+    const float first = before.unguided / scale, earlier = before.guided / scale, last = now / scale;
+    return {1,
+            units(min(first, most)),
+            units(max(min(first, brightest) - most, 0.0f)),
+            units(min(last, most)),
+            squared_units(first - last),
+            squared_units(earlier - last),
+            squared_units(first - earlier)};
   }
 
  private:
-  static constexpr float most = 8.0f, unit = 0x1p20f;
+  static constexpr float most = 8.0f, brightest = 0x1p16f;
 
-  WFPG_HD static std::uint64_t units(float value) {
-    return static_cast<std::uint64_t>(min(value, most) * unit);
-  }
+  WFPG_HD static std::uint64_t units(float value) { return static_cast<std::uint64_t>(value * 0x1p30f); }
   WFPG_HD static std::uint64_t squared_units(float difference) {
     const float cut = min(fabsf(difference), most);
-    return static_cast<std::uint64_t>(cut * cut * unit);
+    return static_cast<std::uint64_t>(cut * cut * 0x1p40f);
   }
+};
+
+/// What a path adds to sums that are only made so that memory for them is there.
+struct measure_nothing {
+  WFPG_HD path_sums operator()(std::size_t) const { return {}; }
 };
 
 }  // namespace wfpg::detail

@@ -15,6 +15,16 @@ namespace wfpg {
 template <class Exec>
 gain_meter<Exec>::gain_meter(const Exec& exec, std::size_t paths) : kept_(exec, min(paths, most_paths)) {
   forget(exec);
+  // Samples allocate nothing: the reduction's memory is allocated now, and retained.
+  if (kept_.size() > 0) sum(exec, kept_.size(), detail::measure_nothing{});
+}
+
+template <class Exec>
+template <class Measure>
+detail::path_sums gain_meter<Exec>::sum(const Exec& exec, std::size_t n, const Measure& measure) {
+  const ::thrust::counting_iterator<std::size_t> first(0);
+  return ::thrust::transform_reduce(exec.thrust(), first, first + static_cast<std::ptrdiff_t>(n), measure,
+                                    detail::path_sums{}, ::thrust::plus<detail::path_sums>());
 }
 
 template <class Exec>
@@ -29,27 +39,27 @@ guiding_gain gain_meter<Exec>::gain(const Exec& exec, const path_recorder<Exec>&
                                     const exitance_cache_view& cache) {
   const std::size_t n = measured_count(recorder);
   const detail::measured_paths paths = measured(recorder, cache);
-  const ::thrust::counting_iterator<std::size_t> first(0);
-  const detail::path_sums sums = ::thrust::transform_reduce(
-      exec.thrust(), first, first + static_cast<std::ptrdiff_t>(n), detail::measure_path{paths, kept_.view()},
-      detail::path_sums{}, ::thrust::plus<detail::path_sums>());
+  const detail::path_sums sums = sum(exec, n, detail::measure_path{paths, kept_.view()});
   keep(exec, paths, n, false);
   return gain_of(sums);
 }
 
-// A guided path's difference from an unguided one has both variances, that from a guided one has its own
-// twice.
+// With the variances U, E and N of unguided, earlier and present paths, the mean squared differences are U +
+// N, E + N and U + E. Two of them less the third are twice a variance.
 template <class Exec>
 guiding_gain gain_meter<Exec>::gain_of(const detail::path_sums& sums) {
   guiding_gain result;
   result.paths = sums.paths;
   if (sums.paths == 0) return result;
-  const double scale = 0x1p-20 / static_cast<double>(sums.paths);
-  result.unguided_mean = scale * static_cast<double>(sums.unguided);
-  result.guided_mean = scale * static_cast<double>(sums.guided);
-  result.guided_variance = 0.5 * scale * static_cast<double>(sums.between_guided);
-  const double both = scale * static_cast<double>(sums.from_unguided);
-  result.unguided_variance = max(both - result.guided_variance, 0.0);
+  const auto n = static_cast<double>(sums.paths);
+  const auto mean = [n](std::uint64_t units) { return 0x1p-30 / n * static_cast<double>(units); };
+  const auto square = [n](std::uint64_t units) { return 0x1p-40 / n * static_cast<double>(units); };
+  const double un = square(sums.now_first), en = square(sums.now_earlier), ue = square(sums.earlier_first);
+  result.unguided_mean = mean(sums.unguided);
+  result.cut_off_mean = mean(sums.cut_off);
+  result.guided_mean = mean(sums.guided);
+  result.unguided_variance = max(0.5 * (un + ue - en), 0.0);
+  result.guided_variance = max(0.5 * (un + en - ue), 0.0);
   return result;
 }
 
