@@ -1,5 +1,4 @@
-// When a guide rests: the schedule, the gain that decides, and a guider whose paths gain much, little or
-// nothing.
+// A guide that rests: the gain that decides, and guiders whose paths gain much, little or nothing.
 #include "support/evaluate.hpp"
 #include "support/guiding.hpp"
 #include "support/policies.hpp"
@@ -11,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -18,129 +18,10 @@
 
 using namespace wfpg_test;
 using wfpg::guiding_gain;
-using wfpg::rest_schedule;
 
 namespace {
 
-/// A gain that is known.
-guiding_gain gain_of(double value) {
-  guiding_gain gain;
-  gain.paths = 4096;
-  gain.unguided_mean = gain.guided_mean = 1.0;
-  gain.unguided_variance = value;
-  gain.guided_variance = 1.0;
-  return gain;
-}
-
-/// Numbers of the first `n` samples for which f(sample) is true.
-template <class F>
-std::vector<std::uint32_t> samples_where(std::uint32_t n, const F& f) {
-  std::vector<std::uint32_t> found;
-  for (std::uint32_t sample = 1; sample <= n; ++sample)
-    if (f(sample)) found.push_back(sample);
-  return found;
-}
-
 using numbers = std::vector<std::uint32_t>;
-
-TEST_CASE("rest: samples 3, 4, 8, 16 and so on are measured, and count from the unguided one", "[rest]") {
-  const rest_schedule one(1.25f, 1), three(1.25f, 3);
-  CHECK(samples_where(70, [&](std::uint32_t s) { return one.is_unguided(s); }) == numbers{1});
-  CHECK(samples_where(70, [&](std::uint32_t s) { return one.compares(s); }) == numbers{3, 4, 8, 16, 32, 64});
-  CHECK(samples_where(70, [&](std::uint32_t s) { return three.is_unguided(s); }) == numbers{3});
-  CHECK(samples_where(70, [&](std::uint32_t s) { return three.compares(s); }) ==
-        numbers{5, 6, 10, 18, 34, 66});
-}
-
-TEST_CASE("rest: without the option, or without an unguided sample, nothing is measured", "[rest]") {
-  for (const rest_schedule& never :
-       {rest_schedule(), rest_schedule(std::nullopt, 1), rest_schedule(1.25f, 0)}) {
-    CHECK(samples_where(70, [&](std::uint32_t s) {
-            return never.compares(s) || never.is_unguided(s);
-          }).empty());
-    CHECK(samples_where(70, [&](std::uint32_t s) { return never.rests(s); }).empty());
-  }
-}
-
-TEST_CASE("rest: the least gain grows to the option's in 32 samples", "[rest]") {
-  const rest_schedule schedule(1.25f, 1);
-  CHECK(schedule.threshold(4) == Approx(1.0f + 0.25f / 8.0f));
-  CHECK(schedule.threshold(16) == Approx(1.125f));
-  CHECK(schedule.threshold(32) == Approx(1.25f));
-  CHECK(schedule.threshold(1024) == Approx(1.25f));
-}
-
-TEST_CASE("rest: a guide rests between comparisons, and only where its gain is known and too small",
-          "[rest]") {
-  rest_schedule schedule(1.25f, 1);
-  schedule.decide(8, gain_of(1.05));
-  CHECK(samples_where(40, [&](std::uint32_t s) { return s > 8 && !schedule.rests(s); }) == numbers{16, 32});
-  for (std::uint32_t sample = 9; sample <= 16; ++sample) schedule.count(sample);
-  CHECK(schedule.rested() == 7);
-  schedule.decide(16, gain_of(1.13));
-  CHECK(!schedule.resting());
-  schedule.decide(32, gain_of(1.13));
-  CHECK(schedule.resting());
-
-  guiding_gain few = gain_of(0.5), dark = gain_of(0.5), bright = gain_of(0.5);
-  few.paths = 4095;
-  dark.unguided_mean = 0.94;    // unguided paths miss light: their variance lies there
-  bright.cut_off_mean = 0.011;  // it lies in few and bright paths
-  for (const guiding_gain& unknown : {few, dark, bright, guiding_gain()}) {
-    schedule.decide(64, gain_of(0.5));
-    REQUIRE(schedule.resting());
-    schedule.decide(64, unknown);
-    CHECK(!schedule.resting());
-  }
-}
-
-TEST_CASE("rest: gains have bounds where variances are 0", "[rest]") {
-  guiding_gain gain = gain_of(3.0);
-  CHECK(gain.value() == 3.0);
-  gain.guided_variance = 0.0;
-  CHECK(gain.value() == 1.0e6);
-  gain.unguided_variance = 0.0;
-  CHECK(gain.value() == 1.0);
-}
-
-TEST_CASE("rest: after light or geometry moved a guide that rests begins again, another one goes on",
-          "[rest]") {
-  rest_schedule resting(1.25f, 1), guiding(1.25f, 1);
-  resting.decide(8, gain_of(0.9));
-  resting.restart(20);
-  guiding.restart(20);
-  CHECK(samples_where(60, [&](std::uint32_t s) { return resting.is_unguided(s); }) == numbers{21});
-  CHECK(samples_where(60, [&](std::uint32_t s) { return resting.compares(s); }) ==
-        numbers{23, 24, 28, 36, 52});
-  CHECK(samples_where(60, [&](std::uint32_t s) { return resting.rests(s); }).empty());
-  CHECK(samples_where(60, [&](std::uint32_t s) { return guiding.compares(s) || guiding.rests(s); }).empty());
-}
-
-TEST_CASE("rest: what moves before the unguided sample changes nothing", "[rest]") {
-  rest_schedule schedule(1.25f, 2);
-  schedule.restart(0);
-  schedule.restart(1);
-  CHECK(samples_where(20, [&](std::uint32_t s) { return schedule.compares(s); }) == numbers{4, 5, 9, 17});
-  schedule.restart(2);
-  CHECK(samples_where(20, [&](std::uint32_t s) { return schedule.compares(s); }).empty());
-}
-
-TEST_CASE("rest: comparisons are at most 512 samples apart", "[rest]") {
-  const rest_schedule schedule(1.25f, 1);
-  const numbers late = samples_where(2100, [&](std::uint32_t s) { return s > 200 && schedule.compares(s); });
-  CHECK(late == numbers{256, 512, 1024, 1536, 2048});
-}
-
-TEST_CASE("rest: a state that no schedule has is refused", "[rest]") {
-  rest_schedule schedule(1.25f, 1);
-  CHECK(schedule.restore(20, 1, 12, true));
-  CHECK(schedule.rests(21));
-  CHECK(!schedule.restore(20, 1, 21, true));
-  CHECK(!schedule.restore(20, 22, 3, false));
-  CHECK(!schedule.restore(20, 0, 3, true));
-  CHECK(rest_schedule(1.25f, 3).restore(1, 3, 0, false));  // before the unguided sample
-  CHECK(rest_schedule(1.25f, 1).restore(20, 21, 3, false));
-}
 
 // A host whose paths have one vertex on a wall. A path brings 0, or its pixel's mean over the probability of
 // not bringing 0: that probability sets the variance.
@@ -167,9 +48,11 @@ struct record_wall_paths {
   wfpg::path_recorder_view recorder;
   std::uint32_t sample;
   float probability;
+  std::uint32_t shift;  ///< above 0: a path has another index in each sample
 
   WFPG_HD void operator()(std::size_t i) const {
-    const auto path = static_cast<std::uint32_t>(i);
+    const auto index = static_cast<std::uint32_t>(i);
+    const std::uint32_t path = shift > 0 ? (index + shift * sample) % path_count : index;
     const wall_path at = wall_path::of(path);
     recorder.vertex(i, 0, at.position, at.normal, 1.0f);
     recorder.radiance(i, 0, wall_path::radiance(path, sample, probability));
@@ -193,10 +76,11 @@ struct chances {
 constexpr chances gains_much{0.25f, 0.5f}, loses{0.5f, 0.4f};
 
 template <class Exec, class Guide>
-void take_sample(const Exec& exec, wfpg::path_guider<Exec, Guide>& guider, std::uint32_t sample, chances p) {
+void take_sample(const Exec& exec, wfpg::path_guider<Exec, Guide>& guider, std::uint32_t sample, chances p,
+                 std::uint32_t paths = path_count, std::uint32_t shift = 0) {
   guider.begin_sample();
   const float probability = guider.guided() ? p.guided : p.unguided;
-  exec.for_each(path_count, record_wall_paths{guider.recorder(), sample, probability});
+  exec.for_each(paths, record_wall_paths{guider.recorder(), sample, probability, shift});
   guider.end_sample();
 }
 
@@ -267,27 +151,11 @@ WFPG_TEST_CASE("rest: a guider measures the variances of its paths", "[rest]") {
   CHECK(measured.unguided_variance != Approx(biased.unguided_variance).epsilon(1.0e-4));
 }
 
-/// Records a path as another index in each sample.
-struct record_shuffled_paths {
-  record_wall_paths record;
-
-  WFPG_HD void operator()(std::size_t i) const {
-    const auto path = static_cast<std::uint32_t>((i + 997u * record.sample) % path_count);
-    const wall_path at = wall_path::of(path);
-    record.recorder.vertex(i, 0, at.position, at.normal, 1.0f);
-    record.recorder.radiance(i, 0, wall_path::radiance(path, record.sample, record.probability));
-  }
-};
-
 WFPG_TEST_CASE("rest: a host that gives pixels other indices in each sample is not compared", "[rest]") {
   const Exec exec;
   wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), rest_options());
-  for (std::uint32_t sample = 1; sample <= 16; ++sample) {
-    guider.begin_sample();
-    const float probability = guider.guided() ? loses.guided : loses.unguided;
-    exec.for_each(path_count, record_shuffled_paths{{guider.recorder(), sample, probability}});
-    guider.end_sample();
-  }
+  for (std::uint32_t sample = 1; sample <= 16; ++sample)
+    take_sample(exec, guider, sample, loses, path_count, 997);
   CHECK(guider.statistics().gain.paths < 600);
   CHECK(guider.statistics().rested_samples == 0);
 }
@@ -334,8 +202,7 @@ WFPG_TEST_CASE("rest: a gain below the option's lets a guide rest once it is set
   CHECK(found == numbers{2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 32});
 }
 
-WFPG_TEST_CASE("rest: directions of samples that rest are the BSDF's, and lights are still chosen",
-               "[rest]") {
+WFPG_TEST_CASE("rest: directions of samples that rest are the BSDF's, and nothing is recorded", "[rest]") {
   const Exec exec;
   wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), rest_options());
   guided_samples(exec, guider, 1, 4, loses);
@@ -416,12 +283,7 @@ guiding_gain gain_of_many(const Exec& exec, std::uint32_t paths,
   options.max_paths = paths;
   options.deposits_per_leaf = deposits_per_leaf;
   wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
-  for (std::uint32_t sample = 1; sample <= 4; ++sample) {
-    guider.begin_sample();
-    const float probability = guider.guided() ? gains_much.guided : gains_much.unguided;
-    exec.for_each(paths, record_wall_paths{guider.recorder(), sample, probability});
-    guider.end_sample();
-  }
+  for (std::uint32_t sample = 1; sample <= 4; ++sample) take_sample(exec, guider, sample, gains_much, paths);
   return guider.statistics().gain;
 }
 
@@ -438,11 +300,12 @@ WFPG_TEST_CASE("rest: paths that are recorded or measured in part are the same o
   CHECK(std::abs(measured.value() - 3.0) < 0.1);
 }
 
-WFPG_TEST_CASE("rest: a guide wakes up where light or geometry moved", "[rest]") {
+WFPG_TEST_CASE("rest: a guide wakes up where light, geometry or the camera moved", "[rest]") {
   const Exec exec;
   using guider_type = wfpg::path_guider<Exec>;
   for (const auto move :
        {+[](guider_type& g) { g.forget_light(); }, +[](guider_type& g) { g.invalidate_all(); },
+        +[](guider_type& g) { g.compare_anew(); },
         +[](guider_type& g) {
           g.invalidate({vec3(0.4f), vec3(0.6f)});
         }}) {

@@ -251,7 +251,7 @@ class path_guider {
   Guide guide_;                   // keeps its learnt state in the caller's policy
   recording_needs needs_;         // of the guide, asked once
   path_recorder<Exec> recorder_;  // of no paths where the guide reads none
-  // A guide file holds the first three; begin_sample() sets the others.
+  // A guide file holds the first three. begin_sample() sets the next three, and end_sample() the last.
   rest_schedule rests_;
   std::uint32_t samples_ = 0;                                     // number of the current sample
   std::uint32_t warm_up_end_ = recording_needs::warm_up_samples;  // the last sample of the warm-up

@@ -23,13 +23,12 @@ struct state_access {
   /// Options that decide which paths are compared, and when: where one differs, a loaded guide never rests.
   template <class Options>
   static std::uint32_t comparison_key(const Options& o) {
-    const auto key = [](std::uint64_t known, std::uint64_t value) { return hash(known, value); };
-    std::uint64_t known = key(0, o.max_paths);
-    known = key(known, o.max_depth);
-    known = key(known, o.deposits_per_leaf.value_or(0));
-    known = key(known, o.seed);
-    known = key(known, o.unguided_samples);
-    return static_cast<std::uint32_t>(key(known, float_bits(o.least_gain.value_or(0.0f))));
+    std::uint64_t key = hash(0, o.max_paths);
+    key = hash(key, o.max_depth);
+    key = hash(key, o.deposits_per_leaf.value_or(0));
+    key = hash(key, o.seed);
+    key = hash(key, o.unguided_samples);
+    return static_cast<std::uint32_t>(hash(key, float_bits(o.least_gain.value_or(0.0f))));
   }
   template <class Exec, class Guide>
   static void put_rests(const path_guider<Exec, Guide>& guider, section_writer& bytes) {

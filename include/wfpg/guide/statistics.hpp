@@ -45,7 +45,7 @@ struct kept_field_statistics {
   std::uint32_t refused = 0;
 };
 
-/// What guiding gains at equal numbers of samples, measured over pixels whose paths were recorded. Radiance
+/// Gain of guiding at equal numbers of samples, measured over pixels whose paths were recorded. Radiance
 /// and variances are relative to what the cache expects of a pixel.
 struct guiding_gain {
   /// Paths that are needed, for a variance to about a fifth.

@@ -11,7 +11,7 @@
 
 namespace wfpg::detail {
 
-/// What paths of one index brought to the camera in earlier samples: luminance, W/(m² sr). 12 bytes.
+/// Radiance that paths of one index brought to the camera in earlier samples: luminance, W/(m² sr). 12 bytes.
 struct earlier_paths {
   /// Marks paths that hit no surface of the octree first.
   static constexpr std::uint32_t nowhere = 0xffffffffu;
@@ -50,7 +50,7 @@ struct measured_paths {
   exitance_cache_view cache;
   std::size_t stride = 1;
 
-  /// What path i brought to the camera, or -1.
+  /// Radiance that path i brought to the camera, or -1.
   WFPG_HD float radiance(std::size_t i) const {
     const recorded_path path(recorded, i * stride);
     if (path.surfaces() == 0 || path.is_gap(0)) return -1.0f;
@@ -100,7 +100,7 @@ struct keep_paths {
   }
 };
 
-/// What a guided path adds to the sums: nothing where one of the three paths is missing, or began elsewhere.
+/// Terms of a guided path in the sums: 0 where one of the three paths is missing, or began elsewhere.
 struct measure_path {
   measured_paths paths;
   array_view<const earlier_paths> kept;
@@ -132,7 +132,7 @@ struct measure_path {
   }
 };
 
-/// What a path adds to sums that are only made so that memory for them is there.
+/// Terms of sums that are only made so that memory for them is there.
 struct measure_nothing {
   WFPG_HD path_sums operator()(std::size_t) const { return {}; }
 };
