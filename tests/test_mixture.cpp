@@ -231,6 +231,38 @@ WFPG_TEST_CASE("mixture: a kernel's density is that of the library's mixture", "
   CHECK(kernel_mixture().pdf(up, 0.25f) == 0.25f);
 }
 
+WFPG_TEST_CASE("mixture: a direction has the guide's share of its density", "[mixture]") {
+  const Exec exec;
+  const built_field<Exec> built(exec, field_values(field_kind::noise, 16, 3), 16, 0.05f);
+  const directional_field field(built.grid(), up);
+  // The delta lobe leaves the guide half of its fraction: the surface is narrow, and has the narrow fraction.
+  for (const bool is_coated : {false, true}) {
+    const wfpg::surface<coated> s{{}, up, up, toward_eye, coated{{bsdf_kind::lambert, up}, is_coated}, true};
+    const guide_mixture whole{field, 0.7f, 5, 0.4f};
+    const kernel_mixture mixture = whole.with(s.bsdf.glossy(toward_eye));
+    const float kept = is_coated ? 1.0f - coated::mirror : 1.0f, fraction = is_coated ? 0.4f : 0.7f;
+    CHECK(mixture.kept == Approx(kept));
+    CHECK(mixture.fraction == Approx(fraction * kept));
+    std::size_t differing = 0, by_kernel = 0, known = 0;
+    for (const sampled_direction& d : evaluate(exec, 2000, [=] WFPG_HD(std::size_t i) {
+           const hashed_numbers random{9};
+           const auto ray = static_cast<std::uint32_t>(i);
+           return whole.sample(s, random(ray, 0).x, random(ray, 1));
+         })) {
+      if (!d.share.is_known()) continue;  // of the delta lobe
+      ++known;
+      const double share = double(fraction * kept * field.pdf(d.direction)) / double(d.pdf);
+      const double steps = is_coated ? share / double(kept) * wfpg::guide_share::narrow_steps
+                                     : share * wfpg::guide_share::smooth_steps;
+      differing += d.share.is_narrow() != is_coated || std::abs(d.share.steps() - steps) > 0.51;
+      by_kernel += d.share.code != mixture.share(d.direction, d.pdf).code;
+    }
+    CHECK(known > 1000);
+    CHECK(differing == 0);
+    CHECK(by_kernel < 20);  // rounded alike, but for the last bit
+  }
+}
+
 WFPG_TEST_CASE("mixture: a kernel that samples delta and other lobes has no bias", "[mixture]") {
   const Exec exec;
   const built_field<Exec> built(exec, field_values(field_kind::noise, 16, 3), 16, 0.05f);

@@ -79,7 +79,7 @@ WFPG_TEST_CASE("path guider: rays share a field by their shading normal on the o
       const std::uint32_t expected = reflects ? nearest_axis(surfaces[i]) : 6;
       const auto found = orientation_of.emplace(fields[i].number, expected);
       shared += found.first->second != expected;
-      wrong_side += !(fields[i].what.fraction > 0.0f) || fields[i].what.hemisphere() != reflects ||
+      wrong_side += !(fields[i].what.is_built()) || fields[i].what.hemisphere() != reflects ||
                     (reflects && wfpg::dominant_axis(fields[i].what.normal) != expected);
     }
     CHECK(shared == 0);

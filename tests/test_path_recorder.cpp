@@ -88,7 +88,7 @@ struct learning : recording<Exec> {
   }
   void scatter(std::uint32_t depth, std::uint32_t field, vec3 direction) const {
     const wfpg::path_recorder_view paths = this->view();
-    const wfpg::sampled_direction drawn{direction, 1.0f, wfpg::sampling_technique::guide, field};
+    const wfpg::sampled_direction drawn{direction, 1.0f, wfpg::sampling_technique::guide, {}, field};
     this->scene.exec.for_each(1, [=] WFPG_HD(std::size_t) { paths.scatter(0, depth, drawn); });
   }
   void escape(std::uint32_t depth, vec3 throughput) const {
@@ -668,9 +668,9 @@ WFPG_TEST_CASE("a recorder without learning fields ignores directions and escape
   const wfpg::path_recorder_view paths = r.view();
   r.vertex(0, 0, place(0), up, vec3(1.0f));
   r.scene.exec.for_each(1, [=] WFPG_HD(std::size_t) {
-    paths.scatter(0, 0, {up, 1.0f, wfpg::sampling_technique::guide, 0});
+    paths.scatter(0, 0, {up, 1.0f, wfpg::sampling_technique::guide, {}, 0});
     paths.escape(0, 1, vec3(0.5f));
-    paths.scatter(9, 9, {up, 1.0f, wfpg::sampling_technique::guide, 0});
+    paths.scatter(9, 9, {up, 1.0f, wfpg::sampling_technique::guide, {}, 0});
   });
   CHECK(r.dropped() == 0);
 }

@@ -274,7 +274,7 @@ struct leave_scene {
   WFPG_HD void operator()(std::size_t) const {
     const vec3 y(0.0f, 1.0f, 0.0f);
     recorder.vertex(0, 0, vec3(0.1f, 0.1f, 0.1f), y, vec3(1.0f));
-    recorder.scatter(0, 0, {y, 1.0f, wfpg::sampling_technique::bsdf, wfpg::no_field});
+    recorder.scatter(0, 0, {y, 1.0f, wfpg::sampling_technique::bsdf, {}, wfpg::no_field});
     recorder.escape(0, 1, vec3(0.5f));
     recorder.emission(0, 1, vec3(0.5f * 7.0f));
   }

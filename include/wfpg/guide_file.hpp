@@ -35,15 +35,16 @@
 //            fields made and refreshed                            16
 //            whether fields learn                                 4
 //            number, key, last use, last build, builds            20 a field
-//            normal and fraction                                  16 a field
+//            normal and fractions                                 16 a field
 //            sums of its distribution over cells                  4 a cell
 //            sums of its distribution over rows                   4 a row
 //            cone's hit                                           4 a cell
 //            learnt radiance, where fields learn                  2 a cell
+//            what fractions learnt, where fields learn            36 a field
 //   lights   learnt mean: of learning nodes, faces and groups     4 a mean
 //   paths    place, what unguided and guided paths brought        12 a path that is compared
 //
-// Cells and rows are those of fields with a fraction above 0. All else that a guider has follows from these.
+// Cells and rows are those of fields that are built. All else that a guider has follows from these.
 // detail/guide_sections.hpp says what is checked.
 #pragma once
 

@@ -45,7 +45,7 @@ __global__ void use_recorder(wfpg::path_recorder_view recorder) {
   recorder.vertex(threadIdx.x, 0, wfpg::vec3(0.0f), wfpg::vec3(0, 0, 1), wfpg::vec3(1.0f));
   recorder.radiance(threadIdx.x, 0, wfpg::vec3(1.0f));
   recorder.emission(threadIdx.x, 1, wfpg::vec3(1.0f));
-  recorder.scatter(threadIdx.x, 0, {wfpg::vec3(0, 0, 1), 1.0f, wfpg::sampling_technique::guide, 0});
+  recorder.scatter(threadIdx.x, 0, {wfpg::vec3(0, 0, 1), 1.0f, wfpg::sampling_technique::guide, {}, 0});
   recorder.escape(threadIdx.x, 1, wfpg::vec3(1.0f));
   recorder.vertex(threadIdx.x, 3, wfpg::vec3(0.0f), wfpg::vec3(0, 0, 1), wfpg::vec3(0, 0, 1), false, 1.0f);
   recorder.scatter(threadIdx.x, 3, wfpg::vec3(0, 0, 1), wfpg::no_field);

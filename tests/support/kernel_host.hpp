@@ -294,7 +294,7 @@ struct shade {
     const bool tells = step.goes_on || !at.in.silent || at.fault == host_fault::early_scatter;
     if (tells && at.fault != host_fault::no_scatter)
       at.recorder.scatter(i, at.depth, at.fault == host_fault::local_scatter ? local : drawn.wi,
-                          drawn.is_delta ? wfpg::no_field : mixture.number);
+                          drawn.is_delta ? wfpg::no_field : mixture.number, mixture.share(drawn.wi, pdf));
     at.checker.scatter(i, at.depth, guide, mixture, step);
     // Next-event estimation would weight a ray to the lamp with this density.
     const vec3 lamp = glm::normalize(vec3(0.8f, 1.0f, 0.8f) - path.position);

@@ -341,7 +341,8 @@ void add_guider_options(CLI::App& app, render_options& options) {
                                *options.least_gain))
       ->transform(number(0.0, 1.0e6));
   add_unless_zero(app, "--guide-fraction", options.guide_fraction,
-                  "fraction of directions drawn from the guide (default: the mode's, as 0)")
+                  "fraction of directions drawn from the guide (default: learnt where fields learn, else the "
+                  "mode's; as 0)")
       ->transform(number(0.0, 1.0));
   app.add_option(
          "--guided-depths", options.guided_depths,

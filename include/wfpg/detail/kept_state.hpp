@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <vector>
 
 namespace wfpg::detail {
@@ -26,19 +27,20 @@ struct place_marks {
   }
 };
 
-/// A slot in use, as a file has it. Its cells follow once it has been built: its fraction is positive then.
+/// A slot in use, as a file has it. Its cells follow once it has been built.
 struct saved_slot {
   std::uint32_t index = 0;
   field_slot slot;
   resident_field field;
 
-  bool is_built() const { return field.fraction > 0.0f; }
+  bool is_built() const { return field.is_built(); }
 };
 
 /// The cells of all slots, on the host.
 struct pool_copy {
   std::vector<std::uint32_t> words, hits;
-  std::vector<std::uint16_t> learnt;  // empty where fields do not learn
+  std::vector<std::uint16_t> learnt;       // empty where fields do not learn
+  std::vector<field_fractions> fractions;  // a slot; empty where fields do not learn
 };
 
 /// Whether words are the inclusive sums of a distribution with positive weight. Kernels search them without
@@ -157,7 +159,8 @@ struct kept_state {
   static pool_copy empty_pool(const field_store<Exec>& store) {
     return {std::vector<std::uint32_t>(store.pool_.words_.size()),
             std::vector<std::uint32_t>(store.pool_.hits_.size()),
-            std::vector<std::uint16_t>(store.pool_.learns() ? store.pool_.learnt_.size() : 0)};
+            std::vector<std::uint16_t>(store.pool_.learns() ? store.pool_.learnt_.size() : 0),
+            std::vector<field_fractions>(store.pool_.fractions_.size())};
   }
 
   /// Calls copy(host, buffer) for each part of the pool.
@@ -165,7 +168,9 @@ struct kept_state {
   static void copy_pool(const field_store<Exec>& store, pool_copy& pool, const Copy& copy) {
     copy(pool.words.data(), store.pool_.words_);
     copy(pool.hits.data(), store.pool_.hits_);
-    if (store.pool_.learns()) copy(pool.learnt.data(), store.pool_.learnt_);
+    if (!store.pool_.learns()) return;
+    copy(pool.learnt.data(), store.pool_.learnt_);
+    copy(pool.fractions.data(), store.pool_.fractions_);
   }
 
   /// Appends one slot's part of an array with `n` entries a slot.
@@ -185,11 +190,16 @@ struct kept_state {
     bytes.put(s.slot.last_built);
     bytes.put(s.slot.builds);
     bytes.put(s.field.normal);
-    bytes.put(s.field.fraction);
+    bytes.put(std::uint32_t(s.field.smooth) | std::uint32_t(s.field.narrow) << 16);
     if (!s.is_built()) return;
     put_part(pool.words, store.pool_.words_a_field(), s.index, bytes);
     put_part(pool.hits, store.pool_.cells_a_field(), s.index, bytes);
-    if (store.pool_.learns()) put_part(pool.learnt, store.pool_.cells_a_field(), s.index, bytes);
+    if (!store.pool_.learns()) return;
+    put_part(pool.learnt, store.pool_.cells_a_field(), s.index, bytes);
+    const field_fractions& fractions = pool.fractions[s.index];
+    bytes.put(fractions.first);
+    for (const fraction_means& m : fractions.means)
+      for (const float value : {m.light, m.guided, m.count, m.reference}) bytes.put(value);
   }
 
   /// Reads the next slot in use up to its cells. Its index is at least `first`.
@@ -205,7 +215,9 @@ struct kept_state {
     s.slot.last_built = bytes.get<std::uint32_t>();
     s.slot.builds = bytes.get<std::uint32_t>();
     s.field.normal = bytes.get_vec3();
-    s.field.fraction = bytes.get<float>();
+    const auto fractions = bytes.get<std::uint32_t>();
+    s.field.smooth = static_cast<std::uint16_t>(fractions & 0xffffu);
+    s.field.narrow = static_cast<std::uint16_t>(fractions >> 16);
     check(bytes, s, store.tree_.node_count(), store.schedule_.sample());
     return s;
   }
@@ -222,7 +234,28 @@ struct kept_state {
     place(hits, slot, pool.hits);
     if (!learnt) return;
     const auto values = bytes.get_all<std::uint16_t>(cells);
-    if (store.pool_.learns()) place(values, slot, pool.learnt);
+    const field_fractions fractions = take_fractions(bytes);
+    if (!store.pool_.learns()) return;
+    place(values, slot, pool.learnt);
+    pool.fractions[slot] = fractions;
+  }
+  static field_fractions take_fractions(section_reader& bytes) {
+    const auto sound = [&bytes](float most) {
+      const auto value = bytes.get<float>();
+      bytes.require(is_up_to(value, most), "has a fraction that learnt from what is no number");
+      return value;
+    };
+    field_fractions fractions;
+    fractions.first = sound(1.0f);
+    for (fraction_means& m : fractions.means) {
+      constexpr float largest = std::numeric_limits<float>::max();
+      m.light = sound(largest);
+      m.guided = sound(largest);
+      m.count = sound(largest);
+      m.reference = sound(largest);
+      bytes.require(m.count > 0.0f || !(m.light > 0.0f), "has a fraction that learnt from no direction");
+    }
+    return fractions;
   }
   template <class Word>
   static void place(const std::vector<Word>& words, std::size_t slot, std::vector<Word>& of_all) {
@@ -237,8 +270,8 @@ struct kept_state {
                   "has a field of a sample to come");
     bytes.require(is_finite(square) && (!s.field.hemisphere() || (square > 0.5f && square < 2.0f)),
                   "has a normal without unit length");
-    bytes.require(is_up_to(s.field.fraction, 1.0f), "has a fraction out of range");
-    bytes.require(s.field.fraction > 0.0f || s.slot.builds == 0, "has a field without cells");
+    bytes.require((s.field.smooth > 0) == (s.field.narrow > 0), "has a field of one fraction");
+    bytes.require(s.is_built() || s.slot.builds == 0, "has a field without cells");
   }
 
   static void check_cells(const section_reader& bytes, const std::vector<std::uint32_t>& words,

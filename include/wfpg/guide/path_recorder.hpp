@@ -45,7 +45,10 @@ struct alignas(8) recorded_light {
 
 /// Sampled direction at a vertex. 8 bytes, stored only where directions are recorded.
 struct alignas(8) recorded_direction {
-  std::uint32_t field;      ///< sampled_direction::field of scatter(), or no_field
+  static constexpr std::uint32_t field_mask = 0xffffffu;  ///< a field of all ones is none
+
+  /// sampled_direction::field of scatter() in the lower 24 bits, guide_share::code in the upper 8.
+  std::uint32_t field_and_share;
   std::uint32_t direction;  ///< pack_direction() of it; 0 where scatter() was not called
 };
 
@@ -124,18 +127,23 @@ class path_recorder_view {
 
   /// Records the unit direction in which the path leaves vertex `depth`, which must be its last so far. The
   /// guide learns from it what the direction finds. `field`: number of the field in the mixture that drew it,
-  /// or no_field, as for delta lobes. Ignored where directions are not recorded.
-  WFPG_HD void scatter(std::size_t path, std::uint32_t depth, vec3 direction, std::uint32_t field) const {
+  /// or no_field, as for delta lobes. A number above 2^24 - 2 counts as none. `share`: the guide's in the
+  /// density of the direction. Ignored where directions are not recorded.
+  WFPG_HD void scatter(std::size_t path, std::uint32_t depth, vec3 direction, std::uint32_t field,
+                       guide_share share = {}) const {
     std::uint32_t place;
     if (!records_directions() || !find(path, place)) return;
     if (depth >= max_depth_ || depth + 1 != length_of_surfaces(place) || !is_direction(direction))
       return drop();
-    directions_[depth * recorded_ + place] = {field, pack_marked(direction)};
+    constexpr std::uint32_t mask = detail::recorded_direction::field_mask;
+    directions_[depth * recorded_ + place] = {min(field, mask) | std::uint32_t(share.code & 0xffu) << 24,
+                                              pack_marked(direction)};
   }
   /// Records a direction that the guider sampled, with its field.
   /// Ignored for technique `none`: the path ends there.
   WFPG_HD void scatter(std::size_t path, std::uint32_t depth, const sampled_direction& drawn) const {
-    if (drawn.technique != sampling_technique::none) scatter(path, depth, drawn.direction, drawn.field);
+    if (drawn.technique != sampling_technique::none)
+      scatter(path, depth, drawn.direction, drawn.field, drawn.share);
   }
 
   /// Records that the path left the scene: the environment becomes its vertex `depth`, the last one. Call it
@@ -239,7 +247,7 @@ class path_recorder_view {
     const std::size_t slot = depth * recorded_ + place;
     places_[slot] = at;
     light_[slot] = light;
-    if (records_directions()) directions_[slot] = {no_field, 0};
+    if (records_directions()) directions_[slot] = {no_field, 0};  // nor a share
   }
   /// Notes that the last direction has found something. Only silent escapes ask for it.
   WFPG_HD void hear(std::uint32_t place) const {
@@ -282,7 +290,7 @@ struct no_path_recorder {
   /// Does nothing; see path_recorder_view::scatter().
   WFPG_HD void scatter(std::size_t, std::uint32_t, const sampled_direction&) const {}
   /// Does nothing; see path_recorder_view::scatter().
-  WFPG_HD void scatter(std::size_t, std::uint32_t, vec3, std::uint32_t) const {}
+  WFPG_HD void scatter(std::size_t, std::uint32_t, vec3, std::uint32_t, guide_share = {}) const {}
   /// Does nothing; see path_recorder_view::escape().
   WFPG_HD void escape(std::size_t, std::uint32_t, path_light) const {}
   /// Does nothing; see path_recorder_view::radiance().

@@ -14,7 +14,8 @@ namespace wfpg {
 
 /// Options of guiding. path_guider's constructor checks the ranges and throws std::invalid_argument.
 struct sampling_options {
-  /// Probability that the guide, not the BSDF, samples a direction; in (0, 1]. Unset: the guide's default.
+  /// Probability that the guide, not the BSDF, samples a direction; in (0, 1]. Unset: the guide's default, or
+  /// what it learns.
   std::optional<float> guide_fraction;
   /// Number of depths that are guided, from 0 on; at least 1. Deeper rays sample their BSDFs. Default: all.
   /// With next-event estimation, leave out the depth of a path's last direction. That direction finds

@@ -73,6 +73,8 @@ struct basic_kernel_mixture {
   float fraction = 0.0f;
   /// Number of the field, for path_recorder_view::scatter(), or no_field.
   std::uint32_t number = no_field;
+  /// Part of the field's own fraction that narrow lobes leave it here, in (0, 1].
+  float kept = 1.0f;
 
   /// Returns whether the guide draws the direction; else the BSDF does. `u`: uniform in [0, 1). It becomes
   /// another such number, which does not depend on the choice.
@@ -94,6 +96,11 @@ struct basic_kernel_mixture {
   }
   /// The guide's term of the density, per steradian. Precondition: `fraction` is positive.
   WFPG_HD float guided_pdf(vec3 direction) const { return fraction * field.pdf(direction); }
+  /// The guide's share of a density that pdf() returned for a direction, for path_recorder_view::scatter().
+  /// The field's fraction learns from it. It evaluates the field once more. Of a delta lobe it means nothing.
+  WFPG_HD guide_share share(vec3 direction, float pdf) const {
+    return fraction > 0.0f ? guide_share::of(guided_pdf(direction), pdf, kept) : guide_share();
+  }
   /// Probability with which the BSDF is chosen and draws a delta lobe. `probability`: the lobe's own, in the
   /// BSDF.
   WFPG_HD float delta_pdf(float probability) const { return (1.0f - fraction) * probability; }
@@ -118,12 +125,17 @@ struct basic_guide_mixture {
   float fraction = 0.0f;
   /// Number of the field, which sampled directions carry in sampled_direction::field.
   std::uint32_t number = no_field;
+  /// Probability of the field on narrow surfaces (guide_share), in [0, 1], before their lobes reduce it. One
+  /// below 0 stands for `fraction`.
+  float narrow = -1.0f;
 
   /// Returns the mixture for kernels that sample and evaluate their BSDF themselves. `part`: what the host
   /// knows of its narrow lobes.
   WFPG_HD basic_kernel_mixture<Field> with(const glossy_part& part) const {
     if (!guides()) return {};
-    return {field, guided_fraction(fraction, part, field.resolved_alpha()), number};
+    const float resolved = field.resolved_alpha();
+    return {field, guided_fraction(fraction_at(part, resolved), part, resolved), number,
+            guided_fraction(1.0f, part, resolved)};
   }
 
   /// Draws a direction at a surface, with the mixture's density. `u_technique` in [0, 1) chooses the
@@ -135,7 +147,8 @@ struct basic_guide_mixture {
     // A delta lobe has no density per steradian, so no mixture can contain it.
     if (s.bsdf.is_delta()) return from_bsdf(s.bsdf.sample(s.outgoing, u), true);
     if (!guides()) return from_bsdf(s.bsdf.sample(s.outgoing, u), false);
-    const mixture_fractions parts = fractions_of(s);
+    float kept;
+    const mixture_fractions parts = fractions_of(s, kept);
     const kernel_mixture_type mixture{field, parts.guide, number};
     float rescaled = u_technique;
     sampled_direction result;
@@ -145,6 +158,7 @@ struct basic_guide_mixture {
       result.direction = field.sample(u, of_field);
       result.technique = sampling_technique::guide;
       result.pdf = parts.guide * of_field + bsdf_pdf(s, parts, result.direction);
+      result.share = guide_share::of(parts.guide * of_field, result.pdf, kept);
       return result;
     }
     // The technique's number chooses among three intervals: the guide's, the narrow part's, the rest's.
@@ -155,12 +169,14 @@ struct basic_guide_mixture {
     if (!is_drawn(drawn)) return {};
     if (drawn.is_delta)
       return {drawn.direction, part_probability<Bsdf>(parts, is_narrow) * drawn.pdf,
-              sampling_technique::delta, no_field};
+              sampling_technique::delta, guide_share(), no_field};
     result.direction = drawn.direction;
     result.technique = sampling_technique::bsdf;
     // All techniques' densities count, whichever drew the direction. This is one-sample MIS with the balance
     // heuristic, so the estimate's weight is simply value / pdf.
-    result.pdf = mixture.guided_pdf(drawn.direction) + bsdf_pdf(s, parts, drawn.direction);
+    const float of_guide = mixture.guided_pdf(drawn.direction);
+    result.pdf = of_guide + bsdf_pdf(s, parts, drawn.direction);
+    result.share = guide_share::of(of_guide, result.pdf, kept);
     return result;
   }
 
@@ -179,23 +195,39 @@ struct basic_guide_mixture {
   /// `fraction` to the guide and the rest to itself. Precondition: the field is not empty.
   template <class Bsdf>
   WFPG_HD mixture_fractions fractions_of(const surface<Bsdf>& s) const {
-    if constexpr (!has_glossy_part_v<Bsdf>)
-      return {fraction, 0.0f, 1.0f - fraction};
-    else {
-      const glossy_part part = s.bsdf.glossy(s.outgoing);
-      const float guide = guided_fraction(fraction, part, field.resolved_alpha());
-      if constexpr (!has_separate_parts_v<Bsdf>)
-        return {guide, 0.0f, 1.0f - guide};
-      else {
-        // Each part of the BSDF keeps what the guide leaves of it. The three sum to 1.
-        const float on_narrow = narrow_fraction(fraction, part.alpha, field.resolved_alpha());
-        return {guide, part.fraction * (1.0f - on_narrow), (1.0f - part.fraction) * (1.0f - fraction)};
-      }
-    }
+    float kept;
+    return fractions_of(s, kept);
   }
 
  private:
   using kernel_mixture_type = basic_kernel_mixture<Field>;
+
+  /// Fraction of a surface with such a part, before the part reduces it.
+  WFPG_HD float fraction_at(const glossy_part& part, float resolved_alpha) const {
+    const bool is_narrow = guided_fraction(1.0f, part, resolved_alpha) < guide_share::least_smooth;
+    return is_narrow && narrow >= 0.0f ? narrow : fraction;
+  }
+
+  /// fractions_of(), and the part of its fraction that the surface leaves the guide.
+  template <class Bsdf>
+  WFPG_HD mixture_fractions fractions_of(const surface<Bsdf>& s, float& kept) const {
+    kept = 1.0f;
+    if constexpr (!has_glossy_part_v<Bsdf>)
+      return {fraction, 0.0f, 1.0f - fraction};
+    else {
+      const glossy_part part = s.bsdf.glossy(s.outgoing);
+      const float resolved = field.resolved_alpha(), of_all = fraction_at(part, resolved);
+      kept = guided_fraction(1.0f, part, resolved);
+      const float guide = guided_fraction(of_all, part, resolved);
+      if constexpr (!has_separate_parts_v<Bsdf>)
+        return {guide, 0.0f, 1.0f - guide};
+      else {
+        // Each part of the BSDF keeps what the guide leaves of it. The three sum to 1.
+        const float on_narrow = narrow_fraction(of_all, part.alpha, resolved);
+        return {guide, part.fraction * (1.0f - on_narrow), (1.0f - part.fraction) * (1.0f - of_all)};
+      }
+    }
+  }
 
   /// Whether directions may come from the field. It is false for a product that is black everywhere.
   WFPG_HD bool guides() const { return fraction > 0.0f && !field.empty(); }
@@ -210,7 +242,7 @@ struct basic_guide_mixture {
     if (!is_drawn(drawn)) return {};
     const bool is_delta = all_delta || drawn.is_delta;
     return {drawn.direction, drawn.pdf, is_delta ? sampling_technique::delta : sampling_technique::bsdf,
-            no_field};
+            guide_share(), no_field};
   }
 
   /// Draws from the BSDF, from the part that was chosen where its parts can be drawn alone.

@@ -95,7 +95,7 @@ class host_checker_view {
     logged.survival = step.survival;
     logged.flags =
         wfpg::detail::logged_step::is_logged | (step.goes_on ? wfpg::detail::logged_step::goes_on : 0u) |
-        wfpg::detail::guiding_flags(guide.fields().info(mixture.number).fraction, mixture,
+        wfpg::detail::guiding_flags(guide.fields().info(mixture.number).is_built(), mixture,
                                     step.mirror_pdf * step.cosine, step.is_delta ? step.bsdf_pdf : 0.0f);
   }
   /// Logs the density that the host used for another direction at the vertex, as for a MIS weight.

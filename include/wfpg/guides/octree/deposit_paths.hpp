@@ -5,6 +5,9 @@
 //
 // Depths that the host left out are skipped: what leaves them is not known.
 //
+// Fractions of guided directions learn from the same light, over the throughput before the direction was
+// sampled. That has BSDF, cosine and density in it.
+//
 // Cost: O(paths * depth), one thread a path. Memory: none beside the queues of the cache and of the fields.
 #pragma once
 
@@ -49,6 +52,22 @@ struct deposit_path {
     // Counting is atomic, and would order the look-ups of the writes above.
     for (std::uint32_t i = 0; i < known; ++i) cache.count(first + i);
     for (std::uint32_t i = 0; i < found; ++i) learnt.count(first_found + i);
+    if (found > 0 && learnt.learns_fractions()) weigh(path, vertices);
+  }
+
+ private:
+  /// Fields learn their fractions of guided directions from what each direction brought, over its density.
+  /// From the last vertex back, as above. The light is in a cache by now, and the atomics of learning would
+  /// order the look-ups above.
+  WFPG_HD void weigh(const recorded_path& path, std::uint32_t vertices) const {
+    vec3 brought(0.0f);
+    for (std::uint32_t depth = vertices; depth-- > 1;) {
+      brought += path.contribution(depth);
+      // Delta lobes and hosts that tell no share teach nothing.
+      const guide_share share = path.share(depth - 1);
+      if (share.is_known())
+        learnt.weigh(path.field(depth - 1), leaving_luminance(brought, path.throughput(depth - 1)), share);
+    }
   }
 };
 

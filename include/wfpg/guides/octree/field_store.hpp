@@ -42,6 +42,7 @@ struct kept_field_wave {
   product_points points;                       ///< of products; P divides the store's resolution
   /// On the device: the wave's counts are added to it. Null: they are not counted.
   depth_statistics* statistics = nullptr;
+  bool learns_fraction = true;  ///< fields keep what they learnt of it; false: they have `fraction`
 };
 
 /// Owns the slots, in the memory of `Exec`. The octree must outlive it. Results do not depend on the number
@@ -95,8 +96,9 @@ class field_store {
   /// All fields, with a wave's points for products. Valid until the next wave is prepared.
   resident_fields fields(const product_points& points) const { return pool_.view(points); }
 
-  /// Where kernels deposit what the sample's paths found; empty where fields do not learn.
-  learnt_radiance_view learnt() const { return pool_.learnt(); }
+  /// Where kernels deposit what the sample's paths found; empty where fields do not learn. `with_fractions`:
+  /// fields also learn their fractions of guided directions.
+  learnt_radiance_view learnt(bool with_fractions = true) const { return pool_.learnt(with_fractions); }
 
   /// Ends the sample. Fields learn if anything was `recorded` in learnt(). After samples 1, 2, 4, 8, ...
   /// chooses bins anew by the rays counted so far. O(cells of fields used + values), and O(nodes) where bins

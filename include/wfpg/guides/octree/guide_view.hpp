@@ -16,21 +16,41 @@
 
 namespace wfpg {
 
-/// Frame and fraction of a field in memory, beside its distribution. 16 bytes, so that a kernel reads it in
+/// Frame and fractions of a field in memory, beside its distribution. 16 bytes, so that a kernel reads it in
 /// one load.
 struct alignas(16) resident_field {
   /// Of the hemisphere that the field covers, unit length; zero: it covers the sphere.
   vec3 normal{0.0f};
-  /// Fraction of guided directions in the mixture, in [0, 1]. 0: the field is not built, and guides nothing.
-  float fraction = 0.0f;
+  /// Fraction of guided directions on smooth surfaces, in 1/65535. 0: the field is not built.
+  std::uint16_t smooth = 0;
+  /// That of narrow surfaces (guide_share), before their lobes reduce it.
+  std::uint16_t narrow = 0;
+
+  /// A field that is not built, and guides nothing.
+  resident_field() = default;
+  /// A field with one fraction, in [0, 1], for surfaces of both kinds.
+  WFPG_HD resident_field(vec3 of_hemisphere, float fraction) : normal(of_hemisphere) {
+    set_fractions(fraction, fraction);
+  }
 
   /// True: the field covers a hemisphere; false: the sphere.
   WFPG_HD bool hemisphere() const { return normal.x != 0.0f || normal.y != 0.0f || normal.z != 0.0f; }
+  /// Whether the field has a distribution.
+  WFPG_HD bool is_built() const { return smooth > 0; }
+  /// Fraction of guided directions on smooth surfaces, in [0, 1].
+  WFPG_HD float fraction() const { return static_cast<float>(smooth) * (1.0f / 65535.0f); }
+  /// Fraction of guided directions on narrow surfaces, in [0, 1], before their lobes reduce it.
+  WFPG_HD float narrow_fraction() const { return static_cast<float>(narrow) * (1.0f / 65535.0f); }
+  /// Sets both fractions, each in [0, 1].
+  WFPG_HD void set_fractions(float of_smooth, float of_narrow) {
+    smooth = static_cast<std::uint16_t>(of_smooth * 65535.0f + 0.5f);
+    narrow = static_cast<std::uint16_t>(of_narrow * 65535.0f + 0.5f);
+  }
 };
 
 /// Fields in memory, with their distributions. Trivially copyable.
 struct resident_fields {
-  /// One entry a field: frame and fraction.
+  /// One entry a field: frame and fractions.
   const resident_field* fields = nullptr;
   /// Distributions, one after the other, grid_distribution::words(F) words each.
   const std::uint32_t* words = nullptr;
@@ -38,7 +58,7 @@ struct resident_fields {
   /// Where this wave's products evaluate BSDFs; a P of 0: no products.
   product_points points;
 
-  /// Returns frame and fraction of field `i`. no_field has fraction 0. Precondition: i is in range, or
+  /// Returns frame and fractions of field `i`. no_field is not built. Precondition: i is in range, or
   /// no_field.
   WFPG_HD resident_field info(std::uint32_t i) const { return i == no_field ? resident_field{} : fields[i]; }
   /// Returns field `i` for sampling. `what`: info(i), which the caller has read already.
@@ -49,8 +69,8 @@ struct resident_fields {
   /// Mixture of field `i` and a BSDF, without products. Where the field guides nothing, the BSDF alone.
   WFPG_HD guide_mixture mixture(std::uint32_t i) const {
     const resident_field what = info(i);
-    if (!(what.fraction > 0.0f)) return {};
-    return {field(i, what), what.fraction, i};
+    if (!what.is_built()) return {};
+    return {field(i, what), what.fraction(), i, what.narrow_fraction()};
   }
   /// Mixture of the BSDF and of its product with field `i`. Evaluates the BSDF P² to 2 P² times.
   ///
@@ -59,8 +79,8 @@ struct resident_fields {
   template <class Bsdf>
   WFPG_HD product_mixture product(std::uint32_t i, const surface<Bsdf>& s, std::uint32_t* weights) const {
     const resident_field what = info(i);
-    if (!(what.fraction > 0.0f)) return {};
-    return {multiply_field(field(i, what), points, s, weights), what.fraction, i};
+    if (!what.is_built()) return {};
+    return {multiply_field(field(i, what), points, s, weights), what.fraction(), i, what.narrow_fraction()};
   }
 };
 
@@ -75,7 +95,7 @@ class guide_view {
       : field_of_ray_(field_of_ray), fields_(fields) {}
 
   /// Whether the ray has a field that guides. Without one, it samples its BSDF alone. O(1).
-  WFPG_HD bool guides(std::uint32_t ray) const { return fields_.info(number(ray)).fraction > 0.0f; }
+  WFPG_HD bool guides(std::uint32_t ray) const { return fields_.info(number(ray)).is_built(); }
   /// Number of the ray's field among fields(), or no_field. A ray beyond the wave has none.
   WFPG_HD std::uint32_t number(std::uint32_t ray) const {
     return ray < field_of_ray_.size() ? field_of_ray_[ray] : no_field;

@@ -13,6 +13,7 @@
 #include <wfpg/guides/octree/field_cells.hpp>
 #include <wfpg/guides/octree/field_slots.hpp>
 #include <wfpg/guides/octree/guide_view.hpp>
+#include <wfpg/guides/octree/learnt_fractions.hpp>
 
 namespace wfpg {
 
@@ -40,16 +41,17 @@ WFPG_HD constexpr std::uint32_t refreshed_cell(std::uint32_t cone, std::uint32_t
 
 /// Memory of all kept fields, as the kernels that build them see it. Trivially copyable.
 struct kept_fields_view {
-  field_slots_view slots;     ///< state of each slot
-  resident_field* fields;     ///< a slot: normal and fraction
-  std::uint32_t* words;       ///< a slot: its distribution
-  cone_hit* hits;             ///< a slot: F² hits in row-major order
-  stochastic_mean16* learnt;  ///< a slot: F² means of what paths found; null: fields do not learn
-  float cone_samples;         ///< samples that a cone counts as, beside learnt values; positive
-  std::uint32_t resolution;   ///< F: cells along a side
-  std::uint32_t recast;       ///< R: a refresh casts one of R cells
-  std::uint32_t sample;       ///< current sample, from 1
-  std::uint64_t* refreshed;   ///< counter of refreshes: builds that cast a part of the cells
+  field_slots_view slots;      ///< state of each slot
+  resident_field* fields;      ///< a slot: normal and fraction
+  std::uint32_t* words;        ///< a slot: its distribution
+  cone_hit* hits;              ///< a slot: F² hits in row-major order
+  stochastic_mean16* learnt;   ///< a slot: F² means of what paths found; null: fields do not learn
+  field_fractions* fractions;  ///< a slot: what its fractions learn; null: fields do not learn
+  float cone_samples;          ///< samples that a cone counts as, beside learnt values; positive
+  std::uint32_t resolution;    ///< F: cells along a side
+  std::uint32_t recast;        ///< R: a refresh casts one of R cells
+  std::uint32_t sample;        ///< current sample, from 1
+  std::uint64_t* refreshed;    ///< counter of refreshes: builds that cast a part of the cells
 };
 
 /// Builds the fields of slots for a wave's rays. `Wave`: kept_field_wave.
@@ -102,7 +104,10 @@ struct kept_field_builder {
     const bool hemisphere = cells.origin.hemisphere;
     finish_field(block, words, size, hemisphere, wave.options);
     block.for_each(1, [&](int) {
-      kept.fields[slot] = {hemisphere ? cells.origin.normal : vec3(0.0f), wave.fraction};
+      // A field that begins anew has learnt nothing of its fractions, either.
+      if (whole || !wave.learns_fraction)
+        kept.fields[slot] = {hemisphere ? cells.origin.normal : vec3(0.0f), wave.fraction};
+      if (whole && kept.fractions) begin(kept.fractions[slot]);
       field_slot& state = kept.slots.slots[slot];
       state.last_built = kept.sample;
       ++state.builds;
@@ -120,6 +125,12 @@ struct kept_field_builder {
     if (!kept.learnt) return seen;
     if (whole) kept.learnt[cell] = {};
     return mixed_with(kept.learnt[cell], seen, kept.cone_samples);
+  }
+
+  // Fractions of a field that begins: those of the wave's options.
+  WFPG_HD void begin(field_fractions& fractions) const {
+    fractions = {};
+    fractions.first = wave.fraction;
   }
 
   // Counts one build. One thread of the block calls it.

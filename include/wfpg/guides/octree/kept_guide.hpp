@@ -82,7 +82,7 @@ class kept_guide : public octree_scene<Exec> {
   /// Deposits the recorded paths of a sample into the cache, and into fields that learn. Clears the recorder.
   /// Both change in update().
   void learn(const sample_context<Exec>& at, path_recorder<Exec>& paths) {
-    scene::deposit(at, paths, store_.learnt());
+    scene::deposit(at, paths, learnt());
   }
   /// Updates the cache, fields and choices of lights. Call after each sample, recorded or not. O(deposits +
   /// nodes + cells of the fields used).
@@ -105,7 +105,7 @@ class kept_guide : public octree_scene<Exec> {
 
   /// Where a host's kernels record what their directions found, without the recorder. Empty where fields do
   /// not learn. Such a host sets deposit_capacity, which is also the capacity here.
-  learnt_radiance_view learnt() const { return store_.learnt(); }
+  learnt_radiance_view learnt() const { return store_.learnt(learns_fractions()); }
   /// Key of each kept field, indexed by sampled_direction::field. A key is node * orientations + orientation,
   /// or 0xffffffff where the number is not in use. Waits for the work before it.
   std::vector<std::uint32_t> field_keys(const Exec& exec) const { return store_.keys(exec); }
@@ -133,9 +133,11 @@ class kept_guide : public octree_scene<Exec> {
                                        options.kept.resolution);
     return options;
   }
+  // Whether fractions are learnt: the option, if set, pins them.
+  bool learns_fractions() const { return !options_.guide_fraction; }
   // What the store needs of a wave. Draws the wave's points for products.
   //
-  // Kept fields have one fraction of guided directions, for bins of every size.
+  // Kept fields begin with one fraction of guided directions, for bins of every size.
   template <class Surfaces, class Random>
   kept_field_wave<Surfaces> kept_wave(const sample_context<Exec>& at, const wave<Surfaces, Random>& w) {
     return {w.ray_count,
@@ -146,7 +148,8 @@ class kept_guide : public octree_scene<Exec> {
             scene::fraction().with_enough_rays,
             hash(at.seed, w.depth),
             scene::draw_points(at, w.depth),
-            scene::depth_counts(w.depth)};
+            scene::depth_counts(w.depth),
+            learns_fractions()};
   }
   // `FieldSampler`: sample_field or sample_product, over `Sampler`.
   template <class FieldSampler, class Surfaces, class Random, class Caster, class Sampler>

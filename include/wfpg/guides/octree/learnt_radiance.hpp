@@ -11,6 +11,7 @@
 #include <wfpg/exec/support/running_mean.hpp>
 #include <wfpg/exec/support/value_queue.hpp>
 #include <wfpg/guides/octree/guide_view.hpp>
+#include <wfpg/guides/octree/learnt_fractions.hpp>
 
 namespace wfpg {
 
@@ -21,10 +22,10 @@ class learnt_radiance_view {
   /// An empty view.
   learnt_radiance_view() = default;
   /// View of fields of `resolution`² cells. `fields`: one entry a slot. `queue`: its keys are the cells of
-  /// all slots.
+  /// all slots. `fractions`: one entry a slot; null: fractions are not learnt.
   WFPG_HD learnt_radiance_view(array_view<const resident_field> fields, std::uint32_t resolution,
-                               const detail::value_queue_view& queue)
-      : fields_(fields), resolution_(resolution), queue_(queue) {}
+                               const detail::value_queue_view& queue, field_fractions* fractions = nullptr)
+      : fields_(fields), resolution_(resolution), queue_(queue), fractions_(fractions) {}
 
   /// Whether it has no fields to record for.
   WFPG_HD bool empty() const { return resolution_ == 0; }
@@ -55,6 +56,15 @@ class learnt_radiance_view {
     else
       queue_.drop(entry);
   }
+  /// Whether fields learn their fractions of guided directions.
+  WFPG_HD bool learns_fractions() const { return fractions_ != nullptr; }
+  /// Adds what a direction of `field` brought, over its density: luminance, BSDF and cosine included.
+  /// `share`: that of the guide in the density. Drops unknown fields and shares, and what is negative or not
+  /// finite. Precondition: learns_fractions().
+  WFPG_HD void weigh(std::uint32_t field, float brought, guide_share share) const {
+    if (field < fields_.size()) fractions_[field].add(brought, share);
+  }
+
   /// Counts a reserved entry, after it was written. Call it once an entry.
   WFPG_HD void count(std::uint32_t entry) const { queue_.count(entry); }
 
@@ -76,6 +86,7 @@ class learnt_radiance_view {
   array_view<const resident_field> fields_;
   std::uint32_t resolution_ = 0;
   detail::value_queue_view queue_;
+  field_fractions* fractions_ = nullptr;
 };
 
 }  // namespace wfpg

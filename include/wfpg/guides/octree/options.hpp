@@ -61,7 +61,8 @@ struct kept_field_options {
 
 /// Options of both guides, beside sampling_options. `guide_fraction` is in (0, 1], and below 1 with products.
 /// Its default is 0.5 in plain mode, and 0.7 in oriented mode. A transient oriented bin of fewer than
-/// binning.rays_per_bin rays has 0.5.
+/// binning.rays_per_bin rays has 0.5. Kept fields that learn begin with the default, and each learns its own:
+/// learnt_fractions.hpp. A fraction that is set stays.
 struct octree_guide_options : sampling_options {
   /// Voxels along the scene's longest side; a power of two in [1, 4096].
   std::uint32_t octree_resolution = 128;

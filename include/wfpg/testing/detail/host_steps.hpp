@@ -60,15 +60,15 @@ inline constexpr float large_delta_lobe = 0.25f;
 // this.
 inline constexpr float full_fraction = 1.0f - 1.0e-4f;
 
-/// Flags of a step's mixture. `full`: the guide's fraction before narrow lobes reduce it.
+/// Flags of a step's mixture. `guided`: it has a field.
 /// `mirror_pdf`: of the BSDF at normal incidence. `delta`: probability of the delta lobe that drew, or 0.
-WFPG_HD inline std::uint32_t guiding_flags(float full, const kernel_mixture& mixture, float mirror_pdf,
+WFPG_HD inline std::uint32_t guiding_flags(bool guided, const kernel_mixture& mixture, float mirror_pdf,
                                            float delta) {
-  if (!(full > 0.0f)) return 0;
+  if (!guided) return 0;
   const float part = guided_fraction(1.0f, glossy_part::unknown(mirror_pdf), mixture.field.resolved_alpha());
   return logged_step::guided | (part < narrow_lobe_part ? logged_step::narrow : 0u) |
          (delta >= large_delta_lobe ? logged_step::delta : 0u) |
-         (mixture.fraction >= full_fraction * full ? logged_step::in_full : 0u);
+         (mixture.kept >= full_fraction ? logged_step::in_full : 0u);
 }
 
 /// A vertex of a recorded path, for the host.

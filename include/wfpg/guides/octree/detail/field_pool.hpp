@@ -1,8 +1,8 @@
 // Owns the memory of kept fields. Each slot has its field's frame and fraction, its distribution, what its
 // cones hit, and what paths found in its cells.
 //
-// Memory: 8 F^2 + 4 F + 16 bytes a slot, and 2 F^2 more where fields learn. A sample takes 16 bytes a cell
-// and 8 a value.
+// Memory: 8 F^2 + 4 F + 16 bytes a slot, and 2 F^2 + 88 more where fields learn. A sample takes 16 bytes a
+// cell and 8 a value.
 #pragma once
 
 #include <wfpg/exec/buffer.hpp>
@@ -11,6 +11,7 @@
 #include <wfpg/guides/octree/field_cells.hpp>
 #include <wfpg/guides/octree/field_slots.hpp>
 #include <wfpg/guides/octree/guide_view.hpp>
+#include <wfpg/guides/octree/learnt_fractions.hpp>
 #include <wfpg/guides/octree/learnt_radiance.hpp>
 
 #include <vector>
@@ -38,6 +39,16 @@ struct fold_learnt {
   }
 };
 
+/// Kernel: forgets what fractions learn from.
+struct forget_fractions {
+  field_fractions* fractions;
+  WFPG_HD void operator()(std::size_t i) const {
+    const float first = fractions[i].first;
+    fractions[i] = {};
+    fractions[i].first = first;
+  }
+};
+
 /// The fields of all slots, in the memory of `Exec`.
 template <class Exec>
 class field_pool {
@@ -51,6 +62,7 @@ class field_pool {
         words_(exec, slots * words_a_field()),
         hits_(exec, slots * cells_a_field()),
         learnt_(exec, max_values > 0 ? hits_.size() : 0),
+        fractions_(exec, std::vector<field_fractions>(max_values > 0 ? slots : 0)),
         queue_(exec, learnt_.size() > 0 ? max_values : 0, learnt_.size()) {
     exec.fill_bytes(words_.data(), 0, words_.bytes());  // files are written from copies of whole buffers
     exec.fill_bytes(hits_.data(), 0, hits_.bytes());
@@ -64,6 +76,7 @@ class field_pool {
   static std::size_t bytes_a_field(std::uint32_t resolution, bool learns) {
     const std::size_t a_cell = sizeof(cone_hit) + (learns ? sizeof(stochastic_mean16) : 0);
     return a_cell * resolution * resolution + sizeof(resident_field) +
+           (learns ? sizeof(field_fractions) : 0) +
            grid_distribution::words(resolution) * sizeof(std::uint32_t);
   }
 
@@ -71,33 +84,41 @@ class field_pool {
   resident_field* fields() const { return fields_.data(); }
   std::uint32_t* words() const { return words_.data(); }
   cone_hit* hits() const { return hits_.data(); }
-  stochastic_mean16* means() const { return learnt_.data(); }  ///< null where fields do not learn
+  stochastic_mean16* means() const { return learnt_.data(); }       ///< null where fields do not learn
+  field_fractions* fractions() const { return fractions_.data(); }  ///< null where fields do not learn
 
   /// All fields, with the points of a wave's products.
   resident_fields view(const product_points& points) const {
     return {fields_.data(), words_.data(), resolution_, points};
   }
-  /// Where a sample's paths are recorded; empty where fields do not learn.
-  learnt_radiance_view learnt() const {
+  /// Where a sample's paths are recorded; empty where fields do not learn. `with_fractions`: fractions of
+  /// guided directions are learnt, too.
+  learnt_radiance_view learnt(bool with_fractions) const {
     if (!learns()) return {};
-    return {array_view<const resident_field>(fields_.data(), fields_.size()), resolution_, queue_.view()};
+    return {array_view<const resident_field>(fields_.data(), fields_.size()), resolution_, queue_.view(),
+            with_fractions ? fractions_.data() : nullptr};
   }
-  /// Adds the recorded values to the means of the fields that were used in `sample`. O(values + cells of
-  /// these fields).
+  /// Adds the recorded values to the means and fractions of the fields that were used in `sample`. O(values +
+  /// cells of these fields).
   void learn(const Exec& exec, array_view<field_slot> slots, std::uint32_t sample) {
     if (!learns()) return;
+    exec.for_each(fields_.size(), learn_fractions{slots, sample, fractions_.data(), fields_.data()});
     queue_.sum(exec);
     exec.for_each_block(fields_.size(), 0,
                         fold_learnt{slots, sample, cells_a_field(), queue_.view(), learnt_.data()});
   }
-  /// Forgets all means, and values recorded since the last learn().
+  /// Forgets all means, what fractions learn from, and values recorded since the last learn(). Fractions stay
+  /// until they learn again.
   void forget(const Exec& exec) {
     forget_means(exec);
+    exec.for_each(fractions_.size(), forget_fractions{fractions_.data()});
     if (learns()) queue_.clear(exec);
   }
 
   /// Bytes of all fields, without the values that a sample records.
-  std::size_t bytes() const { return fields_.bytes() + words_.bytes() + hits_.bytes() + learnt_.bytes(); }
+  std::size_t bytes() const {
+    return fields_.bytes() + words_.bytes() + hits_.bytes() + learnt_.bytes() + fractions_.bytes();
+  }
   std::size_t value_bytes() const { return queue_.bytes(); }
 
  private:
@@ -106,10 +127,11 @@ class field_pool {
   void forget_means(const Exec& exec) { exec.fill_bytes(learnt_.data(), 0, learnt_.bytes()); }
 
   std::uint32_t resolution_ = 0;
-  buffer<resident_field, Exec> fields_;     // a slot
-  buffer<std::uint32_t, Exec> words_;       // a slot: its distribution
-  buffer<cone_hit, Exec> hits_;             // a slot: its cells
-  buffer<stochastic_mean16, Exec> learnt_;  // a slot: its cells; empty where fields do not learn
+  buffer<resident_field, Exec> fields_;      // a slot
+  buffer<std::uint32_t, Exec> words_;        // a slot: its distribution
+  buffer<cone_hit, Exec> hits_;              // a slot: its cells
+  buffer<stochastic_mean16, Exec> learnt_;   // a slot: its cells; empty where fields do not learn
+  buffer<field_fractions, Exec> fractions_;  // a slot; empty where fields do not learn
   value_queue<Exec> queue_;
 };
 

@@ -69,11 +69,17 @@ guide_view field_store<Exec>::prepare(const Exec& exec, const kept_field_wave<Su
                 "caster: needs ray_hit operator()(const ray&) const, or cast(exec, rays, hits) const");
   begin_wave(exec, wave);
   find(exec, wave);
-  const kept_fields_view kept{table_.view(),       pool_.fields(),
-                              pool_.words(),       pool_.hits(),
-                              pool_.means(),       options_.cone_samples,
-                              options_.resolution, options_.recast,
-                              schedule_.sample(),  &table_.state()->refreshed};
+  const kept_fields_view kept{table_.view(),
+                              pool_.fields(),
+                              pool_.words(),
+                              pool_.hits(),
+                              pool_.means(),
+                              pool_.fractions(),
+                              options_.cone_samples,
+                              options_.resolution,
+                              options_.recast,
+                              schedule_.sample(),
+                              &table_.state()->refreshed};
   if (builds_in_wave())
     build(exec, kept_field_builder<kept_field_wave<Surfaces>>{wave, kept}, caster, caster_buffer_bytes);
   end_wave();
