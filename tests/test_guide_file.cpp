@@ -408,7 +408,7 @@ TEST_CASE("the content of a guide file is checked, even if its checksums are rig
   refused("fields", slot + 4, 4, 8 * nodes, "has a field of no node");
   refused("fields", slot + 8, 4, 4, "has a field of a sample to come");
   refused("fields", slot + 20, 4, infinity, "has a normal without unit length");
-  refused("fields", slot + 32, 4, 0x40000000u, "has a fraction out of range");
+  refused("fields", slot + 32, 4, 0x40000000u, "has a field of one fraction");
   refused("fields", slot + 32, 4, 0, "has a field without cells");
   refused("fields", cells, 4, 0xffffffffu, "has a field that is no distribution");
   refused("fields", cells + 64, 4, 0xffffffffu,
@@ -418,7 +418,12 @@ TEST_CASE("the content of a guide file is checked, even if its checksums are rig
   CHECK(fault(with_number(lit, "lights", 0, 4, 0xffffff01u), options_with_lights())
             .find("section lights has learnt light out of range") != std::string::npos);
   const std::string fields = payload_of(bytes, "fields");
-  const std::size_t one = 36 + 80 + 64 + 32;
+  constexpr std::size_t learnt = cells + 80 + 64 + 32;  // what the field's fractions learnt
+  refused("fields", learnt, 4, 0x40000000u, "has a fraction that learnt from what is no number");
+  refused("fields", learnt + 4, 4, infinity, "has a fraction that learnt from what is no number");
+  refused("fields", learnt + 12, 4, 0xbf800000u, "has a fraction that learnt from what is no number");
+  refused("fields", learnt + 4, 8, 0x3f800000u, "has a fraction that learnt from no direction");
+  const std::size_t one = 36 + 80 + 64 + 32 + 36;
   std::string twice = fields.substr(0, slot) + fields.substr(slot, one) + fields.substr(slot, one);
   CHECK(fault(with_payload(bytes, "fields", twice), options).find("slots out of order") != std::string::npos);
   set_number(twice, slot + one, 4, number_in(twice, slot, 4) + 1);

@@ -83,9 +83,9 @@ std::map<std::string, std::size_t> units_of(const wfpg::path_guider<one_policy>&
   const std::string fields = payload_of(bytes, "fields");
   std::size_t live = 0, built = 0;
   for (std::size_t at = 32; at < fields.size(); ++live) {
-    const float fraction = wfpg::number_at<float>(&fields[at + 32]);
-    built += fraction > 0.0f;
-    at += 36 + (fraction > 0.0f ? 10 * cells + 4 * options.kept.resolution : 0);
+    const bool is_built = wfpg::number_at<std::uint32_t>(&fields[at + 32]) > 0;
+    built += is_built;
+    at += 36 + (is_built ? 10 * cells + 4 * options.kept.resolution + 36 : 0);
   }
   return {{"", 1},
           {"leaf", tree.leaf_count()},
@@ -93,6 +93,7 @@ std::map<std::string, std::size_t> units_of(const wfpg::path_guider<one_policy>&
           {"inner node", tree.first_leaf()},
           {"depth", options.max_depth},
           {"field", live},
+          {"built field", built},
           {"cell", built * cells},
           {"row", built * options.kept.resolution},
           {"mean", payload_of(bytes, "lights").size() / 4},

@@ -75,13 +75,25 @@ TEST_CASE("rest: a guide rests between comparisons, and only where its gain is k
   guiding_gain few = gain_of(0.5), dark = gain_of(0.5), bright = gain_of(0.5);
   few.paths = 4095;
   dark.unguided_mean = 0.94;    // unguided paths miss light: their variance lies there
-  bright.cut_off_mean = 0.011;  // it lies in few and bright paths
-  for (const guiding_gain& unknown : {few, dark, bright, guiding_gain()}) {
+  bright.cut_off_mean = 0.011;  // it lies in few and bright paths, and the guide finds it by others
+  bright.guided_cut_off_mean = 0.005;
+  guiding_gain brightest = bright;
+  brightest.cut_off_mean = brightest.guided_cut_off_mean = 0.11;  // too much to know anything
+  for (const guiding_gain& unknown : {few, dark, bright, brightest, guiding_gain()}) {
     schedule.decide(64, gain_of(0.5));
     REQUIRE(schedule.resting());
     schedule.decide(64, unknown);
     CHECK(!schedule.resting());
   }
+}
+
+TEST_CASE("rest: gains are known where guided paths are as bright as others", "[rest]") {
+  guiding_gain bright = gain_of(0.5);
+  bright.cut_off_mean = 0.09;
+  bright.guided_cut_off_mean = 0.044;
+  CHECK(!bright.is_known());
+  bright.guided_cut_off_mean = 0.046;
+  CHECK(bright.is_known());
 }
 
 TEST_CASE("rest: gains have bounds where variances are 0", "[rest]") {

@@ -140,7 +140,7 @@ struct kept_state {
       slots[saved.index] = saved.slot;
       fields[saved.index] = saved.field;
       keys.push_back(saved.slot.key);
-      if (saved.is_built()) take_cells(bytes, store, saved.index, learnt, pool);
+      if (saved.is_built()) take_cells(bytes, store, saved.index, learnt, fields[saved.index], pool);
     }
     std::sort(keys.begin(), keys.end());
     bytes.require(std::adjacent_find(keys.begin(), keys.end()) == keys.end(), "has a field twice");
@@ -222,20 +222,24 @@ struct kept_state {
     return s;
   }
 
-  /// Reads the cells of a slot into its part of the pool.
+  /// Reads the cells of a slot into its part of the pool, and sets the fractions of a field that is not to
+  /// learn.
   template <class Exec>
   static void take_cells(section_reader& bytes, const field_store<Exec>& store, std::size_t slot, bool learnt,
-                         pool_copy& pool) {
+                         resident_field& field, pool_copy& pool) {
     const std::size_t cells = store.pool_.cells_a_field();
     const auto words = bytes.get_all<std::uint32_t>(store.pool_.words_a_field());
     const auto hits = bytes.get_all<std::uint32_t>(cells);
     check_cells(bytes, words, hits, store.options_.resolution, store.tree_.node_count());
     place(words, slot, pool.words);
     place(hits, slot, pool.hits);
+    // A field that did not learn begins with the fraction that it had.
+    if (store.pool_.learns()) pool.fractions[slot].first = field.fraction();
     if (!learnt) return;
     const auto values = bytes.get_all<std::uint16_t>(cells);
     const field_fractions fractions = take_fractions(bytes);
-    if (!store.pool_.learns()) return;
+    // A field that is not to learn has the fraction that it began with.
+    if (!store.pool_.learns()) return field.set_fractions(fractions.first, fractions.first);
     place(values, slot, pool.learnt);
     pool.fractions[slot] = fractions;
   }

@@ -55,18 +55,27 @@ struct guiding_gain {
   static constexpr double least_light = 0.95;
   /// Part of the unguided paths' light that may be cut off, since it comes from few and very bright paths.
   static constexpr double most_cut_off = 0.01;
+  /// More may be cut off, up to the latter part, where guided paths have at least the former part of it. The
+  /// guide does not find such light by more and dimmer paths, then.
+  static constexpr double least_as_bright = 0.5, most_as_bright = 0.1;
 
   std::uint64_t paths = 0;     ///< pixels with paths in all samples that were compared
   double unguided_mean = 0.0;  ///< mean radiance of paths that sample their BSDFs, without what is cut off
   double cut_off_mean = 0.0;   ///< mean of what is cut off of these paths
-  double guided_mean = 0.0;    ///< mean radiance of guided paths
-  double unguided_variance = 0.0;  ///< variance of a path that samples its BSDFs
-  double guided_variance = 0.0;    ///< variance of a guided path
+  double guided_mean = 0.0;    ///< mean radiance of guided paths, without what is cut off
+  double guided_cut_off_mean = 0.0;  ///< mean of what is cut off of guided paths
+  double unguided_variance = 0.0;    ///< variance of a path that samples its BSDFs
+  double guided_variance = 0.0;      ///< variance of a guided path
 
   /// Whether value() means something.
   bool is_known() const {
     return paths >= least_paths && unguided_mean >= least_light * guided_mean &&
-           cut_off_mean <= most_cut_off * unguided_mean;
+           (cut_off_mean <= most_cut_off * unguided_mean || is_as_bright());
+  }
+  /// Whether guided paths bring bright light by as few and bright paths as unguided ones do.
+  bool is_as_bright() const {
+    return cut_off_mean <= most_as_bright * unguided_mean &&
+           guided_cut_off_mean >= least_as_bright * cut_off_mean;
   }
   /// Unguided variance over guided variance, at most 1e6; 1 where both are 0.
   double value() const {

@@ -7,7 +7,8 @@
 // Differences are relative to what the cache expects of the path's first surface, and the mean of the scene.
 // So dark and bright parts count alike, and no part without light counts much. They are cut off at 8, since
 // a few bright paths would decide alone. What is cut off lowers the mean of unguided paths, by which
-// guiding_gain notices that they miss light.
+// guiding_gain notices that they miss light. Where as much is cut off of guided paths, the guide has not
+// found that light, either.
 //
 // Source: wfpg's own. Cost: a look-up and O(vertices) a path, over at most 65,536 paths, and a reduction.
 // Memory: 12 bytes a path, at most 768 KiB.

@@ -10,6 +10,7 @@
 // bytes a ray.
 #pragma once
 
+#include <wfpg/base/math.hpp>
 #include <wfpg/base/types.hpp>
 #include <wfpg/sampling/mixture.hpp>
 #include <wfpg/sampling/product_sampler.hpp>
@@ -28,7 +29,7 @@ struct alignas(16) resident_field {
 
   /// A field that is not built, and guides nothing.
   resident_field() = default;
-  /// A field with one fraction, in [0, 1], for surfaces of both kinds.
+  /// A field with one fraction, above 0 and at most 1, for surfaces of both kinds.
   WFPG_HD resident_field(vec3 of_hemisphere, float fraction) : normal(of_hemisphere) {
     set_fractions(fraction, fraction);
   }
@@ -41,10 +42,16 @@ struct alignas(16) resident_field {
   WFPG_HD float fraction() const { return static_cast<float>(smooth) * (1.0f / 65535.0f); }
   /// Fraction of guided directions on narrow surfaces, in [0, 1], before their lobes reduce it.
   WFPG_HD float narrow_fraction() const { return static_cast<float>(narrow) * (1.0f / 65535.0f); }
-  /// Sets both fractions, each in [0, 1].
+  /// Sets both fractions, each above 0 and at most 1. The field then counts as built.
   WFPG_HD void set_fractions(float of_smooth, float of_narrow) {
-    smooth = static_cast<std::uint16_t>(of_smooth * 65535.0f + 0.5f);
-    narrow = static_cast<std::uint16_t>(of_narrow * 65535.0f + 0.5f);
+    smooth = stored(of_smooth);
+    narrow = stored(of_narrow);
+  }
+
+ private:
+  // At least one step: 0 would say that there is no field.
+  WFPG_HD static std::uint16_t stored(float fraction) {
+    return static_cast<std::uint16_t>(max(fraction * 65535.0f + 0.5f, 1.0f));
   }
 };
 

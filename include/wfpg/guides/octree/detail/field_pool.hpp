@@ -39,13 +39,15 @@ struct fold_learnt {
   }
 };
 
-/// Kernel: forgets what fractions learn from.
+/// Kernel: gives fields the fractions that they began with, and forgets what they learnt of them.
 struct forget_fractions {
   field_fractions* fractions;
+  resident_field* fields;
   WFPG_HD void operator()(std::size_t i) const {
     const float first = fractions[i].first;
     fractions[i] = {};
     fractions[i].first = first;
+    if (fields[i].is_built()) fields[i].set_fractions(first, first);
   }
 };
 
@@ -107,11 +109,10 @@ class field_pool {
     exec.for_each_block(fields_.size(), 0,
                         fold_learnt{slots, sample, cells_a_field(), queue_.view(), learnt_.data()});
   }
-  /// Forgets all means, what fractions learn from, and values recorded since the last learn(). Fractions stay
-  /// until they learn again.
+  /// Forgets all means and fractions, and values recorded since the last learn().
   void forget(const Exec& exec) {
     forget_means(exec);
-    exec.for_each(fractions_.size(), forget_fractions{fractions_.data()});
+    exec.for_each(fractions_.size(), forget_fractions{fractions_.data(), fields_.data()});
     if (learns()) queue_.clear(exec);
   }
 

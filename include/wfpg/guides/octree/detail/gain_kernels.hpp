@@ -26,18 +26,20 @@ struct earlier_paths {
 /// 2^-30, squared differences in units of 2^-40.
 struct path_sums {
   std::uint64_t paths = 0;
-  std::uint64_t unguided = 0;       ///< values of unguided paths
-  std::uint64_t cut_off = 0;        ///< what is cut off of them
-  std::uint64_t guided = 0;         ///< values of guided paths
-  std::uint64_t now_first = 0;      ///< squared differences of guided paths from unguided ones
-  std::uint64_t now_earlier = 0;    ///< squared differences of guided paths from earlier guided ones
-  std::uint64_t earlier_first = 0;  ///< squared differences of earlier guided paths from unguided ones
+  std::uint64_t unguided = 0;        ///< values of unguided paths
+  std::uint64_t cut_off = 0;         ///< what is cut off of them
+  std::uint64_t guided = 0;          ///< values of guided paths
+  std::uint64_t guided_cut_off = 0;  ///< what is cut off of them
+  std::uint64_t now_first = 0;       ///< squared differences of guided paths from unguided ones
+  std::uint64_t now_earlier = 0;     ///< squared differences of guided paths from earlier guided ones
+  std::uint64_t earlier_first = 0;   ///< squared differences of earlier guided paths from unguided ones
 
   WFPG_HD path_sums operator+(const path_sums& other) const {
     return {paths + other.paths,
             unguided + other.unguided,
             cut_off + other.cut_off,
             guided + other.guided,
+            guided_cut_off + other.guided_cut_off,
             now_first + other.now_first,
             now_earlier + other.now_earlier,
             earlier_first + other.earlier_first};
@@ -115,8 +117,9 @@ struct measure_path {
     const float first = before.unguided / scale, earlier = before.guided / scale, last = now / scale;
     return {1,
             units(min(first, most)),
-            units(max(min(first, brightest) - most, 0.0f)),
+            units(cut_off(first)),
             units(min(last, most)),
+            units(cut_off(last)),
             squared_units(first - last),
             squared_units(earlier - last),
             squared_units(first - earlier)};
@@ -125,6 +128,7 @@ struct measure_path {
  private:
   static constexpr float most = 8.0f, brightest = 0x1p16f;
 
+  WFPG_HD static float cut_off(float value) { return max(min(value, brightest) - most, 0.0f); }
   WFPG_HD static std::uint64_t units(float value) { return static_cast<std::uint64_t>(value * 0x1p30f); }
   WFPG_HD static std::uint64_t squared_units(float difference) {
     const float cut = min(fabsf(difference), most);

@@ -58,6 +58,7 @@ guiding_gain gain_meter<Exec>::gain_of(const detail::path_sums& sums) {
   result.unguided_mean = mean(sums.unguided);
   result.cut_off_mean = mean(sums.cut_off);
   result.guided_mean = mean(sums.guided);
+  result.guided_cut_off_mean = mean(sums.guided_cut_off);
   result.unguided_variance = max(0.5 * (un + ue - en), 0.0);
   result.guided_variance = max(0.5 * (un + en - ue), 0.0);
   return result;

@@ -52,10 +52,12 @@ std::size_t octree_scene<Exec>::deposits_of_sample() const {
 
 template <class Exec>
 mixture_fraction octree_scene<Exec>::fraction() const {
+  // As fields in memory store them, so that both forms of a guide sample alike.
+  const auto stored = [](float f) { return resident_field(vec3(0.0f), f).fraction(); };
   // An option counts for bins of every size.
-  if (options_.guide_fraction) return {*options_.guide_fraction, *options_.guide_fraction, 0};
-  if (options_.mode == guiding_mode::plain) return {0.5f, 0.5f, 0};
-  return {0.7f, 0.5f, options_.binning.rays_per_bin};
+  if (options_.guide_fraction) return {stored(*options_.guide_fraction), stored(*options_.guide_fraction), 0};
+  if (options_.mode == guiding_mode::plain) return {stored(0.5f), stored(0.5f), 0};
+  return {stored(0.7f), stored(0.5f), options_.binning.rays_per_bin};
 }
 
 template <class Exec>
