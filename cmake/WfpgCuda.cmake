@@ -1,8 +1,12 @@
 # The CUDA compiler, where there is one: enables the language and sets WFPG_HAS_CUDA, and wfpg_add_cuda_options()
 # gives a target what all of the project's CUDA programs have in common. CMAKE_CUDA_ARCHITECTURES, or CUDAARCHS in the
 # environment, chooses what is compiled for.
-if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES AND NOT DEFINED ENV{CUDAARCHS})
+if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
+  # CMake itself reads the environment in a new build folder alone.
   set(CMAKE_CUDA_ARCHITECTURES 75 90)
+  if(DEFINED ENV{CUDAARCHS})
+    set(CMAKE_CUDA_ARCHITECTURES $ENV{CUDAARCHS})
+  endif()
 endif()
 
 find_program(WFPG_NVCC nvcc HINTS ENV CUDA_HOME PATHS /usr/local/cuda /opt/cuda PATH_SUFFIXES bin)
