@@ -72,6 +72,7 @@ void refreshing_slots(benchmark::State& state) {
                                     words.data(),
                                     found.data(),
                                     learnt.data(),
+                                    nullptr,  // fractions do not change in a build
                                     1.0f,
                                     slot_size,
                                     recast,

@@ -23,7 +23,7 @@ OPTIONS = (
     ("octree_resolution", "--octree-resolution {}", (32, 64, 128, 256), 128, ""),
     ("rays_per_bin", "--rays-per-bin {}", (16, 64, 256, 1024), 64, ""),
     ("kept.recast", "--recast {}", (1, 4, 8, 16, 32, 64), 32, ""),
-    ("guide_fraction", "--guide-fraction {}", (0.3, 0.5, 0.7, 0.9), 0.7, ""),
+    ("guide_fraction", "--guide-fraction {}", (0.3, 0.5, 0.7, 0.9, "learnt"), "learnt", ""),
     ("product_resolution", "--method wfpg-product --product-resolution {}", (0, 4, 8), 0, ""),
     # Such small pictures have at most 16 deposits a leaf if the octree is fine.
     ("deposits_per_leaf, octree 32", "--deposits-per-leaf {}", (1, 4, 16), 16, "--octree-resolution 32"),

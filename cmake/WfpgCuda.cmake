@@ -4,7 +4,7 @@
 if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
   # CMake itself reads the environment in a new build folder alone.
   set(CMAKE_CUDA_ARCHITECTURES 75 90)
-  if(DEFINED ENV{CUDAARCHS})
+  if(NOT "$ENV{CUDAARCHS}" STREQUAL "")
     set(CMAKE_CUDA_ARCHITECTURES $ENV{CUDAARCHS})
   endif()
 endif()

@@ -1,6 +1,7 @@
 // Guide files. Loaded guides continue bit for bit. Truncated, altered, foreign, newer or invented files are
 // refused by name and do no harm.
 #include "support/catch.hpp"
+#include "support/evaluate.hpp"
 #include "support/guiding.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
@@ -9,6 +10,8 @@
 
 #include <wfpg/guide_file.hpp>
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
@@ -239,6 +242,44 @@ WFPG_TEST_CASE("a warm start guides from the first sample, with other options", 
   CHECK(count_guided(exec, view, 200) > 150);
 }
 
+/// A ray's fraction of guided directions; 0 where it has no field.
+struct fraction_of_ray {
+  wfpg::guide_view view;
+  WFPG_HD float operator()(std::size_t ray) const {
+    return view.fields().info(view.number(static_cast<std::uint32_t>(ray))).fraction();
+  }
+};
+
+/// Fractions of a guider's fields, of rays that have one.
+template <class Exec>
+std::vector<float> fractions_of(const Exec& exec, wfpg::path_guider<Exec> guider) {
+  const auto surfaces = wall_surfaces(200, 3);
+  const wave_of_surfaces<Exec> wave(exec, surfaces);
+  guider.begin_sample();
+  std::vector<float> found =
+      evaluate(exec, surfaces.size(), fraction_of_ray{guider.prepare(wave.get(), box_caster())});
+  found.erase(std::remove(found.begin(), found.end(), 0.0f), found.end());
+  return found;
+}
+
+WFPG_TEST_CASE("fractions of a guide file are those that the options allow", "[guide_file]") {
+  const Exec exec;
+  wfpg::kept_guide_options learning = small_options(), pinned = learning, all = learning;
+  pinned.guide_fraction = 0.3f;
+  all.guide_fraction = 1.0f;
+  const std::string learnt = saved(trained(exec, learning, 5)), guided = saved(trained(exec, all, 5));
+  const float third = wfpg::resident_field(wfpg::vec3(0.0f), 0.3f).fraction();
+  for (const std::string& bytes : {learnt, guided}) {
+    const std::vector<float> set = fractions_of(exec, loaded(exec, bytes, pinned));
+    CHECK(set.size() > 50);
+    CHECK(std::count(set.begin(), set.end(), third) == static_cast<std::ptrdiff_t>(set.size()));
+    // A field without a BSDF would make products biased, so a fraction of 1 is not taken over.
+    const std::vector<float> free = fractions_of(exec, loaded(exec, bytes, learning));
+    CHECK(free.size() > 50);
+    CHECK(*std::max_element(free.begin(), free.end()) < 0.951f);
+  }
+}
+
 WFPG_TEST_CASE("guides with and without learnt radiance load each other's files", "[guide_file]") {
   const Exec exec;
   const wfpg::kept_guide_options learning = small_options();
@@ -419,11 +460,10 @@ TEST_CASE("the content of a guide file is checked, even if its checksums are rig
             .find("section lights has learnt light out of range") != std::string::npos);
   const std::string fields = payload_of(bytes, "fields");
   constexpr std::size_t learnt = cells + 80 + 64 + 32;  // what the field's fractions learnt
-  refused("fields", learnt, 4, 0x40000000u, "has a fraction that learnt from what is no number");
-  refused("fields", learnt + 4, 4, infinity, "has a fraction that learnt from what is no number");
-  refused("fields", learnt + 12, 4, 0xbf800000u, "has a fraction that learnt from what is no number");
-  refused("fields", learnt + 4, 8, 0x3f800000u, "has a fraction that learnt from no direction");
-  const std::size_t one = 36 + 80 + 64 + 32 + 36;
+  refused("fields", learnt, 4, infinity, "has a fraction that learnt from what is no number");
+  refused("fields", learnt, 4, 0x7f61b1e6u, "has a fraction that learnt from what is no number");  // 3e38
+  refused("fields", learnt + 8, 4, 0xbf800000u, "has a fraction that learnt from what is no number");
+  const std::size_t one = 36 + 80 + 64 + 32 + 32;
   std::string twice = fields.substr(0, slot) + fields.substr(slot, one) + fields.substr(slot, one);
   CHECK(fault(with_payload(bytes, "fields", twice), options).find("slots out of order") != std::string::npos);
   set_number(twice, slot + one, 4, number_in(twice, slot, 4) + 1);

@@ -85,7 +85,7 @@ std::map<std::string, std::size_t> units_of(const wfpg::path_guider<one_policy>&
   for (std::size_t at = 32; at < fields.size(); ++live) {
     const bool is_built = wfpg::number_at<std::uint32_t>(&fields[at + 32]) > 0;
     built += is_built;
-    at += 36 + (is_built ? 10 * cells + 4 * options.kept.resolution + 36 : 0);
+    at += 36 + (is_built ? 10 * cells + 4 * options.kept.resolution + 32 : 0);
   }
   return {{"", 1},
           {"leaf", tree.leaf_count()},

@@ -183,6 +183,7 @@ TEST_CASE("fractions: one bright direction is soon forgotten", "[learnt_fraction
 TEST_CASE("fractions: shares are stored in steps", "[learnt_fractions]") {
   CHECK(!guide_share().is_known());
   CHECK(!guide_share::of(1.0f, 0.0f, 1.0f).is_known());
+  CHECK(!guide_share::of(0.0f, 1.0f, 0.0f).is_known());  // a lobe too narrow to be guided
   for (int i = 0; i <= 100; ++i) {
     const float share = static_cast<float>(i) / 100.0f;
     const guide_share smooth = guide_share::of(3.0f * share, 3.0f, 1.0f);
@@ -234,13 +235,13 @@ WFPG_TEST_CASE("fractions: recorded paths tell what each direction brought", "[l
   const wfpg::vec3 up(0.0f, 0.0f, 1.0f);
   cached_scene<Exec> scene(fragments_in_grid<Exec>({{{0, 0, 0}, up, 1.0f}}), 100);
   const Exec& exec = scene.exec;
-  wfpg::path_recorder<Exec> recorder(exec, {1, 4, true, 0, /*directions=*/true});
+  wfpg::path_recorder<Exec> recorder(exec, {1, 8, true, 0, /*directions=*/true});
   const wfpg::buffer<wfpg::resident_field, Exec> fields(exec, std::vector<wfpg::resident_field>(4));
   const wfpg::buffer<field_fractions, Exec> learning(exec, std::vector<field_fractions>(4));
   wfpg::detail::value_queue<Exec> queue(exec, 10, 16);
   const wfpg::path_recorder_view paths = recorder.view();
   // Field 1 sends the path to a surface that brings light, through half of the throughput; field 2 sends it
-  // on to a lamp. A delta lobe, or a host that tells no share, would teach nothing.
+  // on to a gap. A direction to a gap teaches nothing, nor does one without a share.
   exec.for_each(1, [=] WFPG_HD(std::size_t) {
     paths.vertex(0, 0, wfpg::vec3(0.5f), up, wfpg::vec3(1.0f));
     paths.scatter(0, 0, up, 1, guide_share::of(0.5f, 1.0f, 1.0f));
@@ -249,7 +250,10 @@ WFPG_TEST_CASE("fractions: recorded paths tell what each direction brought", "[l
     paths.scatter(0, 1, up, 2, guide_share::of(0.25f, 1.0f, 0.5f));
     paths.vertex(0, 2, wfpg::vec3(0.5f), up, wfpg::vec3(0.25f));
     paths.scatter(0, 2, up, 3);
-    paths.emission(0, 3, wfpg::vec3(3.0f));
+    paths.vertex(0, 3, wfpg::vec3(0.5f), up, wfpg::vec3(0.25f));
+    paths.scatter(0, 3, up, 0, guide_share::of(0.25f, 1.0f, 1.0f));
+    paths.vertex(0, 5, wfpg::vec3(0.5f), up, wfpg::vec3(0.25f));
+    paths.radiance(0, 5, wfpg::vec3(3.0f));
   });
   const wfpg::learnt_radiance_view learnt{const_view<wfpg::resident_field>(fields), 2, queue.view(),
                                           learning.data()};

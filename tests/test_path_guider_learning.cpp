@@ -292,4 +292,49 @@ WFPG_TEST_CASE("path guider: rays without a field count when bins are chosen", "
   CHECK(missing.empty());
 }
 
+/// The fractions of the fields that a wave's rays have, each as resident_field stores it.
+struct fraction_of_ray {
+  wfpg::guide_view view;
+  WFPG_HD float operator()(std::size_t ray) const {
+    return view.fields().info(view.number(static_cast<std::uint32_t>(ray))).fraction();
+  }
+};
+
+WFPG_TEST_CASE("path guider: fields learn their fractions, unless an option pins them", "[path_guider]") {
+  const Exec exec;
+  const float pinned = wfpg::resident_field(wfpg::vec3(0.0f), 0.7f).fraction();
+  for (const bool pins : {false, true}) {
+    wfpg::kept_guide_options options;
+    options.octree_resolution = 8;
+    options.kept.resolution = 4;
+    options.max_paths = 600;
+    options.max_depth = 3;
+    options.binning.min_level = 1;
+    if (pins) options.guide_fraction = 0.7f;
+    wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
+    const auto surfaces = wall_surfaces(200, 3);
+    const wave_of_surfaces<Exec> wave(exec, surfaces);
+    const auto count = [&] {
+      guider.begin_sample();
+      const auto view = guider.prepare(wave.get(), box_caster());
+      std::size_t learnt = 0, other = 0;
+      for (const float fraction : evaluate(exec, surfaces.size(), fraction_of_ray{view})) {
+        learnt += fraction > 0.0f && fraction != pinned;
+        other += fraction == pinned;
+      }
+      guider.end_sample();
+      return std::pair<std::size_t, std::size_t>(learnt, other);
+    };
+    trace_paths(exec, guider, 6, 600, box_caster());
+    const auto [learnt, other] = count();
+    CHECK((pins ? learnt : other) < 20);
+    CHECK((pins ? other : learnt) > 100);
+    // What moved may be lit otherwise.
+    guider.invalidate_all();
+    const auto [after, begun] = count();
+    CHECK(after == 0);
+    CHECK(begun > 100);
+  }
+}
+
 }  // namespace

@@ -47,7 +47,7 @@ WFPG_TEST_CASE("path guider: memory() is what it allocated, by part", "[path_gui
       CHECK(names == expected);
       CHECK(memory.persistent() <= most_persistent(guider));
       for (const wfpg::memory_part& part : memory.parts) {
-        if (part.name == std::string("paths")) CHECK(part.bytes <= 300 * 3 * 48 + 300 * 4 + 64);
+        if (part.name == std::string("paths")) CHECK(part.bytes <= 300 * 3 * 49 + 300 * 4 + 64);
         if (part.name == std::string("kept fields")) CHECK(part.bytes > 0);
       }
       trace_paths(exec, guider, 1, 300, box_caster{});
@@ -73,7 +73,7 @@ WFPG_TEST_CASE("path guider: recording memory is bounded by the leaves, not by t
     options.deposits_per_leaf.reset();
     const octree_guider<Exec> all(exec, mesh.view(), options);
     const std::size_t wanted = 16 * some.guide().octree().leaf_count() / 3;  // paths of 3 vertices
-    const std::size_t a_path = 3 * 48 + 4;
+    const std::size_t a_path = 3 * 49 + 4;
     INFO(paths << " paths, " << wanted << " wanted");
     CHECK(bytes_of(all, "paths") >= paths * a_path);
     CHECK(bytes_of(some, "paths") >= std::min(paths, wanted) * a_path);

@@ -40,7 +40,7 @@
 //            sums of its distribution over rows                   4 a row
 //            cone's hit                                           4 a cell
 //            learnt radiance, where fields learn                  2 a cell
-//            what fractions learnt, where fields learn            36 a built field
+//            what fractions learnt, where fields learn            32 a built field
 //   lights   learnt mean: of learning nodes, faces and groups     4 a mean
 //   paths    place, what unguided and guided paths brought        12 a path that is compared
 //

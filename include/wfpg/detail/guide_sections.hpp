@@ -276,7 +276,8 @@ struct guide_sections {
   static void load_fields(const Exec& exec, file_reader& file, std::uint32_t samples,
                           kept_guide<Exec>& guide) {
     kept_state::restore_levels(exec, file.section("levels"), samples, guide.store_);
-    kept_state::restore_fields(exec, file.section("fields"), guide.store_);
+    kept_state::restore_fields(exec, file.section("fields"), guide.first_fraction(), guide.learns_fractions(),
+                               guide.store_);
   }
   /// Reads nothing: a transient_guide's file has no fields.
   template <class Exec>

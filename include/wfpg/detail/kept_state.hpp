@@ -1,7 +1,7 @@
 // Converts kept fields to and from bytes: the bin of each leaf, and the slots in use with the content of
 // their cells. The table that finds slots is made anew when the next sample begins.
 //
-// Memory: a copy of the whole pool, and the bytes of the fields in use. The pool is copied in three pieces,
+// Memory: a copy of the whole pool, and the bytes of the fields in use. The pool is copied in pieces,
 // since each copy costs a device microseconds.
 #pragma once
 
@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
-#include <limits>
 #include <vector>
 
 namespace wfpg::detail {
@@ -119,7 +118,8 @@ struct kept_state {
   // Reads section "fields". Throws file_error for what kernels could not rely on, before it changes the
   // store.
   template <class Exec>
-  static void restore_fields(const Exec& exec, section_reader bytes, field_store<Exec>& store) {
+  static void restore_fields(const Exec& exec, section_reader bytes, float first_fraction,
+                             bool learns_fractions, field_store<Exec>& store) {
     field_store_state state;
     state.pressure = bytes.get<std::uint32_t>();
     state.refused = bytes.get<std::uint32_t>();
@@ -140,7 +140,9 @@ struct kept_state {
       slots[saved.index] = saved.slot;
       fields[saved.index] = saved.field;
       keys.push_back(saved.slot.key);
-      if (saved.is_built()) take_cells(bytes, store, saved.index, learnt, fields[saved.index], pool);
+      if (saved.is_built()) take_cells(bytes, store, saved.index, learnt, pool);
+      if (saved.is_built())
+        set_fractions(first_fraction, learns_fractions, saved.index, fields[saved.index], pool);
     }
     std::sort(keys.begin(), keys.end());
     bytes.require(std::adjacent_find(keys.begin(), keys.end()) == keys.end(), "has a field twice");
@@ -197,7 +199,6 @@ struct kept_state {
     if (!store.pool_.learns()) return;
     put_part(pool.learnt, store.pool_.cells_a_field(), s.index, bytes);
     const field_fractions& fractions = pool.fractions[s.index];
-    bytes.put(fractions.first);
     for (const fraction_means& m : fractions.means)
       for (const float value : {m.light, m.guided, m.count, m.reference}) bytes.put(value);
   }
@@ -222,41 +223,48 @@ struct kept_state {
     return s;
   }
 
-  /// Reads the cells of a slot into its part of the pool, and sets the fractions of a field that is not to
-  /// learn.
+  /// Reads the cells of a slot into its part of the pool.
   template <class Exec>
   static void take_cells(section_reader& bytes, const field_store<Exec>& store, std::size_t slot, bool learnt,
-                         resident_field& field, pool_copy& pool) {
+                         pool_copy& pool) {
     const std::size_t cells = store.pool_.cells_a_field();
     const auto words = bytes.get_all<std::uint32_t>(store.pool_.words_a_field());
     const auto hits = bytes.get_all<std::uint32_t>(cells);
     check_cells(bytes, words, hits, store.options_.resolution, store.tree_.node_count());
     place(words, slot, pool.words);
     place(hits, slot, pool.hits);
-    // A field that did not learn begins with the fraction that it had.
-    if (store.pool_.learns()) pool.fractions[slot].first = field.fraction();
     if (!learnt) return;
     const auto values = bytes.get_all<std::uint16_t>(cells);
     const field_fractions fractions = take_fractions(bytes);
-    // A field that is not to learn has the fraction that it began with.
-    if (!store.pool_.learns()) return field.set_fractions(fractions.first, fractions.first);
+    if (!store.pool_.learns()) return;
     place(values, slot, pool.learnt);
     pool.fractions[slot] = fractions;
   }
+  /// Gives a field that was read the fractions that it may have. Those of a guider that does not learn them
+  /// are `first`. Others lie within the bounds of learning, whatever the saved guider's options were.
+  static void set_fractions(float first, bool learns, std::size_t slot, resident_field& field,
+                            pool_copy& pool) {
+    const bool keeps = learns && !pool.fractions.empty();
+    const auto bounded = [&](float f) {
+      return keeps ? clamp(f, fraction_constants::least, fraction_constants::most) : first;
+    };
+    const bool is_first = field.fraction() == first && field.narrow_fraction() == first;
+    if (!is_first) field.set_fractions(bounded(field.fraction()), bounded(field.narrow_fraction()));
+    if (!pool.fractions.empty()) pool.fractions[slot].first = first;
+  }
   static field_fractions take_fractions(section_reader& bytes) {
-    const auto sound = [&bytes](float most) {
+    const auto sound = [&bytes] {
       const auto value = bytes.get<float>();
-      bytes.require(is_up_to(value, most), "has a fraction that learnt from what is no number");
+      bytes.require(is_up_to(value, fraction_constants::most_light),
+                    "has a fraction that learnt from what is no number");
       return value;
     };
     field_fractions fractions;
-    fractions.first = sound(1.0f);
     for (fraction_means& m : fractions.means) {
-      constexpr float largest = std::numeric_limits<float>::max();
-      m.light = sound(largest);
-      m.guided = sound(largest);
-      m.count = sound(largest);
-      m.reference = sound(largest);
+      m.light = sound();
+      m.guided = sound();
+      m.count = sound();
+      m.reference = sound();
       bytes.require(m.count > 0.0f || !(m.light > 0.0f), "has a fraction that learnt from no direction");
     }
     return fractions;

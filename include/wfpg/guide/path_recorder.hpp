@@ -9,7 +9,7 @@
 // recording directions so that kept fields learn from paths, are wfpg's own.
 // Cost: a call writes at most 80 bytes, and 48 for each depth that is left out. It uses an atomic only where
 // it is dropped or follows a gap.
-// Memory: 40 bytes a vertex, 48 with directions, and 4 a recorded path. A recorded path has room for
+// Memory: 40 bytes a vertex, 49 with directions, and 4 a recorded path. A recorded path has room for
 // max_depth vertices.
 #pragma once
 
@@ -45,10 +45,7 @@ struct alignas(8) recorded_light {
 
 /// Sampled direction at a vertex. 8 bytes, stored only where directions are recorded.
 struct alignas(8) recorded_direction {
-  static constexpr std::uint32_t field_mask = 0xffffffu;  ///< a field of all ones is none
-
-  /// sampled_direction::field of scatter() in the lower 24 bits, guide_share::code in the upper 8.
-  std::uint32_t field_and_share;
+  std::uint32_t field;      ///< sampled_direction::field of scatter(), or no_field
   std::uint32_t direction;  ///< pack_direction() of it; 0 where scatter() was not called
 };
 
@@ -127,17 +124,16 @@ class path_recorder_view {
 
   /// Records the unit direction in which the path leaves vertex `depth`, which must be its last so far. The
   /// guide learns from it what the direction finds. `field`: number of the field in the mixture that drew it,
-  /// or no_field, as for delta lobes. A number above 2^24 - 2 counts as none. `share`: the guide's in the
-  /// density of the direction. Ignored where directions are not recorded.
+  /// or no_field, as for delta lobes. `share`: the guide's in the density of the direction. Ignored where
+  /// directions are not recorded.
   WFPG_HD void scatter(std::size_t path, std::uint32_t depth, vec3 direction, std::uint32_t field,
                        guide_share share = {}) const {
     std::uint32_t place;
     if (!records_directions() || !find(path, place)) return;
     if (depth >= max_depth_ || depth + 1 != length_of_surfaces(place) || !is_direction(direction))
       return drop();
-    constexpr std::uint32_t mask = detail::recorded_direction::field_mask;
-    directions_[depth * recorded_ + place] = {min(field, mask) | std::uint32_t(share.code & 0xffu) << 24,
-                                              pack_marked(direction)};
+    directions_[depth * recorded_ + place] = {field, pack_marked(direction)};
+    shares_[depth * recorded_ + place] = static_cast<std::uint8_t>(share.code);
   }
   /// Records a direction that the guider sampled, with its field.
   /// Ignored for technique `none`: the path ends there.
@@ -247,7 +243,7 @@ class path_recorder_view {
     const std::size_t slot = depth * recorded_ + place;
     places_[slot] = at;
     light_[slot] = light;
-    if (records_directions()) directions_[slot] = {no_field, 0};  // nor a share
+    if (records_directions()) directions_[slot] = {no_field, 0};
   }
   /// Notes that the last direction has found something. Only silent escapes ask for it.
   WFPG_HD void hear(std::uint32_t place) const {
@@ -272,6 +268,7 @@ class path_recorder_view {
   detail::recorded_place* places_ = nullptr;
   detail::recorded_light* light_ = nullptr;
   detail::recorded_direction* directions_ = nullptr;  // null where directions are not recorded
+  std::uint8_t* shares_ = nullptr;                    // guide_share::code of each, as it is for a field
   std::uint32_t* counters_ = nullptr;
   wave_recorder_view wave_;
 };
@@ -340,6 +337,7 @@ class path_recorder {
         places_(exec, lengths_.size() * settings.max_depth),
         light_(exec, lengths_.size() * settings.max_depth),
         directions_(exec, settings.directions ? lengths_.size() * settings.max_depth : 0),
+        shares_(exec, directions_.size()),
         counters_(exec, path_recorder_view::counters),
         wave_(exec, settings.waves ? settings.paths : 0) {
     view_.paths_ = settings.paths;
@@ -352,6 +350,7 @@ class path_recorder {
     view_.places_ = places_.data();
     view_.light_ = light_.data();
     view_.directions_ = directions_.data();
+    view_.shares_ = shares_.data();
     view_.counters_ = counters_.data();
     view_.wave_ = wave_.view();
     ::thrust::fill_n(exec.thrust(), counters_.data(), counters_.size(), 0u);
@@ -362,8 +361,8 @@ class path_recorder {
   path_recorder_view view() const { return view_; }
   /// Bytes allocated, in the policy's memory.
   std::size_t bytes() const {
-    return lengths_.bytes() + places_.bytes() + light_.bytes() + directions_.bytes() + counters_.bytes() +
-           wave_.bytes();
+    return lengths_.bytes() + places_.bytes() + light_.bytes() + directions_.bytes() + shares_.bytes() +
+           counters_.bytes() + wave_.bytes();
   }
 
   /// Whether scatter() and escape() are recorded.
@@ -414,6 +413,7 @@ class path_recorder {
   buffer<detail::recorded_place, Exec> places_;
   buffer<detail::recorded_light, Exec> light_;
   buffer<detail::recorded_direction, Exec> directions_;
+  buffer<std::uint8_t, Exec> shares_;
   buffer<std::uint32_t, Exec> counters_;
   wave_recorder<Exec> wave_;
   path_recorder_view view_;

@@ -59,18 +59,11 @@ class recorded_path {
   WFPG_HD vec3 contribution(std::uint32_t depth) const { return paths_.light_[slot(depth)].contribution; }
   /// sampled_direction::field of the direction that scatter() recorded, or no_field. Precondition: the
   /// recorder records directions.
-  WFPG_HD std::uint32_t field(std::uint32_t depth) const {
-    // The upper bits are the share's. A number of all ones stands for no field.
-    constexpr std::uint32_t mask = detail::recorded_direction::field_mask;
-    const std::uint32_t field = paths_.directions_[slot(depth)].field_and_share & mask;
-    return field == mask ? no_field : field;
-  }
+  WFPG_HD std::uint32_t field(std::uint32_t depth) const { return paths_.directions_[slot(depth)].field; }
   /// Share of the guide in the density of the direction that scatter() recorded. It is unknown where the host
-  /// did not say, as for delta lobes. Precondition: the
-  /// recorder records directions.
-  WFPG_HD guide_share share(std::uint32_t depth) const {
-    return {static_cast<std::uint16_t>(paths_.directions_[slot(depth)].field_and_share >> 24)};
-  }
+  /// did not say, as for delta lobes. Preconditions: the recorder records directions, and the direction has a
+  /// field.
+  WFPG_HD guide_share share(std::uint32_t depth) const { return guide_share(paths_.shares_[slot(depth)]); }
   /// Writes the unit direction in which the path left a surface. It is the direction toward the next surface,
   /// or else that of scatter(). False where neither is known. Precondition: the recorder records directions.
   WFPG_HD bool has_direction(std::uint32_t depth, vec3& direction) const {

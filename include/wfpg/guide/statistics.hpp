@@ -55,9 +55,11 @@ struct guiding_gain {
   static constexpr double least_light = 0.95;
   /// Part of the unguided paths' light that may be cut off, since it comes from few and very bright paths.
   static constexpr double most_cut_off = 0.01;
-  /// More may be cut off, up to the latter part, where guided paths have at least the former part of it. The
-  /// guide does not find such light by more and dimmer paths, then.
-  static constexpr double least_as_bright = 0.5, most_as_bright = 0.1;
+  /// More may be cut off where guided paths have at least this part of it. The guide does not find such light
+  /// by more and dimmer paths, then.
+  static constexpr double least_as_bright = 0.5;
+  /// Part of the unguided paths' light that may be cut off then.
+  static constexpr double most_as_bright = 0.1;
 
   std::uint64_t paths = 0;     ///< pixels with paths in all samples that were compared
   double unguided_mean = 0.0;  ///< mean radiance of paths that sample their BSDFs, without what is cut off

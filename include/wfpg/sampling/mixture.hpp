@@ -73,7 +73,7 @@ struct basic_kernel_mixture {
   float fraction = 0.0f;
   /// Number of the field, for path_recorder_view::scatter(), or no_field.
   std::uint32_t number = no_field;
-  /// Part of the field's own fraction that narrow lobes leave it here, in (0, 1].
+  /// Part of the field's own fraction that narrow lobes leave it here, in [0, 1].
   float kept = 1.0f;
 
   /// Returns whether the guide draws the direction; else the BSDF does. `u`: uniform in [0, 1). It becomes

@@ -33,24 +33,31 @@ inline constexpr std::uint32_t no_field = 0xffffffffu;
 struct guide_share {
   /// A surface that leaves the guide less than this part of its fraction is narrow.
   static constexpr float least_smooth = 0.9f;
-  /// Steps of a share of 1: of smooth surfaces, and of narrow ones, whose quotient may be up to 4.
-  static constexpr std::uint32_t smooth_steps = 126, narrow_steps = 31;
+  /// Steps of a share of 1 on smooth surfaces.
+  static constexpr std::uint32_t smooth_steps = 126;
+  /// Steps of a quotient of 1 on narrow surfaces. It is cut off at 4.
+  static constexpr std::uint32_t narrow_steps = 31;
   /// Code of a share that is not known.
   static constexpr std::uint16_t unknown = 0xff;
 
   /// Bit 7: the surface is narrow. Below: the share in steps. Or `unknown`.
   std::uint16_t code = unknown;
 
+  /// A share that is not known.
+  guide_share() = default;
+  /// A share with a code that another had.
+  WFPG_HD constexpr explicit guide_share(std::uint16_t of_other) : code(of_other) {}
+
   /// Returns the share of a guide whose term of the density is `of_guide`, of a density `pdf`. `kept`: the
-  /// part of its fraction that the surface leaves the guide, in (0, 1]. Unknown where `pdf` is not positive.
+  /// part of its fraction that the surface leaves the guide, in [0, 1]. Unknown where `pdf` or `kept` is 0.
   WFPG_HD static guide_share of(float of_guide, float pdf, float kept) {
-    if (!(pdf > 0.0f)) return {};
+    if (!(pdf > 0.0f && kept > 0.0f)) return {};
     const float share = min(of_guide / pdf, 1.0f);
     const bool narrow = kept < least_smooth;
     const float steps =
         narrow ? share / kept * static_cast<float>(narrow_steps) : share * static_cast<float>(smooth_steps);
-    return {static_cast<std::uint16_t>((narrow ? 0x80u : 0u) +
-                                       static_cast<std::uint32_t>(min(steps + 0.5f, 126.0f)))};
+    return guide_share(static_cast<std::uint16_t>((narrow ? 0x80u : 0u) +
+                                                  static_cast<std::uint32_t>(min(steps + 0.5f, 126.0f))));
   }
   /// Whether the share is known.
   WFPG_HD bool is_known() const { return code != unknown; }

@@ -63,10 +63,10 @@ struct deposit_path {
     vec3 brought(0.0f);
     for (std::uint32_t depth = vertices; depth-- > 1;) {
       brought += path.contribution(depth);
-      // Delta lobes and hosts that tell no share teach nothing.
-      const guide_share share = path.share(depth - 1);
-      if (share.is_known())
-        learnt.weigh(path.field(depth - 1), leaving_luminance(brought, path.throughput(depth - 1)), share);
+      // Of a direction to a gap it is not known what it found. Delta lobes have no field.
+      const std::uint32_t field = path.field(depth - 1);
+      if (field == no_field || (depth < path.surfaces() && path.is_gap(depth))) continue;
+      learnt.weigh(field, leaving_luminance(brought, path.throughput(depth - 1)), path.share(depth - 1));
     }
   }
 };

@@ -49,9 +49,10 @@ struct alignas(16) resident_field {
   }
 
  private:
-  // At least one step: 0 would say that there is no field.
+  // 0 would say that there is no field, and 1 that the BSDF never draws.
   WFPG_HD static std::uint16_t stored(float fraction) {
-    return static_cast<std::uint16_t>(max(fraction * 65535.0f + 0.5f, 1.0f));
+    const float steps = clamp(fraction * 65535.0f + 0.5f, 1.0f, fraction < 1.0f ? 65534.0f : 65535.0f);
+    return static_cast<std::uint16_t>(steps);
   }
 };
 

@@ -42,7 +42,7 @@ WFPG_HD constexpr std::uint32_t refreshed_cell(std::uint32_t cone, std::uint32_t
 /// Memory of all kept fields, as the kernels that build them see it. Trivially copyable.
 struct kept_fields_view {
   field_slots_view slots;      ///< state of each slot
-  resident_field* fields;      ///< a slot: normal and fraction
+  resident_field* fields;      ///< a slot: normal and fractions
   std::uint32_t* words;        ///< a slot: its distribution
   cone_hit* hits;              ///< a slot: F² hits in row-major order
   stochastic_mean16* learnt;   ///< a slot: F² means of what paths found; null: fields do not learn

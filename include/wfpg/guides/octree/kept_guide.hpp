@@ -50,7 +50,7 @@ class kept_guide : public octree_scene<Exec> {
                options.max_rays.value_or(options.max_paths), scene::deposits_of_sample()) {}
 
   /// Which fraction of paths is recorded, by deposits_per_leaf. Directions are recorded where fields learn,
-  /// at 8 bytes a vertex.
+  /// at 9 bytes a vertex.
   recording_needs recording() const { return scene::recording(options_.kept.learn); }
 
   /// Call before the waves of a sample. Frees slots that are no longer used. O(slots).
@@ -134,7 +134,9 @@ class kept_guide : public octree_scene<Exec> {
     return options;
   }
   // Whether fractions are learnt: the option, if set, pins them.
-  bool learns_fractions() const { return !options_.guide_fraction; }
+  bool learns_fractions() const { return !options_.guide_fraction && options_.kept.learn; }
+  // Fraction that fields begin with.
+  float first_fraction() const { return scene::fraction().with_enough_rays; }
   // What the store needs of a wave. Draws the wave's points for products.
   //
   // Kept fields begin with one fraction of guided directions, for bins of every size.
@@ -145,7 +147,7 @@ class kept_guide : public octree_scene<Exec> {
             scene::cache(),
             options_.field,
             options_.mode,
-            scene::fraction().with_enough_rays,
+            first_fraction(),
             hash(at.seed, w.depth),
             scene::draw_points(at, w.depth),
             scene::depth_counts(w.depth),

@@ -4,7 +4,8 @@
 //
 // With X = what a direction brought over its density, and a = the guide's share of that density, the fraction
 // becomes E[X a] / E[X]. It is the step of expectation maximisation. Its fixed point has the least divergence
-// between the light that a surface reflects and the mixture.
+// between the light that a surface reflects and the mixture. Delta lobes are left out: only a BSDF whose
+// parts are drawn apart keeps their probability.
 //
 // Source: Mueller (2019), "Path Guiding in Production", section 10.5, learns it by gradients of the same
 // divergence. Means that forget, and what is exact of them, are wfpg's own.
@@ -22,15 +23,19 @@
 
 namespace wfpg {
 
-/// Constants of learnt fractions, with what was measured of them at 64 samples (docs/ablations.md).
+/// Constants of learnt fractions, with what was measured of them at 64 samples of 128 x 128 pixels.
 struct fraction_constants {
-  /// Bounds. An upper one of 0.9 loses 4% in thin-wall, and gains nothing elsewhere.
-  static constexpr float least = 0.1f, most = 0.95f;
+  /// Lower bound: light that moves in is found.
+  static constexpr float least = 0.1f;
+  /// Upper bound. 0.9 loses 4% in thin-wall, and gains nothing elsewhere.
+  static constexpr float most = 0.95f;
   /// Directions that the first fraction counts as.
   static constexpr float first_counts = 32.0f;
   /// Part of what was learnt that the next sample keeps. Older directions had another mixture. 0.97 is no
   /// better.
   static constexpr float kept_part = 0.9f;
+  /// Largest sum of light that a file may have. What a direction brought is at most 1e30.
+  static constexpr float most_light = 1.0e36f;
 };
 
 /// What one sample's directions brought to surfaces of one kind. Integers, so that the order of threads does
@@ -56,13 +61,15 @@ struct field_fractions {
   fraction_means means[2];  ///< of the samples before
   float first = 0.0f;       ///< fraction that the field begins with
 
-  /// Adds what one direction brought, per its density. Any number of threads may call it at once. Drops what
-  /// is negative or not finite. A sample in which nothing had been seen before learns the reference alone.
+  /// Adds what one direction brought, over its density; at most 1e30. Any number of threads may call it at
+  /// once. Drops what is negative or not finite. A sample in which nothing had been seen before learns the
+  /// reference alone.
   WFPG_HD void add(float brought, guide_share share) {
     if (!share.is_known() || !is_finite(brought) || !(brought >= 0.0f)) return;
     const std::uint32_t kind = share.is_narrow() ? 1 : 0;
     fraction_sums& to = sums[kind];
     atomic_add(&to.count, 1);
+    brought = min(brought, 1.0e30f);
     const std::uint32_t bits = float_bits(brought) & 0x7fffffffu;  // without zero's sign
     if (atomic_load(&to.largest) < bits) atomic_max(&to.largest, bits);
     const float reference = means[kind].reference;
@@ -93,8 +100,12 @@ struct field_fractions {
       // One bright direction must not set the scale of all that follow.
       to.reference = clamp(largest, 0.5f * to.reference, most_references * to.reference);
     }
-    if (!(to.light > 0.0f) || !is_finite(to.light)) return now;
+    if (!(to.light > 0.0f && to.count > 0.0f)) return now;
     const float before = fraction_constants::first_counts * (to.light / to.count);
+    if (!is_finite(to.light + before) || !is_finite(to.guided)) {  // too bright for floats: it begins anew
+      to = {};
+      return now;
+    }
     return clamp((to.guided + before * first) / (to.light + before), fraction_constants::least,
                  fraction_constants::most);
   }

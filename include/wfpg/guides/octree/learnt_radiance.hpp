@@ -5,7 +5,7 @@
 // Source: means of radiance by direction are those of Mueller et al., "Practical Path Guiding" (2017). That
 // these fields learn is wfpg's own.
 //
-// Cost: O(1) a deposit. Memory: 2 bytes a cell; in a sample 16 a cell and 8 a value.
+// Cost: O(1) a deposit. Memory: 2 bytes a cell and 88 a field; in a sample 16 a cell and 8 a value.
 #pragma once
 
 #include <wfpg/exec/support/running_mean.hpp>

@@ -1,5 +1,5 @@
-// Owns the memory of kept fields. Each slot has its field's frame and fraction, its distribution, what its
-// cones hit, and what paths found in its cells.
+// Owns the memory of kept fields. Each slot has its field's frame and fractions, its distribution, what
+// its cones hit, what paths found in its cells, and what its fractions learn.
 //
 // Memory: 8 F^2 + 4 F + 16 bytes a slot, and 2 F^2 + 88 more where fields learn. A sample takes 16 bytes a
 // cell and 8 a value.
