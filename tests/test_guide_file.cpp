@@ -242,14 +242,6 @@ WFPG_TEST_CASE("a warm start guides from the first sample, with other options", 
   CHECK(count_guided(exec, view, 200) > 150);
 }
 
-/// A ray's fraction of guided directions; 0 where it has no field.
-struct fraction_of_ray {
-  wfpg::guide_view view;
-  WFPG_HD float operator()(std::size_t ray) const {
-    return view.fields().info(view.number(static_cast<std::uint32_t>(ray))).fraction();
-  }
-};
-
 /// Fractions of a guider's fields, of rays that have one.
 template <class Exec>
 std::vector<float> fractions_of(const Exec& exec, wfpg::path_guider<Exec> guider) {

@@ -235,7 +235,7 @@ WFPG_TEST_CASE("mixture: a direction has the guide's share of its density", "[mi
   const Exec exec;
   const built_field<Exec> built(exec, field_values(field_kind::noise, 16, 3), 16, 0.05f);
   const directional_field field(built.grid(), up);
-  // The delta lobe leaves the guide half of its fraction: the surface is narrow, and has the narrow fraction.
+  // The delta lobe leaves the guide 0.7 of its fraction: the surface is narrow, and has the narrow fraction.
   for (const bool is_coated : {false, true}) {
     const wfpg::surface<coated> s{{}, up, up, toward_eye, coated{{bsdf_kind::lambert, up}, is_coated}, true};
     const guide_mixture whole{field, 0.7f, 5, 0.4f};

@@ -292,14 +292,6 @@ WFPG_TEST_CASE("path guider: rays without a field count when bins are chosen", "
   CHECK(missing.empty());
 }
 
-/// The fractions of the fields that a wave's rays have, each as resident_field stores it.
-struct fraction_of_ray {
-  wfpg::guide_view view;
-  WFPG_HD float operator()(std::size_t ray) const {
-    return view.fields().info(view.number(static_cast<std::uint32_t>(ray))).fraction();
-  }
-};
-
 WFPG_TEST_CASE("path guider: fields learn their fractions, unless an option pins them", "[path_guider]") {
   const Exec exec;
   const float pinned = wfpg::resident_field(wfpg::vec3(0.0f), 0.7f).fraction();

@@ -220,6 +220,14 @@ struct patch_box {
   WFPG_HD float operator()(vec3 p) const { return emitted(p); }
 };
 
+/// A ray's fraction of guided directions on smooth surfaces, as fields store it; 0 where it has no field.
+struct fraction_of_ray {
+  wfpg::guide_view view;
+  WFPG_HD float operator()(std::size_t ray) const {
+    return view.fields().info(view.number(static_cast<std::uint32_t>(ray))).fraction();
+  }
+};
+
 /// Follows a sampled direction to the wall that it hits, and records a vertex there. `World` gives the
 /// emission at a point, and the fraction of paths that continue.
 template <class World>

@@ -31,8 +31,6 @@ struct saved_slot {
   std::uint32_t index = 0;
   field_slot slot;
   resident_field field;
-
-  bool is_built() const { return field.is_built(); }
 };
 
 /// The cells of all slots, on the host.
@@ -140,9 +138,9 @@ struct kept_state {
       slots[saved.index] = saved.slot;
       fields[saved.index] = saved.field;
       keys.push_back(saved.slot.key);
-      if (saved.is_built()) take_cells(bytes, store, saved.index, learnt, pool);
-      if (saved.is_built())
-        set_fractions(first_fraction, learns_fractions, saved.index, fields[saved.index], pool);
+      if (!saved.field.is_built()) continue;
+      take_cells(bytes, store, saved.index, learnt, pool);
+      set_fractions(first_fraction, learns_fractions, saved.index, fields[saved.index], pool);
     }
     std::sort(keys.begin(), keys.end());
     bytes.require(std::adjacent_find(keys.begin(), keys.end()) == keys.end(), "has a field twice");
@@ -193,7 +191,7 @@ struct kept_state {
     bytes.put(s.slot.builds);
     bytes.put(s.field.normal);
     bytes.put(std::uint32_t(s.field.smooth) | std::uint32_t(s.field.narrow) << 16);
-    if (!s.is_built()) return;
+    if (!s.field.is_built()) return;
     put_part(pool.words, store.pool_.words_a_field(), s.index, bytes);
     put_part(pool.hits, store.pool_.cells_a_field(), s.index, bytes);
     if (!store.pool_.learns()) return;
@@ -244,12 +242,13 @@ struct kept_state {
   /// are `first`. Others lie within the bounds of learning, whatever the saved guider's options were.
   static void set_fractions(float first, bool learns, std::size_t slot, resident_field& field,
                             pool_copy& pool) {
-    const bool keeps = learns && !pool.fractions.empty();
-    const auto bounded = [&](float f) {
-      return keeps ? clamp(f, fraction_constants::least, fraction_constants::most) : first;
+    const auto bounded = [](float f) {
+      return clamp(f, fraction_constants::least, fraction_constants::most);
     };
-    const bool is_first = field.fraction() == first && field.narrow_fraction() == first;
-    if (!is_first) field.set_fractions(bounded(field.fraction()), bounded(field.narrow_fraction()));
+    if (learns && !pool.fractions.empty())
+      field.set_fractions(bounded(field.fraction()), bounded(field.narrow_fraction()));
+    else
+      field.set_fractions(first, first);
     if (!pool.fractions.empty()) pool.fractions[slot].first = first;
   }
   static field_fractions take_fractions(section_reader& bytes) {
@@ -283,7 +282,7 @@ struct kept_state {
     bytes.require(is_finite(square) && (!s.field.hemisphere() || (square > 0.5f && square < 2.0f)),
                   "has a normal without unit length");
     bytes.require((s.field.smooth > 0) == (s.field.narrow > 0), "has a field of one fraction");
-    bytes.require(s.is_built() || s.slot.builds == 0, "has a field without cells");
+    bytes.require(s.field.is_built() || s.slot.builds == 0, "has a field without cells");
   }
 
   static void check_cells(const section_reader& bytes, const std::vector<std::uint32_t>& words,

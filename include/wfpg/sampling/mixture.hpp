@@ -134,8 +134,8 @@ struct basic_guide_mixture {
   WFPG_HD basic_kernel_mixture<Field> with(const glossy_part& part) const {
     if (!guides()) return {};
     const float resolved = field.resolved_alpha();
-    return {field, guided_fraction(fraction_at(part, resolved), part, resolved), number,
-            guided_fraction(1.0f, part, resolved)};
+    const float kept = guided_fraction(1.0f, part, resolved);
+    return {field, guided_fraction(fraction_at(kept), part, resolved), number, kept};
   }
 
   /// Draws a direction at a surface, with the mixture's density. `u_technique` in [0, 1) chooses the
@@ -202,9 +202,9 @@ struct basic_guide_mixture {
  private:
   using kernel_mixture_type = basic_kernel_mixture<Field>;
 
-  /// Fraction of a surface with such a part, before the part reduces it.
-  WFPG_HD float fraction_at(const glossy_part& part, float resolved_alpha) const {
-    const bool is_narrow = guided_fraction(1.0f, part, resolved_alpha) < guide_share::least_smooth;
+  /// Fraction of a surface that leaves the guide a part `kept` of it, before that reduces it.
+  WFPG_HD float fraction_at(float kept) const {
+    const bool is_narrow = kept < guide_share::least_smooth;
     return is_narrow && narrow >= 0.0f ? narrow : fraction;
   }
 
@@ -216,8 +216,9 @@ struct basic_guide_mixture {
       return {fraction, 0.0f, 1.0f - fraction};
     else {
       const glossy_part part = s.bsdf.glossy(s.outgoing);
-      const float resolved = field.resolved_alpha(), of_all = fraction_at(part, resolved);
+      const float resolved = field.resolved_alpha();
       kept = guided_fraction(1.0f, part, resolved);
+      const float of_all = fraction_at(kept);
       const float guide = guided_fraction(of_all, part, resolved);
       if constexpr (!has_separate_parts_v<Bsdf>)
         return {guide, 0.0f, 1.0f - guide};

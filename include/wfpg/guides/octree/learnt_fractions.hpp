@@ -39,7 +39,7 @@ struct fraction_constants {
   static constexpr float most_light = 1.0e36f;
 };
 
-/// What one sample's directions brought to surfaces of one kind. Integers, so that the order of threads does
+/// Sums over one sample's directions from surfaces of one kind. Integers, so that the order of threads does
 /// not matter. 24 bytes.
 struct fraction_sums {
   std::uint64_t light = 0;    ///< sum of X, in units of the reference / 2^20
@@ -48,7 +48,8 @@ struct fraction_sums {
   std::uint32_t largest = 0;  ///< float bits of the largest X
 };
 
-/// What directions brought to surfaces of one kind in earlier samples, each forgotten a little. 16 bytes.
+/// Sums over directions of earlier samples from surfaces of one kind, each sample forgotten a little. 16
+/// bytes.
 struct fraction_means {
   float light = 0.0f;      ///< sum of X
   float guided = 0.0f;     ///< sum of X times its share
