@@ -44,6 +44,8 @@ struct order_photons {
 };
 
 struct merge_all {
+  static constexpr bool waits_for_memory = true;
+
   wfpg::path_techniques techniques;
   render::tiled_view<render::subpath_vertex> cameras;
   wfpg::photon_map_view map;

@@ -62,6 +62,21 @@ WFPG_TEST_CASE("index lists have the marked elements in ascending order", "[inde
   }
 }
 
+struct kernel_that_waits : mark_some {
+  static constexpr bool waits_for_memory = true;
+};
+struct kernel_that_computes : mark_some {
+  static constexpr bool waits_for_memory = false;
+};
+
+TEST_CASE("index lists tell a policy which kernels wait for memory", "[index_list]") {
+  using wfpg::detail::call_at_index;
+  using wfpg::detail::waits_for_memory;
+  STATIC_REQUIRE(waits_for_memory<call_at_index<kernel_that_waits>>::value);
+  STATIC_REQUIRE_FALSE(waits_for_memory<call_at_index<kernel_that_computes>>::value);
+  STATIC_REQUIRE_FALSE(waits_for_memory<call_at_index<mark_some>>::value);
+}
+
 WFPG_TEST_CASE("index lists are empty before marks are collected", "[index_list]") {
   const Exec exec;
   const wfpg::index_list<Exec> list(exec, 40);

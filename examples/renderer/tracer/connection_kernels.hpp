@@ -28,6 +28,8 @@ struct start_camera_paths {
 /// the path's segments are merged with photons along them.
 template <class World, bool merges>
 struct trace_camera_paths {
+  static constexpr bool waits_for_memory = merges;
+
   World world;
   std::uint32_t segments;  ///< of the paths, with this one
   tiled_view<subpath> paths;
@@ -249,6 +251,8 @@ struct add_connections {
 /// Adds what the vertex of a camera path finds by merges.
 template <class World>
 struct merge_vertices {
+  static constexpr bool waits_for_memory = true;
+
   World world;
   tiled_view<subpath_vertex> vertices;
   photon_gather photons;

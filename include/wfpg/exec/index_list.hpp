@@ -13,6 +13,7 @@
 #include <wfpg/base/error.hpp>
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/support/thrust.hpp>
+#include <wfpg/exec/support/waits_for_memory.hpp>
 
 #include <thrust/scan.h>
 
@@ -39,6 +40,8 @@ struct collect_indices {
 /// Calls a kernel with the index that a list has at a place.
 template <class F>
 struct call_at_index {
+  static constexpr bool waits_for_memory = detail::waits_for_memory<F>::value;
+
   array_view<const std::uint32_t> indices;  ///< the list
   F f;                                      ///< the kernel
   WFPG_HD void operator()(std::size_t place) const { f(std::size_t(indices[place])); }
