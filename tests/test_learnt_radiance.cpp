@@ -147,17 +147,12 @@ struct deposited_fields {
   wfpg::learnt_radiance_view view() const {
     return {const_view<wfpg::resident_field>(fields), 2, queue.view()};
   }
-  /// Mean and count of every cell. All fields are in use.
+  /// Mean and count of every cell.
   std::vector<stochastic_mean16> means() {
     queue.sum(exec);
-    wfpg::field_slot in_use;
-    in_use.last_used = 1;
-    const wfpg::buffer<wfpg::field_slot, Exec> slots(exec,
-                                                     std::vector<wfpg::field_slot>(fields.size(), in_use));
     const wfpg::buffer<stochastic_mean16, Exec> means(exec,
                                                       std::vector<stochastic_mean16>(fields.size() * cells));
-    exec.for_each_block(fields.size(), 0,
-                        wfpg::detail::fold_learnt{slots.view(), 1, cells, queue.view(), means.data()});
+    exec.for_each_block(fields.size(), 0, wfpg::detail::fold_learnt{1, cells, queue.view(), means.data()});
     return means.to_host(exec);
   }
 };
@@ -217,7 +212,7 @@ WFPG_TEST_CASE("learnt radiance: invalid values, and values without a field, are
     view.deposit(2, up, 1.0f);
     view.deposit(wfpg::no_field, up, 1.0f);
     view.deposit(0, up, 2.0f);
-    view.deposit(1, up, 3e38f);
+    view.deposit(1, up, 4.0f);
     view.deposit(0, up, -0.0f);
     view.deposit(1, up, 5.0f);  // one too many
   });
@@ -231,7 +226,35 @@ WFPG_TEST_CASE("learnt radiance: invalid values, and values without a field, are
   CHECK(counts[0] == 2);
   CHECK(sums[0] == 1.0f);
   CHECK(counts[1] == 1);
-  CHECK(sums[1] > 0x1.fp63f);  // the largest mean
+  CHECK(sums[1] == 4.0f);
+}
+
+WFPG_TEST_CASE("learnt radiance: values beside far brighter ones are learnt", "[learnt_radiance]") {
+  // The cells of 300 fields: the first 128 fields share the unit of their sums.
+  deposited_fields<Exec> deposited(300, 1000);
+  const wfpg::learnt_radiance_view view = deposited.view();
+  const auto mean_of = [&](std::uint32_t field) {
+    const std::vector<stochastic_mean16> means = deposited.means();
+    double sum = 0.0;
+    for (std::uint32_t cell = 0; cell < 4; ++cell) sum += static_cast<double>(means[4 * field + cell].mean());
+    return sum;
+  };
+  deposited.exec.for_each(1, [=] WFPG_HD(std::size_t) {
+    view.deposit(0, up, 1.0e4f);
+    view.deposit(1, up, 1.0e-4f);
+  });
+  CHECK(mean_of(1) == Approx(1.0e-4).epsilon(1.0 / 32));
+  // Infinite light in practice, which would hide others. Fields further away have their own unit.
+  deposited.exec.for_each(1, [=] WFPG_HD(std::size_t) {
+    view.deposit(0, up, 3.0e38f);
+    view.deposit(200, up, 1.0e-4f);
+  });
+  CHECK(mean_of(200) == Approx(1.0e-4).epsilon(1.0 / 32));
+  deposited.exec.for_each(1, [=] WFPG_HD(std::size_t) { view.deposit(0, up, 3.0e38f); });
+  CHECK(mean_of(0) > 0x1.fp63);  // the largest mean
+  // The unit of a sample's sums does not stay for the next one.
+  deposited.exec.for_each(1, [=] WFPG_HD(std::size_t) { view.deposit(1, up, 1.0e-4f); });
+  CHECK(mean_of(1) == Approx(1.0e-4).epsilon(1.0 / 32));
 }
 
 /// Deposits one value in one call, and three in several.
@@ -241,7 +264,6 @@ void deposit_values(const Exec& exec, const wfpg::learnt_radiance_view& view) {
     view.deposit(0, up, 1.0f);
     const std::uint32_t first = view.reserve(3);
     for (std::uint32_t i = 0; i < 3; ++i) view.write(first + i, i, up, 1.0f);
-    for (std::uint32_t i = 0; i < 3; ++i) view.count(first + i);
   });
 }
 

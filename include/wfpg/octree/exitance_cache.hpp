@@ -88,10 +88,7 @@ class exitance_cache_view {
   /// threads may call it at once. Reads see it after exitance_cache::update(). A deposit is dropped and
   /// counted where it is not finite or is negative, lies outside every voxel, or does not fit the queue.
   WFPG_HD void deposit(vec3 position, vec3 direction, float radiance) const {
-    // One thread with one deposit has nothing to overlap.
-    const std::uint32_t entry = reserve(1);
-    write(entry, position, direction, radiance);
-    count(entry);
+    write(reserve(1), position, direction, radiance);
   }
   /// Queues the luminance of linear RGB radiance.
   WFPG_HD void deposit(vec3 position, vec3 direction, vec3 rgb) const {
@@ -99,8 +96,7 @@ class exitance_cache_view {
   }
 
   /// Reserves n entries in a row for one thread and returns the first. The thread then writes each one with
-  /// write(), and after that counts each one with count(). Writing first lets a processor overlap look-ups.
-  /// The atomics of counting would put them in order.
+  /// write(). One reservation for several deposits saves atomics.
   WFPG_HD std::uint32_t reserve(std::uint32_t n) const { return queue_.reserve(n); }
   /// Writes one reserved entry. Parameters and drops are those of deposit().
   WFPG_HD void write(std::uint32_t entry, vec3 position, vec3 direction, float radiance) const {
@@ -113,11 +109,9 @@ class exitance_cache_view {
     // The first reason counts alone: a deposit is dropped once.
     const auto reason = !valid ? counter_invalid : leaf == invalid_node ? counter_outside : counter_overflow;
     atomic_add(counters_ + reason, 1);
-    // A reserved entry must be marked, since count() and update() read it.
+    // A reserved entry must be marked, since update() reads it.
     if (fits) queue_.drop(entry);
   }
-  /// Counts one entry that is written. An entry that was dropped, or did not fit the queue, is skipped.
-  WFPG_HD void count(std::uint32_t entry) const { queue_.count(entry); }
 
  private:
   template <class Exec>

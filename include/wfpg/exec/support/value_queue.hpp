@@ -2,10 +2,13 @@
 // Threads queue values as they come.
 // The end of a sample adds them up in integers.
 // Results have the same bits however threads interleave, which float atomics do not give.
+// 512 neighbouring keys form a group, whose sums have one unit.
+// So a thread that queues a value touches no memory of its key.
+// With room for 2²⁰ values, those down to 2⁻¹⁹ of their group's largest keep all 24 bits.
+// Below 2⁻⁴³ they count as 0.
 // Source: sums of floats in fixed point, as in reproducible summation (Demmel and Nguyen 2013).
 // Cost: three atomics a value: its place, its count and its sum.
-// Emptying the queue resets one counter.
-// Memory: 8 bytes for each value of the capacity, 16 for each key, and 4.
+// Memory: 8 bytes for each value of the capacity, 16 for each key, 8 for each group, and 4.
 #pragma once
 
 #include <wfpg/base/math.hpp>
@@ -20,11 +23,16 @@ namespace wfpg::detail {
 /// Largest capacity of a queue: the 32-bit counter cannot wrap around beyond it.
 inline constexpr std::size_t most_queued = std::size_t(1) << 31;
 
-/// What a key has received since the last take(). 16 bytes.
+/// What a key has received in the sample. 16 bytes, so that it lies in one line of a cache.
 struct pending_values {
-  std::uint64_t sum = 0;      ///< in units of exact_sum; 0 until the queue is summed
-  std::uint32_t count = 0;    ///< values queued for the key
-  std::uint32_t largest = 0;  ///< bits of the largest value, which sets the unit of the sum
+  std::uint64_t sum = 0;    ///< in units of its group's exact_sum
+  std::uint64_t count = 0;  ///< values in the sum
+};
+
+/// What a group of keys has received. 8 bytes.
+struct pending_group {
+  std::uint32_t largest = 0;  ///< in the queue: bits of the largest value, plus 1; 0: there is none
+  std::uint32_t summed = 0;   ///< as `largest` was when the queue was summed last
 };
 
 /// Adds `n` values with the given sum to a mean of `count` values.
@@ -44,7 +52,7 @@ WFPG_HD inline void add_to_mean(double& mean, std::uint32_t& count, double sum, 
 class exact_sum {
  public:
   /// `largest`: bits of the largest value.
-  /// `n`: the number of values, in [1, 2³¹].
+  /// `n`: at least the number of values, in [1, 2³¹].
   WFPG_HD exact_sum(std::uint32_t largest, std::uint32_t n)
       : exponent_(exponent(largest)), shift_(39 - bits_of(n - 1)) {}
   /// Returns a value, given by its float bits, in these units.
@@ -73,13 +81,11 @@ class exact_sum {
 
 /// View of a queue, for kernels.
 /// A default-constructed one has room for nothing.
-/// A thread reserves entries, writes or drops each that fits, and then counts each.
+/// A thread reserves entries, and writes or drops each that fits.
 class value_queue_view {
  public:
   /// Reserves n entries in a row, and returns the first.
   /// They may lie beyond the capacity: ask fits().
-  /// Write or drop all of a thread's entries before counting the first.
-  /// A processor then overlaps its look-ups, which the atomics of counting would order.
   WFPG_HD std::uint32_t reserve(std::uint32_t n) const {
     // Asked first, so that what comes to a full queue does not count on until the counter begins again. A
     // default view has no counter.
@@ -90,45 +96,52 @@ class value_queue_view {
   /// Values that do not fit are lost.
   WFPG_HD bool fits(std::uint32_t entry) const { return entry < capacity_; }
 
-  /// Writes a value for a key.
+  /// Writes a value for a key, and raises the largest value of the key's group.
   /// Preconditions: the entry fits, and the value is finite and not negative.
   WFPG_HD void write(std::uint32_t entry, std::uint32_t key, float value) const {
-    queue_[entry] = std::uint64_t(float_bits(value) & 0x7fffffffu) << 32 | key;  // without zero's sign
-    prefetch(pending_ + key);                                                    // for count()
+    const std::uint32_t bits = float_bits(value) & 0x7fffffffu;  // without zero's sign
+    queue_[entry] = std::uint64_t(bits) << 32 | key;
+    std::uint32_t& largest = groups_[group_of(key)].largest;
+    if (atomic_load(&largest) <= bits) atomic_max(&largest, bits + 1);
   }
   /// Leaves a reserved entry without a value.
   /// Precondition: the entry fits.
   WFPG_HD void drop(std::uint32_t entry) const { queue_[entry] = dropped; }
-  /// Counts an entry for its key, and raises the key's largest value.
-  /// Entries that do not fit are ignored.
-  WFPG_HD void count(std::uint32_t entry) const {
-    if (!fits(entry) || queue_[entry] == dropped) return;
-    pending_values& pending = pending_[key_of(queue_[entry])];
-    const std::uint32_t bits = bits_of_value(queue_[entry]);
-    atomic_add(&pending.count, 1);
-    if (atomic_load(&pending.largest) < bits) atomic_max(&pending.largest, bits);
-  }
 
   /// Adds an entry to its key's sum.
-  /// Precondition: all entries are counted.
+  /// Precondition: set_unit() was called for all groups.
   WFPG_HD void add(std::uint32_t entry) const {
     constexpr std::uint32_t ahead = 16;  // as many lines as a processor may wait for
     if (entry + ahead < min(*queued_, capacity_) && queue_[entry + ahead] != dropped)
       prefetch(pending_ + key_of(queue_[entry + ahead]));
     if (queue_[entry] == dropped) return;
-    pending_values& to = pending_[key_of(queue_[entry])];
-    atomic_add(&to.sum, exact_sum(to.largest, to.count).term(bits_of_value(queue_[entry])));
+    const std::uint32_t key = key_of(queue_[entry]);
+    pending_values& to = pending_[key];
+    atomic_add(&to.sum, unit_of(groups_[group_of(key)]).term(bits_of_value(queue_[entry])));
+    atomic_add(&to.count, std::uint64_t(1));
+  }
+  /// Chooses the unit of a group's sums, from the values in the queue.
+  /// The next sample's values find their own largest one.
+  /// One thread a group.
+  WFPG_HD void set_unit(std::size_t group) const { groups_[group] = {0, groups_[group].largest}; }
+  /// Whether one of n keys may have received a value. O(n / 512).
+  WFPG_HD bool has_values(std::size_t first, std::size_t n) const {
+    for (std::size_t g = first / keys_a_group; n > 0 && g <= (first + n - 1) / keys_a_group; ++g)
+      if (groups_[g].summed != 0) return true;
+    return false;
   }
   /// Returns how many values a key has received, and forgets them.
   /// `sum` becomes their sum.
   /// `sum` is left as it is where there are none.
   /// One thread takes a key.
   WFPG_HD std::uint32_t take(std::size_t key, double& sum) const {
+    const pending_group& group = groups_[key / keys_a_group];
+    if (group.summed == 0) return 0;
     const pending_values from = pending_[key];
     if (from.count == 0) return 0;
-    sum = exact_sum(from.largest, from.count).value(from.sum);
+    sum = unit_of(group).value(from.sum);
     pending_[key] = {};
-    return from.count;
+    return static_cast<std::uint32_t>(from.count);
   }
 
  private:
@@ -136,6 +149,15 @@ class value_queue_view {
   friend class value_queue;
   static constexpr std::uint64_t dropped = 0xffffffffull;  // an entry that is no key's
 
+  /// So many that the groups of a million keys lie in a processor's first cache.
+  static constexpr std::uint32_t keys_a_group = 512;
+  /// Returns the number of groups of `keys` keys.
+  static constexpr std::size_t groups(std::size_t keys) { return (keys + keys_a_group - 1) / keys_a_group; }
+
+  /// Returns the group that a key belongs to.
+  WFPG_HD static std::uint32_t group_of(std::uint32_t key) { return key / keys_a_group; }
+  /// Returns the unit of a group that has received values. There are at most as many as the queue holds.
+  WFPG_HD exact_sum unit_of(const pending_group& group) const { return {group.summed - 1, capacity_}; }
   /// Returns the key of an entry, its lower half.
   WFPG_HD static std::uint32_t key_of(std::uint64_t entry) { return static_cast<std::uint32_t>(entry); }
   /// Returns the float bits of an entry's value, its upper half.
@@ -145,11 +167,20 @@ class value_queue_view {
 
   std::uint64_t* queue_ = nullptr;  // bits of the value above, the key below
   pending_values* pending_ = nullptr;
+  pending_group* groups_ = nullptr;
   std::uint32_t* queued_ = nullptr;
   std::uint32_t capacity_ = 0;
 };
 
+/// Functor that chooses the unit of group i.
+/// It runs between the kernels that queue values and add_queued_values.
+struct set_group_unit {
+  value_queue_view queue;
+  WFPG_HD void operator()(std::size_t i) const { queue.set_unit(i); }
+};
+
 /// Functor that adds entry i to its key's sum.
+/// Entries without a value are passed over.
 struct add_queued_values {
   value_queue_view queue;
   WFPG_HD void operator()(std::size_t i) const { queue.add(static_cast<std::uint32_t>(i)); }
@@ -167,9 +198,13 @@ class value_queue {
   /// Without capacity it takes 4 bytes.
   /// Throws out_of_memory.
   value_queue(const Exec& exec, std::size_t capacity, std::size_t keys)
-      : queue_(exec, capacity), pending_(exec, capacity > 0 ? keys : 0), queued_(exec, 1) {
+      : queue_(exec, capacity),
+        pending_(exec, capacity > 0 ? keys : 0),
+        groups_(exec, value_queue_view::groups(pending_.size())),
+        queued_(exec, 1) {
     view_.queue_ = queue_.data();
     view_.pending_ = pending_.data();
+    view_.groups_ = groups_.data();
     view_.queued_ = queued_.data();
     view_.capacity_ = static_cast<std::uint32_t>(capacity);
     clear(exec);
@@ -181,15 +216,18 @@ class value_queue {
   /// Returns the number of values that fit between two sums.
   std::size_t capacity() const { return queue_.size(); }
   /// Returns the memory in use, bytes.
-  std::size_t bytes() const { return queue_.bytes() + pending_.bytes() + queued_.bytes(); }
+  std::size_t bytes() const { return queue_.bytes() + pending_.bytes() + groups_.bytes() + queued_.bytes(); }
 
   /// Forgets all values, those that are summed and not yet taken included. O(keys).
   void clear(const Exec& exec) {
     exec.fill_bytes(pending_.data(), 0, pending_.bytes());
+    exec.fill_bytes(groups_.data(), 0, groups_.bytes());
     empty(exec);
   }
   /// Adds the queued values to their keys' sums, for take(), and empties the queue. O(values).
+  /// Precondition: all keys that had values after the last sum() were taken.
   void sum(const Exec& exec) {
+    exec.for_each(groups_.size(), set_group_unit{view_});
     exec.for_each(exec::device_count{queued_.data(), queue_.size()}, add_queued_values{view_});
     empty(exec);
   }
@@ -199,6 +237,7 @@ class value_queue {
 
   buffer<std::uint64_t, Exec> queue_;
   buffer<pending_values, Exec> pending_;  // a key
+  buffer<pending_group, Exec> groups_;    // 512 keys
   buffer<std::uint32_t, Exec> queued_;
   value_queue_view view_;
 };

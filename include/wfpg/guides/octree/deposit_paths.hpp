@@ -26,8 +26,8 @@ struct deposit_path {
   exitance_cache_view cache;    ///< receives what leaves each surface
   learnt_radiance_view learnt;  ///< receives what arrives along directions; may be empty
 
-  /// Deposits path `place` of those recorded. O(vertices). It writes all entries of the path before it counts
-  /// them, so that look-ups overlap.
+  /// Deposits path `place` of those recorded. O(vertices). It begins at the last vertex, since what leaves a
+  /// surface is the sum of all that arrives after it.
   WFPG_HD void operator()(std::size_t place) const {
     const recorded_path path(paths, place);
     const std::uint32_t vertices = path.vertices(), surfaces = path.surfaces();
@@ -49,9 +49,6 @@ struct deposit_path {
         learnt.write(first_found + depth - 1, gap ? no_field : path.field(depth - 1),
                      path.direction(depth - 1), leaving);
     }
-    // Counting is atomic, and would order the look-ups of the writes above.
-    for (std::uint32_t i = 0; i < known; ++i) cache.count(first + i);
-    for (std::uint32_t i = 0; i < found; ++i) learnt.count(first_found + i);
     if (found > 0 && learnt.learns_fractions()) weigh(path, vertices);
   }
 

@@ -37,14 +37,11 @@ class learnt_radiance_view {
   /// Drops radiance that is negative or not finite, unknown fields, and directions outside a field's
   /// hemisphere. Drops what exceeds the queue's capacity. Radiance is clamped to 1e30.
   WFPG_HD void deposit(std::uint32_t field, vec3 direction, float radiance) const {
-    const std::uint32_t entry = reserve(1);
-    write(entry, field, direction, radiance);
-    count(entry);
+    write(reserve(1), field, direction, radiance);
   }
 
   /// Reserves `n` entries in a row and returns the first, for a thread with several values. Each entry must
-  /// be written, then each counted. Writing first lets a processor overlap look-ups, which counting's atomics
-  /// would order. An entry may lie beyond the capacity: write() and count() then do nothing.
+  /// be written. An entry may lie beyond the capacity: write() then does nothing.
   WFPG_HD std::uint32_t reserve(std::uint32_t n) const { return queue_.reserve(n); }
   /// Writes one reserved entry: `radiance` that arrives along `direction`. Values that deposit() drops become
   /// empty entries.
@@ -64,9 +61,6 @@ class learnt_radiance_view {
   WFPG_HD void weigh(std::uint32_t field, float brought, guide_share share) const {
     if (field < fields_.size()) fractions_[field].add(brought, share);
   }
-
-  /// Counts a reserved entry, after it was written. Call it once an entry.
-  WFPG_HD void count(std::uint32_t entry) const { queue_.count(entry); }
 
  private:
   /// Finds the cell of a direction, numbered over all fields: field * F² + row-major index. False outside the

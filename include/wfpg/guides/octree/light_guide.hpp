@@ -88,7 +88,6 @@ class light_guide_view {
     const float scattered = estimate * probability(first_row_ + key / rows_.groups, key % rows_.groups);
     if (!(scattered >= 0.0f) || !is_finite(scattered)) return queue_.drop(entry);
     queue_.write(entry, key, min(scattered, most));
-    queue_.count(entry);
   }
 
  private:

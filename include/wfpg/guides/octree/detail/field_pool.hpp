@@ -18,9 +18,8 @@
 
 namespace wfpg::detail {
 
-/// Kernel: adds the values of a sample to the means of the fields used in it. A block folds one field.
+/// Kernel: adds the values of a sample to the means of the fields that received any. A block folds one field.
 struct fold_learnt {
-  array_view<field_slot> slots;
   std::uint32_t sample;
   std::uint32_t cells;  // of a field; all together fewer than 2^32
   value_queue_view queue;
@@ -28,8 +27,8 @@ struct fold_learnt {
 
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t slot) const {
-    if (slots[slot].last_used != sample) return;
     const std::size_t first = slot * cells;
+    if (!queue.has_values(first, cells)) return;
     block.for_each(static_cast<int>(cells), [&](int i) {
       const std::size_t cell = first + static_cast<std::size_t>(i);
       double sum;
@@ -100,14 +99,14 @@ class field_pool {
     return {array_view<const resident_field>(fields_.data(), fields_.size()), resolution_, queue_.view(),
             with_fractions ? fractions_.data() : nullptr};
   }
-  /// Adds the recorded values to the means and fractions of the fields that were used in `sample`. O(values +
-  /// cells of these fields).
+  /// Adds the recorded values to the means of their fields, and to the fractions of those that were used in
+  /// `sample`. O(values + cells of these fields).
   void learn(const Exec& exec, array_view<field_slot> slots, std::uint32_t sample) {
     if (!learns()) return;
     exec.for_each(fields_.size(), learn_fractions{slots, sample, fractions_.data(), fields_.data()});
     queue_.sum(exec);
     exec.for_each_block(fields_.size(), 0,
-                        fold_learnt{slots, sample, cells_a_field(), queue_.view(), learnt_.data()});
+                        fold_learnt{sample, cells_a_field(), queue_.view(), learnt_.data()});
   }
   /// Forgets all means and fractions, and values recorded since the last learn().
   void forget(const Exec& exec) {

@@ -70,7 +70,6 @@ struct learn_path {
       arriving += path.contribution(next);
       write(first + next - 1, path, next, arriving);
     }
-    for (std::uint32_t i = 0; i < n - 1; ++i) queue.count(first + i);
   }
 
  private:
