@@ -44,7 +44,7 @@ struct order_photons {
 };
 
 struct merge_all {
-  static constexpr bool waits_for_memory = true;
+  [[maybe_unused]] static constexpr bool waits_for_memory = true;
 
   wfpg::path_techniques techniques;
   render::tiled_view<render::subpath_vertex> cameras;

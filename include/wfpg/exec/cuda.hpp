@@ -151,18 +151,34 @@ inline __device__ std::size_t count_of(exec::device_count n) {
 /// Threads of a block of loops over indices.
 /// Few, so that a block whose last ray takes long holds few others up.
 constexpr unsigned index_threads = 128;
-/// Such blocks that a multiprocessor holds at least: bounds a kernel's registers.
-/// Functors that wait for memory have 8, and so 64 registers a thread.
-/// Measured by merges of photons and beams: 10 blocks take 1.0 to 1.1 times as long, 5 take 1.0 to 1.4 times.
-template <class F>
-constexpr unsigned least_index_blocks = waits_for_memory<F>::value ? 8 : 1;
 
 /// Calls f(i) for each index below n.
 /// Strides by the grid's size, so that any grid does all of the work.
 template <class Count, class F>
-__global__ void __launch_bounds__(index_threads, least_index_blocks<F>) for_each_kernel(Count n, F f) {
+__device__ void call_for_each(Count n, const F& f) {
   const std::size_t count = count_of(n), stride = std::size_t(gridDim.x) * blockDim.x;
   for (std::size_t i = std::size_t(blockIdx.x) * blockDim.x + threadIdx.x; i < count; i += stride) f(i);
+}
+/// Kernel of a loop over indices. Its registers are not bounded.
+/// Even a bound of one block makes nvcc choose otherwise, and tracing take a tenth longer.
+template <class Count, class F>
+__global__ void for_each_kernel(Count n, F f) {
+  call_for_each(n, f);
+}
+/// Kernel of a loop that waits for memory.
+/// A multiprocessor holds 8 blocks at least, so a thread has 64 registers.
+/// Measured by merges of photons and beams: 10 blocks take 1.0 to 1.1 times as long, 5 take 1.0 to 1.4 times.
+template <class Count, class F>
+__global__ void __launch_bounds__(index_threads, 8) for_each_waiting_kernel(Count n, F f) {
+  call_for_each(n, f);
+}
+/// Returns the kernel of a loop that calls an F.
+template <class Count, class F>
+auto index_kernel() {
+  if constexpr (waits_for_memory<F>::value)
+    return for_each_waiting_kernel<Count, F>;
+  else
+    return for_each_kernel<Count, F>;
 }
 
 /// Gives each warp the run of its 32 threads' indices.
@@ -300,7 +316,7 @@ class cuda {
   void for_each(std::size_t n, const F& f) const {
     if (n == 0) return;
     const std::size_t blocks = (n + threads - 1) / threads;
-    launch(wfpg::detail::for_each_kernel<std::size_t, F>, blocks, threads, 0, n, f);
+    launch(wfpg::detail::index_kernel<std::size_t, F>(), blocks, threads, 0, n, f);
   }
   /// Calls f(i) for a number of indices that only the device knows.
   /// The host does not wait for it.
@@ -309,7 +325,7 @@ class cuda {
   void for_each(device_count n, const F& f) const {
     if (n.capacity == 0) return;
     const std::size_t blocks = (n.capacity + threads - 1) / threads;
-    launch(wfpg::detail::for_each_kernel<device_count, F>, at_most_resident(blocks), threads, 0, n, f);
+    launch(wfpg::detail::index_kernel<device_count, F>(), at_most_resident(blocks), threads, 0, n, f);
   }
 
   /// Calls f(run) for runs that make up [0, n), a warp each, in no order; also where n is 0.

@@ -29,12 +29,6 @@ struct pending_values {
   std::uint64_t count = 0;  ///< values in the sum
 };
 
-/// What a group of keys has received. 8 bytes.
-struct pending_group {
-  std::uint32_t largest = 0;  ///< in the queue: bits of the largest value, plus 1; 0: there is none
-  std::uint32_t summed = 0;   ///< as `largest` was when the queue was summed last
-};
-
 /// Adds `n` values with the given sum to a mean of `count` values.
 /// The count stays at `most` once it is reached: from then on old values fade, and nothing overflows.
 /// Precondition: n > 0.
@@ -82,6 +76,7 @@ class exact_sum {
 /// View of a queue, for kernels.
 /// A default-constructed one has room for nothing.
 /// A thread reserves entries, and writes or drops each that fits.
+/// Then sum() of the queue adds them, and one thread a key takes what came of them.
 class value_queue_view {
  public:
   /// Reserves n entries in a row, and returns the first.
@@ -101,14 +96,16 @@ class value_queue_view {
   WFPG_HD void write(std::uint32_t entry, std::uint32_t key, float value) const {
     const std::uint32_t bits = float_bits(value) & 0x7fffffffu;  // without zero's sign
     queue_[entry] = std::uint64_t(bits) << 32 | key;
-    std::uint32_t& largest = groups_[group_of(key)].largest;
+    std::uint32_t& largest = largest_[group_of(key)];
     if (atomic_load(&largest) <= bits) atomic_max(&largest, bits + 1);
   }
   /// Leaves a reserved entry without a value.
+  /// Entries that are reserved and neither written nor dropped hold what earlier samples left.
   /// Precondition: the entry fits.
   WFPG_HD void drop(std::uint32_t entry) const { queue_[entry] = dropped; }
 
   /// Adds an entry to its key's sum.
+  /// Entries ahead are fetched, as they are scattered over the keys.
   /// Precondition: set_unit() was called for all groups.
   WFPG_HD void add(std::uint32_t entry) const {
     constexpr std::uint32_t ahead = 16;  // as many lines as a processor may wait for
@@ -117,26 +114,30 @@ class value_queue_view {
     if (queue_[entry] == dropped) return;
     const std::uint32_t key = key_of(queue_[entry]);
     pending_values& to = pending_[key];
-    atomic_add(&to.sum, unit_of(groups_[group_of(key)]).term(bits_of_value(queue_[entry])));
+    atomic_add(&to.sum, unit_of(group_of(key)).term(bits_of_value(queue_[entry])));
     atomic_add(&to.count, std::uint64_t(1));
   }
   /// Chooses the unit of a group's sums, from the values in the queue.
-  /// The next sample's values find their own largest one.
+  /// A group without any keeps its unit, so that a sum that failed can be repeated.
   /// One thread a group.
-  WFPG_HD void set_unit(std::size_t group) const { groups_[group] = {0, groups_[group].largest}; }
-  /// Whether one of n keys may have received a value. O(n / 512).
+  WFPG_HD void set_unit(std::size_t group) const {
+    if (largest_[group] != 0) units_[group] = largest_[group];
+  }
+  /// Whether one of n keys may have received a value since the queue was cleared. O(n / 512).
+  /// Groups are asked: values of neighbouring keys count, too.
   WFPG_HD bool has_values(std::size_t first, std::size_t n) const {
     for (std::size_t g = first / keys_a_group; n > 0 && g <= (first + n - 1) / keys_a_group; ++g)
-      if (groups_[g].summed != 0) return true;
+      if (units_[g] != 0) return true;
     return false;
   }
   /// Returns how many values a key has received, and forgets them.
+  /// Asks its group first, so that keys of groups that never received any are not read.
   /// `sum` becomes their sum.
   /// `sum` is left as it is where there are none.
   /// One thread takes a key.
   WFPG_HD std::uint32_t take(std::size_t key, double& sum) const {
-    const pending_group& group = groups_[key / keys_a_group];
-    if (group.summed == 0) return 0;
+    const std::size_t group = key / keys_a_group;
+    if (units_[group] == 0) return 0;
     const pending_values from = pending_[key];
     if (from.count == 0) return 0;
     sum = unit_of(group).value(from.sum);
@@ -157,7 +158,7 @@ class value_queue_view {
   /// Returns the group that a key belongs to.
   WFPG_HD static std::uint32_t group_of(std::uint32_t key) { return key / keys_a_group; }
   /// Returns the unit of a group that has received values. There are at most as many as the queue holds.
-  WFPG_HD exact_sum unit_of(const pending_group& group) const { return {group.summed - 1, capacity_}; }
+  WFPG_HD exact_sum unit_of(std::size_t group) const { return {units_[group] - 1, capacity_}; }
   /// Returns the key of an entry, its lower half.
   WFPG_HD static std::uint32_t key_of(std::uint64_t entry) { return static_cast<std::uint32_t>(entry); }
   /// Returns the float bits of an entry's value, its upper half.
@@ -167,7 +168,8 @@ class value_queue_view {
 
   std::uint64_t* queue_ = nullptr;  // bits of the value above, the key below
   pending_values* pending_ = nullptr;
-  pending_group* groups_ = nullptr;
+  std::uint32_t* largest_ = nullptr;  // a group: bits of the largest value in the queue, plus 1; or 0
+  std::uint32_t* units_ = nullptr;    // a group: what largest_ was when its values were summed last
   std::uint32_t* queued_ = nullptr;
   std::uint32_t capacity_ = 0;
 };
@@ -200,11 +202,13 @@ class value_queue {
   value_queue(const Exec& exec, std::size_t capacity, std::size_t keys)
       : queue_(exec, capacity),
         pending_(exec, capacity > 0 ? keys : 0),
-        groups_(exec, value_queue_view::groups(pending_.size())),
+        largest_(exec, value_queue_view::groups(pending_.size())),
+        units_(exec, largest_.size()),
         queued_(exec, 1) {
     view_.queue_ = queue_.data();
     view_.pending_ = pending_.data();
-    view_.groups_ = groups_.data();
+    view_.largest_ = largest_.data();
+    view_.units_ = units_.data();
     view_.queued_ = queued_.data();
     view_.capacity_ = static_cast<std::uint32_t>(capacity);
     clear(exec);
@@ -216,28 +220,35 @@ class value_queue {
   /// Returns the number of values that fit between two sums.
   std::size_t capacity() const { return queue_.size(); }
   /// Returns the memory in use, bytes.
-  std::size_t bytes() const { return queue_.bytes() + pending_.bytes() + groups_.bytes() + queued_.bytes(); }
+  std::size_t bytes() const {
+    return queue_.bytes() + pending_.bytes() + largest_.bytes() + units_.bytes() + queued_.bytes();
+  }
 
   /// Forgets all values, those that are summed and not yet taken included. O(keys).
+  /// The memory stays.
   void clear(const Exec& exec) {
     exec.fill_bytes(pending_.data(), 0, pending_.bytes());
-    exec.fill_bytes(groups_.data(), 0, groups_.bytes());
+    exec.fill_bytes(units_.data(), 0, units_.bytes());
     empty(exec);
   }
   /// Adds the queued values to their keys' sums, for take(), and empties the queue. O(values).
   /// Precondition: all keys that had values after the last sum() were taken.
   void sum(const Exec& exec) {
-    exec.for_each(groups_.size(), set_group_unit{view_});
+    exec.for_each(units_.size(), set_group_unit{view_});
     exec.for_each(exec::device_count{queued_.data(), queue_.size()}, add_queued_values{view_});
     empty(exec);
   }
 
  private:
-  void empty(const Exec& exec) { ::thrust::fill_n(exec.thrust(), queued_.data(), queued_.size(), 0u); }
+  void empty(const Exec& exec) {
+    // The counter first: should the second call fail, later values have a coarser unit than they need.
+    ::thrust::fill_n(exec.thrust(), queued_.data(), queued_.size(), 0u);
+    exec.fill_bytes(largest_.data(), 0, largest_.bytes());
+  }
 
   buffer<std::uint64_t, Exec> queue_;
-  buffer<pending_values, Exec> pending_;  // a key
-  buffer<pending_group, Exec> groups_;    // 512 keys
+  buffer<pending_values, Exec> pending_;         // a key
+  buffer<std::uint32_t, Exec> largest_, units_;  // a group
   buffer<std::uint32_t, Exec> queued_;
   value_queue_view view_;
 };
