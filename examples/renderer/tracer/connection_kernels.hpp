@@ -28,7 +28,7 @@ struct start_camera_paths {
 /// the path's segments are merged with photons along them.
 template <class World, bool merges>
 struct trace_camera_paths {
-  static constexpr bool waits_for_memory = merges;
+  static constexpr bool waits_for_memory = true;
 
   World world;
   std::uint32_t segments;  ///< of the paths, with this one
@@ -194,6 +194,8 @@ struct path_connections {
 
 /// Evaluates connections without what is between their ends. An index is a stored vertex.
 struct evaluate_connections {
+  static constexpr bool waits_for_memory = true;
+
   path_connections connections;
   wfpg::array_view<const std::uint32_t> joins;  ///< by path: 1 where the camera path's vertex can be joined
   wfpg::array_view<std::uint32_t> marks;        ///< receives 1 where light may come, else 0
@@ -215,6 +217,8 @@ struct evaluate_connections {
 /// Looks what is between the ends of connections, and weights them. An index is a stored vertex.
 template <class World>
 struct join_connections {
+  static constexpr bool waits_for_memory = true;
+
   World world;
   path_connections connections;
 

@@ -90,6 +90,8 @@ struct trace_light_paths {
 /// Connects the new vertex of an active light path to the camera.
 template <class World>
 struct splat_light_paths {
+  static constexpr bool waits_for_memory = true;
+
   World world;
   pinhole camera;
   tiled_view<subpath_vertex> vertices;
