@@ -153,6 +153,7 @@ struct deposited_fields {
     const wfpg::buffer<stochastic_mean16, Exec> means(exec,
                                                       std::vector<stochastic_mean16>(fields.size() * cells));
     exec.for_each_block(fields.size(), 0, wfpg::detail::fold_learnt{1, cells, queue.view(), means.data()});
+    queue.end_takes(exec);
     return means.to_host(exec);
   }
 };
@@ -252,6 +253,15 @@ WFPG_TEST_CASE("learnt radiance: values beside far brighter ones are learnt", "[
   CHECK(mean_of(200) == Approx(1.0e-4).epsilon(1.0 / 32));
   deposited.exec.for_each(1, [=] WFPG_HD(std::size_t) { view.deposit(0, up, 3.0e38f); });
   CHECK(mean_of(0) > 0x1.fp63);  // the largest mean
+  // Dark values alone count, too.
+  deposited.exec.for_each(1, [=] WFPG_HD(std::size_t) { view.deposit(290, up, 0.0f); });
+  std::uint32_t counts = 0;
+  for (const stochastic_mean16& mean : deposited.means()) counts += mean.count();
+  CHECK(counts == 1);
+  // Sums that are not taken, as where a fold fails, are forgotten once their keys' group has new values.
+  // In the next unit this one would be 0.6 of the value below.
+  deposited.exec.for_each(1, [=] WFPG_HD(std::size_t) { view.deposit(1, up, 0x1p40f); });
+  deposited.queue.sum(deposited.exec);
   // The unit of a sample's sums does not stay for the next one.
   deposited.exec.for_each(1, [=] WFPG_HD(std::size_t) { view.deposit(1, up, 1.0e-4f); });
   CHECK(mean_of(1) == Approx(1.0e-4).epsilon(1.0 / 32));

@@ -328,6 +328,17 @@ TEST_CASE("the next call reports a launch that failed before", "[cuda]") {
   CHECK(wfpg::read_element(exec, word.data()) == 7);
 }
 
+struct waiting_kernel : set_word {
+  static constexpr bool waits_for_memory = true;
+};
+
+TEST_CASE("kernels that wait for memory have bounded registers, others have not", "[cuda]") {
+  namespace detail = wfpg::detail;
+  CHECK(detail::index_kernel<std::size_t, waiting_kernel>() ==
+        detail::for_each_waiting_kernel<std::size_t, waiting_kernel>);
+  CHECK(detail::index_kernel<std::size_t, set_word>() == detail::for_each_kernel<std::size_t, set_word>);
+}
+
 // Needs its own process, since it breaks the GPU's context.
 TEST_CASE("every call reports a kernel that failed before", "[.][cuda][sticky]") {
   const cuda_policy exec;

@@ -213,6 +213,7 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(d::find_child_masks{});
   launch(d::leaf_normals{});
   launch(d::inner_normals{});
+  launch(d::set_group_unit{});
   launch(d::add_queued_values{});
   launch(d::fold_deposits{});
   launch(d::average_children{});

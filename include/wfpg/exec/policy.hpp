@@ -15,7 +15,8 @@
 //                                stable; the low `bits` bits of the unsigned keys are in their order
 //   3. a loop over indices:      void for_each(n, f) const;  f(i), in no order; f is a functor with a const
 //                                operator() that the device can call. Where f has a static constexpr bool
-//                                waits_for_memory that is true, more of its threads may be resident on a GPU
+//                                waits_for_memory that is true, more of its threads may be resident on a
+//                                GPU; so in a loop over blocks, but not in a loop in steps
 //   4. a loop in steps:          void for_each_run(n, f) const;  f(run): indices that go through f's steps
 //                                together, a warp's on a GPU, up to 32 on a CPU (exec/cpu_policy.hpp says
 //                                what a run offers)

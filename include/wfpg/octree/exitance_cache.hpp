@@ -1,8 +1,9 @@
 // The exitance cache: what light leaves each node of the octree (paper, section 3.2). For either side of a
 // voxel it stores mean outgoing radiance: exitance / pi, luminance, W/(m² sr).
 //
-// Each voxel has two normals, found by k-means. Deposits wait in a queue. update() sums them exactly and
-// folds the sums into running means, so any order of arrival gives the same bits. Inner nodes get averages,
+// Each voxel has two normals, found by k-means. Deposits wait in a queue. update() sums them in integers and
+// folds the sums into running means, so any order of arrival gives the same bits. Deposits that are 2⁴³ times
+// darker than others of the sample nearby count as 0. Inner nodes get averages,
 // bottom-up.
 //
 // Cost: a deposit is one look-up of a leaf, O(depth); update() is O(deposits + nodes). Memory: 26 bytes a
@@ -227,6 +228,7 @@ class exitance_cache {
     // Values become exact sums by key, then means by leaf, and then averages by inner node.
     queue_.sum(exec);
     exec.for_each(leaves_.size(), detail::fold_deposits{queue_.view(), leaves_.data()});
+    queue_.end_takes(exec);
     detail::for_each_bottom_up(exec, view_.tree_, 0, detail::average_children{view_, inner_radiance_.data()});
   }
 

@@ -4,10 +4,10 @@
 // Results have the same bits however threads interleave, which float atomics do not give.
 // 512 neighbouring keys form a group, whose sums have one unit.
 // So a thread that queues a value touches no memory of its key.
-// With room for 2²⁰ values, those down to 2⁻¹⁹ of their group's largest keep all 24 bits.
+// Of 2²⁰ values, those down to 2⁻¹⁹ of their group's largest keep all 24 bits.
 // Below 2⁻⁴³ they count as 0.
 // Source: sums of floats in fixed point, as in reproducible summation (Demmel and Nguyen 2013).
-// Cost: three atomics a value: its place, its count and its sum.
+// Cost: two atomics a value, one a reservation, and one where a value is its group's largest so far.
 // Memory: 8 bytes for each value of the capacity, 16 for each key, 8 for each group, and 4.
 #pragma once
 
@@ -49,6 +49,13 @@ class exact_sum {
   /// `n`: at least the number of values, in [1, 2³¹].
   WFPG_HD exact_sum(std::uint32_t largest, std::uint32_t n)
       : exponent_(exponent(largest)), shift_(39 - bits_of(n - 1)) {}
+  /// The units that have a code().
+  WFPG_HD explicit exact_sum(std::uint32_t code)
+      : exponent_(static_cast<int>(code >> 6)), shift_(static_cast<int>(code & 63u)) {}
+  /// Returns a number for the units. Never 0.
+  WFPG_HD std::uint32_t code() const {
+    return static_cast<std::uint32_t>(exponent_) << 6 | static_cast<std::uint32_t>(shift_);
+  }
   /// Returns a value, given by its float bits, in these units.
   /// Subnormal values are allowed.
   WFPG_HD std::uint64_t term(std::uint32_t bits) const {
@@ -76,7 +83,7 @@ class exact_sum {
 /// View of a queue, for kernels.
 /// A default-constructed one has room for nothing.
 /// A thread reserves entries, and writes or drops each that fits.
-/// Then sum() of the queue adds them, and one thread a key takes what came of them.
+/// Then sum() of the queue adds them, one thread a key takes what came of them, and end_takes() ends it.
 class value_queue_view {
  public:
   /// Reserves n entries in a row, and returns the first.
@@ -118,25 +125,28 @@ class value_queue_view {
     atomic_add(&to.count, std::uint64_t(1));
   }
   /// Chooses the unit of a group's sums, from the values in the queue.
-  /// A group without any keeps its unit, so that a sum that failed can be repeated.
+  /// Sums that it has already are of a sum() that failed, or were never taken: they are forgotten.
+  /// A group without values keeps its unit and its sums.
   /// One thread a group.
   WFPG_HD void set_unit(std::size_t group) const {
-    if (largest_[group] != 0) units_[group] = largest_[group];
+    if (largest_[group] == 0) return;
+    if (units_[group] != 0) forget(group);
+    units_[group] = exact_sum(largest_[group] - 1, min(*queued_, capacity_)).code();
   }
-  /// Whether one of n keys may have received a value since the queue was cleared. O(n / 512).
+  /// Whether one of n > 0 keys may have a sum that is not taken. O(n / 512).
   /// Groups are asked: values of neighbouring keys count, too.
   WFPG_HD bool has_values(std::size_t first, std::size_t n) const {
-    for (std::size_t g = first / keys_a_group; n > 0 && g <= (first + n - 1) / keys_a_group; ++g)
+    for (std::size_t g = group_of(first); g <= group_of(first + n - 1); ++g)
       if (units_[g] != 0) return true;
     return false;
   }
   /// Returns how many values a key has received, and forgets them.
-  /// Asks its group first, so that keys of groups that never received any are not read.
+  /// Asks its group first, so that keys of groups without any are not read.
   /// `sum` becomes their sum.
   /// `sum` is left as it is where there are none.
   /// One thread takes a key.
   WFPG_HD std::uint32_t take(std::size_t key, double& sum) const {
-    const std::size_t group = key / keys_a_group;
+    const std::size_t group = group_of(key);
     if (units_[group] == 0) return 0;
     const pending_values from = pending_[key];
     if (from.count == 0) return 0;
@@ -156,9 +166,14 @@ class value_queue_view {
   static constexpr std::size_t groups(std::size_t keys) { return (keys + keys_a_group - 1) / keys_a_group; }
 
   /// Returns the group that a key belongs to.
-  WFPG_HD static std::uint32_t group_of(std::uint32_t key) { return key / keys_a_group; }
-  /// Returns the unit of a group that has received values. There are at most as many as the queue holds.
-  WFPG_HD exact_sum unit_of(std::size_t group) const { return {units_[group] - 1, capacity_}; }
+  WFPG_HD static std::size_t group_of(std::size_t key) { return key / keys_a_group; }
+  /// Returns the unit of a group that has sums.
+  WFPG_HD exact_sum unit_of(std::size_t group) const { return exact_sum(units_[group]); }
+  /// Forgets a group's sums.
+  WFPG_HD void forget(std::size_t group) const {
+    const std::size_t first = group * keys_a_group, end = min(first + keys_a_group, keys_);
+    for (std::size_t key = first; key < end; ++key) pending_[key] = {};
+  }
   /// Returns the key of an entry, its lower half.
   WFPG_HD static std::uint32_t key_of(std::uint64_t entry) { return static_cast<std::uint32_t>(entry); }
   /// Returns the float bits of an entry's value, its upper half.
@@ -169,7 +184,8 @@ class value_queue_view {
   std::uint64_t* queue_ = nullptr;  // bits of the value above, the key below
   pending_values* pending_ = nullptr;
   std::uint32_t* largest_ = nullptr;  // a group: bits of the largest value in the queue, plus 1; or 0
-  std::uint32_t* units_ = nullptr;    // a group: what largest_ was when its values were summed last
+  std::uint32_t* units_ = nullptr;    // a group: exact_sum::code() of its sums; 0: it has none
+  std::size_t keys_ = 0;
   std::uint32_t* queued_ = nullptr;
   std::uint32_t capacity_ = 0;
 };
@@ -209,6 +225,7 @@ class value_queue {
     view_.pending_ = pending_.data();
     view_.largest_ = largest_.data();
     view_.units_ = units_.data();
+    view_.keys_ = pending_.size();
     view_.queued_ = queued_.data();
     view_.capacity_ = static_cast<std::uint32_t>(capacity);
     clear(exec);
@@ -231,19 +248,23 @@ class value_queue {
     exec.fill_bytes(units_.data(), 0, units_.bytes());
     empty(exec);
   }
-  /// Adds the queued values to their keys' sums, for take(), and empties the queue. O(values).
-  /// Precondition: all keys that had values after the last sum() were taken.
+  /// Adds the queued values to their keys' sums, for take(), and empties the queue.
+  /// O(values + keys / 512).
+  /// May be called again where it failed.
+  /// Call end_takes() before the next one: sums that are left are forgotten with their group.
   void sum(const Exec& exec) {
     exec.for_each(units_.size(), set_group_unit{view_});
     exec.for_each(exec::device_count{queued_.data(), queue_.size()}, add_queued_values{view_});
     empty(exec);
   }
+  /// Says that all sums were taken. Groups then have none. O(keys / 512).
+  void end_takes(const Exec& exec) { exec.fill_bytes(units_.data(), 0, units_.bytes()); }
 
  private:
   void empty(const Exec& exec) {
-    // The counter first: should the second call fail, later values have a coarser unit than they need.
-    ::thrust::fill_n(exec.thrust(), queued_.data(), queued_.size(), 0u);
     exec.fill_bytes(largest_.data(), 0, largest_.bytes());
+    // Should this fail, a repeated sum adds and counts all values twice, which leaves their means.
+    ::thrust::fill_n(exec.thrust(), queued_.data(), queued_.size(), 0u);
   }
 
   buffer<std::uint64_t, Exec> queue_;

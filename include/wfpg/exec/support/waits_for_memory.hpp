@@ -1,5 +1,6 @@
 // A hint that kernels give a policy: their threads mostly wait for memory.
-// Only the CUDA policy takes it. Wrappers of kernels pass it on, as index_list does.
+// Only the CUDA policy takes it, in loops over indices and over blocks.
+// Wrappers of kernels pass it on, as index_list does.
 //
 //   struct merge_photons {
 //     static constexpr bool waits_for_memory = true;

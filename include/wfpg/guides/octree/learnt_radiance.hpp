@@ -34,6 +34,8 @@ class learnt_radiance_view {
   /// sampled_direction::field of this sample, where the direction was sampled or evaluated. Fields that are
   /// built after the sample use it.
   ///
+  /// Radiance that is 2⁴³ times darker than what the field's other cells received in a sample counts as 0.
+  ///
   /// Drops radiance that is negative or not finite, unknown fields, and directions outside a field's
   /// hemisphere. Drops what exceeds the queue's capacity. Radiance is clamped to 1e30.
   WFPG_HD void deposit(std::uint32_t field, vec3 direction, float radiance) const {

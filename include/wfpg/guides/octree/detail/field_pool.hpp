@@ -107,6 +107,7 @@ class field_pool {
     queue_.sum(exec);
     exec.for_each_block(fields_.size(), 0,
                         fold_learnt{sample, cells_a_field(), queue_.view(), learnt_.data()});
+    queue_.end_takes(exec);
   }
   /// Forgets all means and fractions, and values recorded since the last learn().
   void forget(const Exec& exec) {

@@ -77,6 +77,7 @@ void light_guide<Exec>::end_sample(const Exec& exec) {
   queue_.sum(exec);
   exec.for_each(rows_of(view_.level_) * groups,
                 detail::fold_light_values{queue_.view(), first_row(view_.level_) * groups, means_.data()});
+  queue_.end_takes(exec);
   follow_means(exec);
 }
 

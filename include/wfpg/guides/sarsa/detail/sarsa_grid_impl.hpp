@@ -101,6 +101,7 @@ void sarsa_grid<Exec>::learn(const sample_context<Exec>& at, path_recorder<Exec>
   paths.clear(at.exec);
   queue_.sum(at.exec);
   at.exec.for_each(directions(), detail::fold_values{queue_.view(), means_.data(), options_.learning_rate});
+  queue_.end_takes(at.exec);
 }
 
 /// Ends a step.
