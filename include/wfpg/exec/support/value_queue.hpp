@@ -3,7 +3,7 @@
 // The end of a sample adds them up in integers.
 // Results have the same bits however threads interleave, which float atomics do not give.
 // 512 neighbouring keys form a group, whose sums have one unit.
-// So a thread that queues a value touches no memory of its key.
+// A thread that queues a value therefore touches no memory of its key.
 // Of 2²⁰ values, those down to 2⁻¹⁹ of their group's largest keep all 24 bits.
 // Below 2⁻⁴³ they count as 0.
 // Source: sums of floats in fixed point, as in reproducible summation (Demmel and Nguyen 2013).
@@ -23,10 +23,10 @@ namespace wfpg::detail {
 /// Largest capacity of a queue: the 32-bit counter cannot wrap around beyond it.
 inline constexpr std::size_t most_queued = std::size_t(1) << 31;
 
-/// What a key has received in the sample. 16 bytes, so that it lies in one line of a cache.
+/// Values that a key has received in the sample. 16 bytes, so that they lie in one line of a cache.
 struct pending_values {
   std::uint64_t sum = 0;    ///< in units of its group's exact_sum
-  std::uint64_t count = 0;  ///< values in the sum
+  std::uint32_t count = 0;  ///< values in the sum
 };
 
 /// Adds `n` values with the given sum to a mean of `count` values.
@@ -122,7 +122,7 @@ class value_queue_view {
     const std::uint32_t key = key_of(queue_[entry]);
     pending_values& to = pending_[key];
     atomic_add(&to.sum, unit_of(group_of(key)).term(bits_of_value(queue_[entry])));
-    atomic_add(&to.count, std::uint64_t(1));
+    atomic_add(&to.count, 1);
   }
   /// Chooses the unit of a group's sums, from the values in the queue.
   /// Sums that it has already are of a sum() that failed, or were never taken: they are forgotten.
@@ -152,7 +152,7 @@ class value_queue_view {
     if (from.count == 0) return 0;
     sum = unit_of(group).value(from.sum);
     pending_[key] = {};
-    return static_cast<std::uint32_t>(from.count);
+    return from.count;
   }
 
  private:
@@ -160,7 +160,7 @@ class value_queue_view {
   friend class value_queue;
   static constexpr std::uint64_t dropped = 0xffffffffull;  // an entry that is no key's
 
-  /// So many that the groups of a million keys lie in a processor's first cache.
+  /// The groups of a million keys then lie in a processor's first cache.
   static constexpr std::uint32_t keys_a_group = 512;
   /// Returns the number of groups of `keys` keys.
   static constexpr std::size_t groups(std::size_t keys) { return (keys + keys_a_group - 1) / keys_a_group; }
