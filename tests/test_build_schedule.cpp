@@ -33,6 +33,35 @@ std::vector<std::uint32_t> building_waves(build_schedule schedule) {
   return waves;
 }
 
+TEST_CASE("build schedule: once all paths are guided, bins are chosen and may shrink as at the beginning",
+          "[build_schedule]") {
+  build_schedule schedule;
+  for (std::uint32_t sample = 1; sample <= 20; ++sample) schedule.begin_sample(sample);
+  schedule.begin_anew();
+  CHECK(schedule.before() == 20);
+  std::vector<std::uint32_t> chosen;
+  for (std::uint32_t sample = 21; sample <= 60; ++sample) {
+    schedule.begin_sample(sample);
+    CHECK(schedule.age() == sample - 20);
+    if (schedule.chooses_bins()) chosen.push_back(sample);
+    if (sample <= 28) CHECK(schedule.counts_rays());
+  }
+  CHECK(chosen == std::vector<std::uint32_t>{21, 22, 24, 28, 36, 52});
+  build_schedule restored;
+  CHECK(restored.restore(60, 30, 40, 20));
+  CHECK(restored.age() == 40);
+  CHECK(!restored.restore(60, 30, 40, 61));
+}
+
+TEST_CASE("build schedule: where few paths take part, more of their rays are counted", "[build_schedule]") {
+  build_schedule schedule(1u << 20, 1u << 12);  // 256 rays a leaf
+  schedule.begin_sample(3);
+  CHECK(schedule.counted().stride == 32);
+  CHECK(schedule.counted(2).stride == 8);
+  CHECK(schedule.counted(9).stride == 1);
+  CHECK(schedule.counted(9).includes(7));
+}
+
 }  // namespace
 
 TEST_CASE("build schedule: every wave builds during warm-up, then one in eight", "[build_schedule]") {
@@ -108,10 +137,10 @@ TEST_CASE("build schedule: a new field is due, and again after a fraction of the
 
 TEST_CASE("build schedule: a valid saved state is accepted, an invalid one is refused", "[build_schedule]") {
   build_schedule schedule(1000, 1000);
-  CHECK(schedule.restore(64, 16, 68));
+  CHECK(schedule.restore(64, 16, 68, 0));
   CHECK(schedule.sample() == 64);
   CHECK(schedule.counted_samples() == 16);
   CHECK(schedule.busy_until() == 68);
-  CHECK_FALSE(build_schedule().restore(10, 11, 12));
-  CHECK_FALSE(build_schedule().restore(10, 5, 43));
+  CHECK_FALSE(build_schedule().restore(10, 11, 12, 0));
+  CHECK_FALSE(build_schedule().restore(10, 5, 43, 0));
 }

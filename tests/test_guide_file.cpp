@@ -303,9 +303,9 @@ TEST_CASE("truncated, altered and foreign guide files have different errors", "[
   for (const std::string& foreign : {std::string(), std::string("\x89PNG\r\n\x1a\n................"),
                                      std::string(1000, '\0'), std::string("glTF"), bytes.substr(1)})
     CHECK(fault(foreign, options) == "wfpg: the guide is not a guide file");
-  CHECK(fault(with_version(bytes, 5), options) ==
-        "wfpg: the guide is of version 5, expected 4 or older: a newer wfpg wrote it");
-  CHECK(fault(with_version(bytes, 2), options) == "wfpg: the guide is of version 2, expected 4");
+  CHECK(fault(with_version(bytes, 6), options) ==
+        "wfpg: the guide is of version 6, expected 5 or older: a newer wfpg wrote it");
+  CHECK(fault(with_version(bytes, 2), options) == "wfpg: the guide is of version 2, expected 5");
   for (const std::size_t at : {8u, 11u, 12u}) {
     std::string altered = bytes;
     altered[at] = static_cast<char>(altered[at] ^ 1);
@@ -426,14 +426,19 @@ TEST_CASE("the content of a guide file is checked, even if its checksums are rig
           "has radiance that is negative or not finite");
   refused("counts", 0, 4, 0x80000000u, "has samples without end");
   refused("counts", 4, 4, 36, "warms up until after samples that are to come");
-  refused("counts", 12, 4, 6, "rests in samples that are to come");
+  refused("counts", 12, 4, 6, "has rests that no guider has");
   refused("counts", 16, 4, 5, "rests in samples that are to come");
+  refused("counts", 20, 4, 3, "has rests that no guider has");
+  refused("counts", 24, 4, 0, "has rests that no guider has");
+  refused("counts", 36, 8, nan, "has a gain out of range");
   refused("paths", 0, 4, 2 * nodes, "has paths from no node");
   refused("paths", 4, 4, infinity, "has radiance that is not finite");
-  refused("paths", section_of(bytes, "paths").size - 4, 4, infinity, "has radiance that is not finite");
+  refused("paths", section_of(bytes, "paths").size - 8, 4, infinity, "has radiance that is not finite");
   refused("levels", 0, 4, 4, "has more samples than there were");
   refused("levels", 4, 4, 36, "has more samples than there were");
-  refused("levels", 8 + 5 * leaves - 1, 1, 4, "has a level below the leaves");
+  refused("levels", 8, 4, 4, "has more samples than there were");
+  refused("levels", 12, 4, 32, "has bins for too few paths");
+  refused("levels", 16 + 5 * leaves - 1, 1, 4, "has a level below the leaves");
 
   refused("fields", 0, 4, 1, "has a pressure out of range");
   constexpr std::size_t slot = 32, cells = slot + 36;  // the first slot in use, and its cells

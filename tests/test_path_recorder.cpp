@@ -250,11 +250,11 @@ WFPG_TEST_CASE("a deposit and a clear both forget the paths", "[path_recorder]")
 
 TEST_CASE("one run of each group is recorded, another in each sample", "[path_recorder]") {
   constexpr std::size_t paths = 5000;
-  constexpr std::uint32_t run = wfpg::detail::recorded_runs::run, samples = 400;
+  constexpr std::uint32_t run = wfpg::recorded_runs::run, samples = 400;
   for (const std::uint32_t shift : {0u, 1u, 3u}) {
     std::vector<std::uint32_t> times(paths, 0);
     for (std::uint32_t sample = 0; sample < samples; ++sample) {
-      const wfpg::detail::recorded_runs runs{shift, static_cast<std::uint32_t>(wfpg::hash(7, sample))};
+      const wfpg::recorded_runs runs{shift, static_cast<std::uint32_t>(wfpg::hash(7, sample))};
       std::vector<bool> taken(runs.size(paths), false);
       std::size_t wrong = 0;
       for (std::size_t path = 0; path < paths; ++path) {
@@ -278,11 +278,34 @@ TEST_CASE("one run of each group is recorded, another in each sample", "[path_re
   }
 }
 
+TEST_CASE("a rarer part lies in the whole one, and path() is the inverse of find()", "[path_recorder]") {
+  constexpr std::size_t paths = 20000;
+  for (const std::uint32_t shift : {0u, 2u})
+    for (const std::uint32_t rarer : {1u, 3u}) {
+      const wfpg::recorded_runs whole{shift, 77u}, part{shift, 77u, rarer};
+      CHECK(part.log2_divisor() == shift + rarer);
+      std::size_t count = 0, wrong = 0;
+      for (std::size_t path = 0; path < paths; ++path) {
+        std::uint32_t place, in_whole;
+        const bool takes_part = part.find(path, place);
+        wrong += part.includes(static_cast<std::uint32_t>(path)) != takes_part;
+        if (!takes_part) continue;
+        ++count;
+        wrong += !whole.find(path, in_whole) || part.path(place) != path || place >= part.size(paths);
+        wrong += whole.path(in_whole) != path;
+      }
+      CHECK(wrong == 0);
+      CHECK(part.includes(wfpg::no_path));
+      const double expected = double(paths) / double(1u << (shift + rarer));
+      CHECK(std::abs(double(count) - expected) <= double(wfpg::recorded_runs::run << (shift + rarer)));
+    }
+}
+
 WFPG_TEST_CASE("a fraction of the paths is deposited, and the rest counts as not dropped",
                "[path_recorder]") {
   constexpr std::size_t paths = 300;
   recording<Exec> all(paths, 2, true), r(paths, 2, true, 2);
-  CHECK(r.recorder.recorded() == 3 * 32);
+  CHECK(r.recorder.recorded() == wfpg::recorded_runs{2}.size(paths));
   CHECK(r.recorder.bytes() < all.recorder.bytes() / 3);
   for (std::uint32_t seed = 0; seed < 8; ++seed) {
     r.scene.cache.clear(r.scene.exec);
@@ -298,7 +321,7 @@ WFPG_TEST_CASE("a fraction of the paths is deposited, and the rest counts as not
     double sum = 0.0, count = 0.0;
     for (std::size_t path = 0; path < paths; ++path) {
       std::uint32_t recorded;
-      if (!wfpg::detail::recorded_runs{2, seed}.find(path, recorded)) continue;
+      if (!wfpg::recorded_runs{2, seed}.find(path, recorded)) continue;
       sum += static_cast<double>(path);
       count += 1.0;
     }

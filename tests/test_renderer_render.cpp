@@ -141,6 +141,11 @@ TEST_CASE("checkpoints are the pictures after fewer samples", "[renderer]") {
 
 TEST_CASE("later samples have more weight only if they are better", "[renderer]") {
   render_options options;
+  CHECK(combination_of(options) == wfpg::sample_combination::inverse_variance);
+  options.least_gain = 0.0f;  // nothing is measured
+  CHECK(combination_of(options) == wfpg::sample_combination::pt_linear);
+  options.least_gain.reset();
+  options.octree = octree_source::samples;  // nor here
   CHECK(combination_of(options) == wfpg::sample_combination::pt_linear);
   options.method = sampling_method::pt;
   CHECK(combination_of(options) == wfpg::sample_combination::constant);

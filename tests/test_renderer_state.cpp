@@ -175,7 +175,10 @@ TEST_CASE("a rendering with other options or another scene does not resume", "[r
   refused("--octree-resolution 32, not 64", [](render_options& o) { o.octree_resolution = 64; });
   refused("--rays-per-bin 128, not 64", [](render_options& o) { o.binning.rays_per_bin = 64; });
   refused("--min-bin-level 2, not 3", [](render_options& o) { o.binning.min_level = 3; });
-  refused("--least-gain 0, not 2", [](render_options& o) { o.least_gain = 2.0f; });
+  refused("--least-gain 0, not 2", [](render_options& o) {
+    o.least_gain = 2.0f;
+    o.combine = wfpg::sample_combination::pt_linear;
+  });
   refused("--deposits-per-leaf 16, not 8", [](render_options& o) { o.deposits_per_leaf = 8; });
   refused("--guide-fraction 0, not 0.25", [](render_options& o) { o.guide_fraction = 0.25f; });
   refused("--guided-depths 4294967295, not 2", [](render_options& o) { o.guided_depths = 2; });

@@ -104,7 +104,7 @@ struct scale_of_path {
   WFPG_HD float operator()(std::size_t i) const {
     const wall_path at = wall_path::of(static_cast<std::uint32_t>(i));
     const wfpg::sparse_voxel_octree_view& tree = cache.octree();
-    const wfpg::node_id above = tree.ancestor(tree.leaf_at(at.position), tree.depth() - 2);
+    const wfpg::node_id above = tree.ancestor(tree.leaf_at(at.position), tree.depth() - 4);
     return cache.read(above, at.normal) + (cache.read(0, 0u) + cache.read(0, 1u)) / 2.0f;
   }
 };
@@ -115,7 +115,8 @@ guiding_gain brute_force(const std::vector<float>& scales, std::uint32_t earlier
   double first_now = 0.0, first_earlier = 0.0, between = 0.0;
   for (std::uint32_t path = 0; path < path_count; ++path) {
     const auto square = [&](float a, float b) {
-      return std::pow(std::min(std::abs(double(a) - double(b)) / double(scales[path]), 8.0), 2.0);
+      const double d = std::abs(double(a) - double(b)) / double(scales[path]);
+      return d <= 8.0 ? d * d : 16.0 * d - 64.0;
     };
     const float b = wall_path::radiance(path, 1, p.unguided);
     const float g = wall_path::radiance(path, earlier, p.guided),
@@ -136,13 +137,16 @@ WFPG_TEST_CASE("rest: a guider measures the variances of its paths", "[rest]") {
   guided_samples(exec, guider, 1, 7, gains_much);
   const std::vector<float> scales =
       evaluate(exec, std::size_t(path_count), scale_of_path{guider.guide().cache()});
+  const guiding_gain before = guider.statistics().gain;
   take_sample(exec, guider, 8, gains_much);
-  const guiding_gain measured = guider.statistics().gain;
+  guiding_gain measured = guider.statistics().gain;  // the mean of both comparisons
+  measured.guided_variance = 2.0 * measured.guided_variance - before.guided_variance;
+  measured.unguided_variance = 2.0 * measured.unguided_variance - before.unguided_variance;
   const guiding_gain expected = brute_force(scales, 4, 8, gains_much);
   CHECK(measured.paths == path_count);
   CHECK(measured.guided_variance == Approx(expected.guided_variance).epsilon(1.0e-4));
   CHECK(measured.unguided_variance == Approx(expected.unguided_variance).epsilon(1.0e-4));
-  // 3 by the probabilities, and less by the radiance that is cut off.
+  // 3 by the probabilities, and less by differences that count linearly.
   CHECK(std::abs(measured.value() - 3.0) < 0.3);
   CHECK(std::abs(measured.unguided_mean / measured.guided_mean - 1.0) < 0.1);
   // The check above would notice 1% of bias.
@@ -187,9 +191,9 @@ WFPG_TEST_CASE("rest: a guide that gains, one that must not rest, and one of few
   const Exec exec;
   CHECK(guided_of_40(exec, rest_options(), gains_much).size() == 39);
   wfpg::kept_guide_options never = rest_options(), few = rest_options();
-  never.least_gain.reset();
+  never.least_gain = 0.0f;
   CHECK(guided_of_40(exec, never, loses).size() == 39);
-  few.max_paths = 4000;
+  few.max_paths = 1000;
   CHECK(guided_of_40(exec, few, loses).size() == 39);
 }
 
@@ -294,10 +298,10 @@ WFPG_TEST_CASE("rest: paths that are recorded or measured in part are the same o
                      measured = gain_of_many(exec, 150000, std::nullopt);
   CHECK(recorded.paths > 3000);
   CHECK(recorded.paths < 20000);
-  CHECK(measured.paths > 40000);
-  CHECK(measured.paths <= 65536);
+  CHECK(measured.paths > 9000);
+  CHECK(measured.paths <= 16384);
   CHECK(std::abs(recorded.value() - 3.0) < 0.5);
-  CHECK(std::abs(measured.value() - 3.0) < 0.1);
+  CHECK(std::abs(measured.value() - 3.0) < 0.3);
 }
 
 WFPG_TEST_CASE("rest: a guide wakes up where light, geometry or the camera moved", "[rest]") {
@@ -348,7 +352,7 @@ WFPG_TEST_CASE("rest: a guide that is loaded with other options never rests", "[
   const std::string bytes = saved(guider);
   for (const auto change : {+[](wfpg::kept_guide_options& o) { o.seed = 1; },
                             +[](wfpg::kept_guide_options& o) { o.unguided_samples = 0; },
-                            +[](wfpg::kept_guide_options& o) { o.least_gain.reset(); }}) {
+                            +[](wfpg::kept_guide_options& o) { o.least_gain = 0.0f; }}) {
     wfpg::kept_guide_options options = rest_options();
     change(options);
     std::istringstream in(bytes);
@@ -365,10 +369,115 @@ WFPG_TEST_CASE("rest: a guide that is loaded with other options never rests", "[
   CHECK(guided_samples(exec, loaded, 4, 20, loses) == numbers{4, 5, 6, 10, 18});
 }
 
-TEST_CASE("rest: a least gain below 1 is refused", "[rest]") {
+/// A host of many paths, of which few are guided while the guide probes.
+template <class Exec>
+struct probing_host {
+  static constexpr std::uint32_t paths = 70000;
+
+  Exec exec;
+  wfpg::path_guider<Exec> guider{exec, box_mesh<Exec>(exec).view(), [] {
+                                   wfpg::kept_guide_options options = rest_options();
+                                   options.max_paths = paths;
+                                   options.deposits_per_leaf.reset();
+                                   options.least_gain = 2.0f;
+                                   return options;
+                                 }()};
+
+  void take(std::uint32_t first, std::uint32_t last, chances p) {
+    for (std::uint32_t sample = first; sample <= last; ++sample) take_sample(exec, guider, sample, p, paths);
+  }
+  /// Number of `n` rays with a field. `tells_paths`: surfaces have the indices of their paths.
+  std::size_t guided_rays(std::uint32_t n, bool tells_paths) {
+    std::vector<test_surface> surfaces;
+    for (std::uint32_t path = 0; path < n; ++path) {
+      const wall_path at = wall_path::of(path);
+      surfaces.push_back(make_surface(at.position, at.normal, at.normal));
+      if (tells_paths) surfaces.back().path = path;
+    }
+    const wave_of_surfaces<Exec> wave(exec, surfaces);
+    return count_guided(exec, guider.prepare(wave.get(), box_caster()), n);
+  }
+};
+
+WFPG_TEST_CASE("rest: until it is known whether guiding pays, few paths are recorded and guided", "[rest]") {
+  probing_host<Exec> host;
+  constexpr std::uint32_t n = 8000;
+  host.take(1, 1, gains_much);
+  host.guider.begin_sample();
+  host.guided_rays(n, true);
+  host.guider.end_sample();
+  host.guider.begin_sample();
+  CHECK(host.guider.guided());
+  CHECK(host.guider.probing());
+  const std::size_t recorded = host.guider.recorder().recorded();
+  CHECK(recorded >= 4096);
+  CHECK(recorded < host.paths / 8);
+  std::size_t among = 0;
+  for (std::uint32_t path = 0; path < n; ++path) {
+    std::uint32_t place;
+    among += host.guider.recorder().has_place(path, place) ? 1 : 0;
+  }
+  host.guided_rays(n, true);  // of two fields that are asked for at once, one may have to wait
+  CHECK(host.guided_rays(n, true) == among);
+  CHECK(host.guided_rays(n, false) == n);  // where the host does not tell paths
+  host.guider.end_sample();
+
+  host.take(4, 16, gains_much);  // 3 is more than 1.125, and than the least gain after sample 16
+  host.guider.begin_sample();
+  CHECK(!host.guider.probing());
+  CHECK(host.guided_rays(n, true) == n);
+  CHECK(host.guider.recorder().recorded() == host.paths);
+}
+
+WFPG_TEST_CASE("rest: a guide that probes, or did, is saved and goes on with the same bits", "[rest]") {
+  for (const std::uint32_t until : {2u, 4u, 5u, 9u, 17u}) {
+    probing_host<Exec> host;
+    const auto go_on = [&](wfpg::path_guider<Exec>& guider, std::uint32_t from, std::uint32_t to) {
+      std::swap(host.guider, guider);
+      for (std::uint32_t sample = from; sample <= to; ++sample) {
+        host.guider.begin_sample();
+        host.guided_rays(4000, true);
+        host.exec.for_each(host.paths, record_wall_paths{host.guider.recorder(), sample,
+                                                         host.guider.guided() ? 0.5f : 0.25f, 0});
+        host.guider.end_sample();
+      }
+      std::swap(host.guider, guider);
+    };
+    wfpg::path_guider<Exec> guider = std::move(host.guider);
+    host.guider = wfpg::path_guider<Exec>(host.exec, box_mesh<Exec>(host.exec).view(), guider.options());
+    go_on(guider, 1, until);
+    const std::string bytes = saved(guider);
+    std::istringstream in(bytes);
+    wfpg::path_guider<Exec> loaded = wfpg::load_guide(host.exec, in, guider.options());
+    CHECK(saved(loaded) == bytes);
+    go_on(guider, until + 1, 20);
+    go_on(loaded, until + 1, 20);
+    CHECK(guider.sample_weight() == loaded.sample_weight());
+    CHECK(saved(loaded) == saved(guider));
+  }
+}
+
+WFPG_TEST_CASE("rest: a sample weighs as much as the gain that was measured before it", "[rest]") {
+  probing_host<Exec> host;
+  for (std::uint32_t sample = 1; sample <= 20; ++sample) {
+    host.take(sample, sample, gains_much);
+    const float weight = host.guider.sample_weight();
+    if (host.guider.probing() || !host.guider.guided()) CHECK(weight == 1.0f);
+    // By the probabilities the gain is 3.
+    if (sample > 16) CHECK(std::abs(weight - 3.0f) < 0.6f);
+  }
+  probing_host<Exec> resting;
+  for (std::uint32_t sample = 1; sample <= 20; ++sample) {
+    resting.take(sample, sample, loses);
+    CHECK(resting.guider.sample_weight() == 1.0f);
+  }
+  CHECK(resting.guider.resting());
+}
+
+TEST_CASE("rest: a least gain below 1 that is not 0 is refused", "[rest]") {
   const wfpg::exec::seq exec;
   wfpg::kept_guide_options options = rest_options();
-  for (const float bad : {0.99f, 2.0e6f, std::numeric_limits<float>::quiet_NaN()}) {
+  for (const float bad : {-1.0f, 0.99f, 2.0e6f, std::numeric_limits<float>::quiet_NaN()}) {
     options.least_gain = bad;
     const box_mesh<wfpg::exec::seq> mesh(exec);
     CHECK(refusal([&] {

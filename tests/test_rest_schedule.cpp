@@ -3,8 +3,9 @@
 
 #include <wfpg/guide/rest_schedule.hpp>
 
+#include <cmath>
 #include <cstdint>
-#include <optional>
+#include <utility>
 #include <vector>
 
 using wfpg::guiding_gain;
@@ -42,13 +43,12 @@ TEST_CASE("rest: samples 3, 4, 8, 16 and so on are measured, and count from the 
         numbers{5, 6, 10, 18, 34, 66});
 }
 
-TEST_CASE("rest: without the option, or without an unguided sample, nothing is measured", "[rest]") {
-  for (const rest_schedule& never :
-       {rest_schedule(), rest_schedule(std::nullopt, 1), rest_schedule(1.25f, 0)}) {
+TEST_CASE("rest: with a least gain of 0, or without an unguided sample, nothing is measured", "[rest]") {
+  for (const rest_schedule& never : {rest_schedule(), rest_schedule(0.0f, 1), rest_schedule(1.25f, 0)}) {
     CHECK(samples_where(70, [&](std::uint32_t s) {
-            return never.compares(s) || never.is_unguided(s);
+            return never.compares(s) || never.is_unguided(s) || never.rests(s) || never.probes(s);
           }).empty());
-    CHECK(samples_where(70, [&](std::uint32_t s) { return never.rests(s); }).empty());
+    CHECK(never.weight() == 1.0f);
   }
 }
 
@@ -60,11 +60,40 @@ TEST_CASE("rest: the least gain grows to the option's in 32 samples", "[rest]") 
   CHECK(schedule.threshold(1024) == Approx(1.25f));
 }
 
+TEST_CASE("rest: the gain that lets a guide take part in all paths shrinks to the least gain", "[rest]") {
+  const rest_schedule schedule(2.0f, 1);
+  CHECK(schedule.sure_gain(4) == Approx(2.0f * (1.0f + 0.5f * 12.0f / 16.0f)));
+  CHECK(schedule.sure_gain(8) == Approx(2.0f * (1.0f + 0.5f * 8.0f / 16.0f)));
+  for (const std::uint32_t late : {16u, 32u, 512u})
+    CHECK(schedule.sure_gain(late) == schedule.threshold(late));
+}
+
+TEST_CASE("rest: a guide takes part in few paths until it is known whether guiding pays", "[rest]") {
+  rest_schedule schedule(2.0f, 1);
+  schedule.decide(3, gain_of(0.1));  // too early to decide
+  CHECK(samples_where(20, [&](std::uint32_t s) { return schedule.probes(s); }).size() == 20);
+  schedule.decide(4, gain_of(2.0));  // above 1.125 and below 2.75: not sure
+  CHECK(schedule.probes(5));
+  schedule.decide(8, gain_of(1.5));
+  CHECK(schedule.probes(9));
+  schedule.decide(16, gain_of(1.6));  // few paths decide at last
+  CHECK(samples_where(40, [&](std::uint32_t s) { return schedule.probes(s) || schedule.rests(s); }).empty());
+  schedule.decide(32, gain_of(2.1));
+  CHECK(samples_where(40, [&](std::uint32_t s) { return schedule.probes(s) || schedule.rests(s); }).empty());
+
+  rest_schedule sure(2.0f, 1);
+  sure.decide(4, gain_of(2.8));
+  CHECK(!sure.probes(5));
+  sure.decide(8, gain_of(2.0));  // once it takes part in all paths, it goes on so
+  CHECK(!sure.probes(9));
+}
+
 TEST_CASE("rest: a guide rests between comparisons, and only where its gain is known and too small",
           "[rest]") {
   rest_schedule schedule(1.25f, 1);
   schedule.decide(8, gain_of(1.05));
   CHECK(samples_where(40, [&](std::uint32_t s) { return s > 8 && !schedule.rests(s); }) == numbers{16, 32});
+  CHECK(samples_where(40, [&](std::uint32_t s) { return s > 8 && schedule.probes(s); }) == numbers{16, 32});
   for (std::uint32_t sample = 9; sample <= 16; ++sample) schedule.count(sample);
   CHECK(schedule.rested() == 7);
   schedule.decide(16, gain_of(1.13));
@@ -72,28 +101,56 @@ TEST_CASE("rest: a guide rests between comparisons, and only where its gain is k
   schedule.decide(32, gain_of(1.13));
   CHECK(schedule.resting());
 
-  guiding_gain few = gain_of(0.5), dark = gain_of(0.5), bright = gain_of(0.5);
-  few.paths = 4095;
-  dark.unguided_mean = 0.94;    // unguided paths miss light: their variance lies there
-  bright.cut_off_mean = 0.011;  // it lies in few and bright paths, and the guide finds it by others
-  bright.guided_cut_off_mean = 0.005;
-  guiding_gain brightest = bright;
-  brightest.cut_off_mean = brightest.guided_cut_off_mean = 0.11;  // too much to know anything
-  for (const guiding_gain& unknown : {few, dark, bright, brightest, guiding_gain()}) {
+  guiding_gain few = gain_of(0.5), dark = gain_of(0.5);
+  few.paths = guiding_gain::least_paths - 1;
+  dark.unguided_mean = 0.94;  // unguided paths miss light: their variance lies there
+  for (const guiding_gain& unknown : {few, dark, guiding_gain()}) {
     schedule.decide(64, gain_of(0.5));
     REQUIRE(schedule.resting());
     schedule.decide(64, unknown);
     CHECK(!schedule.resting());
+    CHECK(!schedule.probes(65));
   }
 }
 
-TEST_CASE("rest: gains are known where guided paths are as bright as others", "[rest]") {
-  guiding_gain bright = gain_of(0.5);
-  bright.cut_off_mean = 0.09;
-  bright.guided_cut_off_mean = 0.044;
-  CHECK(!bright.is_known());
-  bright.guided_cut_off_mean = 0.046;
-  CHECK(bright.is_known());
+TEST_CASE("rest: longer paths have to gain more", "[rest]") {
+  guiding_gain longer = gain_of(3.0);
+  longer.unguided_vertices = 2.0;
+  longer.guided_vertices = 3.0;
+  CHECK(longer.value() == Approx(3.0));
+  CHECK(longer.value_a_vertex() == Approx(2.0));
+  rest_schedule schedule(2.5f, 1);
+  schedule.decide(32, longer);
+  CHECK(schedule.resting());
+}
+
+TEST_CASE("rest: a guided sample weighs as much as its gain, from 1 to 16", "[rest]") {
+  rest_schedule schedule(1.25f, 1);
+  CHECK(schedule.weight() == 1.0f);
+  for (const auto& [gain, weight] : {std::pair(3.0, 3.0f), std::pair(0.5, 1.0f), std::pair(100.0, 16.0f)}) {
+    schedule.decide(4, gain_of(gain));
+    CHECK(schedule.weight() == Approx(weight));
+  }
+  guiding_gain missed = gain_of(2.0);
+  missed.unguided_mean = 0.5;
+  schedule.decide(4, missed);
+  CHECK(schedule.weight() == 4.0f);
+  missed.unguided_mean = 0.85;  // by chance, may be
+  schedule.decide(4, missed);
+  CHECK(schedule.weight() == Approx(2.0f));
+  schedule.decide(4, gain_of(3.0));
+  guiding_gain few = gain_of(7.0);
+  few.paths = 10;
+  schedule.decide(4, few);
+  CHECK(schedule.weight() == 1.0f);
+}
+
+TEST_CASE("rest: a mean of gains is that of its variances, and begins with the first", "[rest]") {
+  const guiding_gain first = gain_of(6.0), second = gain_of(2.0);
+  CHECK(first.mean_with({}).value() == Approx(6.0));
+  CHECK(second.mean_with(first).value() == Approx(4.0));
+  CHECK(second.mean_with(first).paths == second.paths);
+  CHECK(second.mean_with(second.mean_with(first)).value() == Approx(3.0));
 }
 
 TEST_CASE("rest: gains have bounds where variances are 0", "[rest]") {
@@ -107,19 +164,38 @@ TEST_CASE("rest: gains have bounds where variances are 0", "[rest]") {
 
 TEST_CASE("rest: after light or geometry moved a guide that rests begins again, another one goes on",
           "[rest]") {
-  rest_schedule resting(1.25f, 1), guiding(1.25f, 1);
+  rest_schedule resting(1.25f, 1), probing(1.25f, 1), guiding(1.25f, 1);
   resting.decide(8, gain_of(0.9));
-  resting.restart(20);
-  guiding.restart(20);
+  guiding.decide(8, gain_of(3.0));
+  CHECK(guiding.weight() == 3.0f);
+  for (rest_schedule* s : {&resting, &probing, &guiding}) s->restart(20);
   CHECK(samples_where(60, [&](std::uint32_t s) { return resting.is_unguided(s); }) == numbers{21});
   CHECK(samples_where(60, [&](std::uint32_t s) { return resting.compares(s); }) ==
         numbers{23, 24, 28, 36, 52});
-  CHECK(samples_where(60, [&](std::uint32_t s) { return resting.rests(s); }).empty());
-  CHECK(samples_where(60, [&](std::uint32_t s) { return guiding.compares(s) || guiding.rests(s); }).empty());
+  CHECK(samples_where(60, [&](std::uint32_t s) {
+          return resting.rests(s) || (s > 20) != resting.probes(s);
+        }).empty());
+  for (const rest_schedule& on : {probing, guiding}) {
+    CHECK(samples_where(60, [&](std::uint32_t s) { return on.compares(s) || on.guides_few(s); }).empty());
+    CHECK(on.weight() == 1.0f);  // of what was forgotten
+  }
 }
 
-TEST_CASE("rest: what moves before the unguided sample changes nothing", "[rest]") {
+TEST_CASE("rest: a host that moves something after each sample has a guide that takes part in all paths",
+          "[rest]") {
+  rest_schedule schedule(1.25f, 1);
+  for (std::uint32_t sample = 1; sample <= 20; ++sample) schedule.restart(sample);
+  CHECK(samples_where(60, [&](std::uint32_t s) { return s > 1 && schedule.guides_few(s); }).empty());
+  schedule = rest_schedule(1.25f, 1);
+  schedule.decide(8, gain_of(0.9));
+  for (std::uint32_t sample = 9; sample <= 20; ++sample) schedule.restart(sample);
+  CHECK(samples_where(60, [&](std::uint32_t s) { return s > 20 && schedule.guides_few(s); }).empty());
+}
+
+TEST_CASE("rest: what moves before the unguided sample changes nothing, and no sample before it records few",
+          "[rest]") {
   rest_schedule schedule(1.25f, 2);
+  CHECK(samples_where(20, [&](std::uint32_t s) { return !schedule.probes(s); }) == numbers{1});
   schedule.restart(0);
   schedule.restart(1);
   CHECK(samples_where(20, [&](std::uint32_t s) { return schedule.compares(s); }) == numbers{4, 5, 9, 17});
@@ -135,13 +211,20 @@ TEST_CASE("rest: comparisons are at most 512 samples apart", "[rest]") {
 
 TEST_CASE("rest: a state that no schedule has is refused", "[rest]") {
   rest_schedule schedule(1.25f, 1);
-  CHECK(schedule.restore(20, 1, 12, true));
+  using state = rest_schedule::state;
+  CHECK(schedule.restore(20, state{1, 12, 0, 2.0f}));
   CHECK(schedule.rests(21));
-  CHECK(!schedule.restore(20, 1, 21, true));
-  CHECK(!schedule.restore(20, 22, 3, false));
-  CHECK(!schedule.restore(20, 0, 3, true));
-  CHECK(rest_schedule(1.25f, 3).restore(1, 3, 0, false));  // before the unguided sample
-  CHECK(rest_schedule(1.25f, 1).restore(20, 21, 3, false));
+  CHECK(schedule.weight() == 2.0f);
+  const state kept = schedule.saved();
+  CHECK((kept.unguided == 1 && kept.rested == 12 && kept.takes_part == 0 && kept.weight == 2.0f));
+  CHECK(schedule.restore(20, state{1, 12, 1, 1.0f}));
+  CHECK(schedule.probes(21));
+  for (const state& wrong :
+       {state{1, 21, 0, 1.0f}, state{0, 2, 0, 1.0f}, state{23, 2, 2, 1.0f}, state{0, 2, 1, 1.0f},
+        state{1, 2, 3, 1.0f}, state{1, 2, 2, 0.5f}, state{1, 2, 2, 17.0f}, state{1, 2, 2, std::nanf("")}})
+    CHECK(!schedule.restore(20, wrong));
+  CHECK(rest_schedule(1.25f, 3).restore(1, state{3, 0, 1, 1.0f}));  // before the unguided sample
+  CHECK(rest_schedule(1.25f, 1).restore(20, state{21, 3, 1, 1.0f}));
 }
 
 }  // namespace

@@ -26,6 +26,7 @@ TEST_CASE("sample combiner: weights of the first eight samples are right", "[sam
   CHECK(weights(sample_combination::discard_first) == sequence{0, 1, 1, 1, 1, 1, 1, 1});
   CHECK(weights(sample_combination::pt_first) == sequence{1, 1, 1, 1, 1, 1, 1, 1});
   CHECK(weights(sample_combination::pt_linear) == sequence{1, 2, 3, 4, 5, 5, 5, 5});
+  CHECK(weights(sample_combination::inverse_variance) == sequence{1, 1, 1, 1, 1, 1, 1, 1});
 }
 
 TEST_CASE("sample combiner: weights stay bounded", "[sample_combiner]") {
@@ -34,12 +35,14 @@ TEST_CASE("sample combiner: weights stay bounded", "[sample_combiner]") {
   CHECK(wfpg::sample_weight(sample_combination::quadratic, 0xffffffffu) == 25.0f);
 }
 
-TEST_CASE("sample combiner: only pt_first and pt_linear want an unguided sample", "[sample_combiner]") {
+TEST_CASE("sample combiner: combinations that begin with path tracing want an unguided sample",
+          "[sample_combiner]") {
   using wfpg::sample_combination;
   for (sample_combination c :
        {sample_combination::constant, sample_combination::linear, sample_combination::quadratic,
         sample_combination::one_two, sample_combination::discard_first})
     CHECK(wfpg::unguided_samples(c) == 0);
-  for (sample_combination c : {sample_combination::pt_first, sample_combination::pt_linear})
+  for (sample_combination c :
+       {sample_combination::pt_first, sample_combination::pt_linear, sample_combination::inverse_variance})
     CHECK(wfpg::unguided_samples(c) == 1);
 }

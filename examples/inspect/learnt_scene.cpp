@@ -25,7 +25,7 @@ constexpr std::uint64_t reference_seed = 0x5eed0fed;
 
 render::render_options checked(render::render_options options) {
   require_fields(options);
-  options.least_gain.reset();  // a guide that rests has no fields to show
+  options.least_gain = 0.0f;  // a guide that rests has no fields to show
   return options;
 }
 

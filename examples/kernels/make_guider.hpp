@@ -17,6 +17,7 @@ guider_on<Device> make_guider(const guide_caster<Device>& caster, const wfpg::bo
   options.guided_depths = wanted.max_depth > 3 ? wanted.max_depth - 2 : 1;
   options.unguided_samples = wanted.guided ? wanted.unguided_samples : ~0u;
   options.records_waves = true;
+  if (wanted.check) options.least_gain = 0.0f;  // all paths are checked
   options.seed = wanted.seed;
   const typename Device::policy policy;
   return {policy, wfpg::fragments_from_caster(policy, caster, bounds), options};

@@ -10,8 +10,6 @@
 #include "app/sample_budget.hpp"
 #include "renderer.hpp"
 
-#include <wfpg/sampling/sample_combiner.hpp>
-
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -66,9 +64,8 @@ render::image take_samples(renderer& host, const render::render_options& options
   render::progress_bar bar;
   for (render::sample_budget budget(options, 0); !budget.is_spent();) {
     budget.count();
-    const auto number = static_cast<std::uint32_t>(budget.samples());
-    const double weight = wfpg::sample_weight(render::combination_of(options), number);
     const std::vector<vec3> colours = host.sample();
+    const double weight = host.weight();
     for (std::size_t p = 0; p < sums.size(); ++p) sums[p] += weight * glm::dvec3(colours[p]);
     weights += weight;
     bar.show(budget.progress());

@@ -30,6 +30,8 @@ class renderer {
   virtual ~renderer() = default;
   /// Renders one sample of each pixel and returns its colours, row by row from the top, linear RGB.
   virtual std::vector<vec3> sample() = 0;
+  /// Weight that the last sample should have in the picture.
+  virtual float weight() const { return 1.0f; }
   /// What the samples so far show to be wrong in the host's use of the guide, a sentence a line. Empty where
   /// nothing is, or nothing is checked.
   virtual std::string faults() const { return {}; }

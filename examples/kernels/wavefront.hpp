@@ -50,6 +50,7 @@ class wavefront : public renderer {
     launch<Device>(count_, start_paths{at, camera_});
 #if KERNELS_GUIDE
     guider_.begin_sample();
+    weight_ = guider_.sample_weight();
 #endif
     for (; at.depth < at.max_depth; ++at.depth) {
       find_vertices_of(at);
@@ -69,6 +70,10 @@ class wavefront : public renderer {
     std::vector<vec3> colours(count_);
     ::thrust::copy(colours_.begin(), colours_.end(), colours.begin());
     return colours;
+  }
+
+  float weight() const override {
+    return weight_;
   }
 
 #if KERNELS_CHECK
@@ -171,6 +176,7 @@ class wavefront : public renderer {
   array<std::uint32_t> hidden_;
   array<vec3> colours_;
   std::uint32_t samples_ = 0;
+  float weight_ = 1.0f;  // of the last one
 #if KERNELS_GUIDE
   guider_on<Device> guider_;
   wfpg::guide_view view_;

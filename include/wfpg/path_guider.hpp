@@ -144,7 +144,7 @@ class path_guider {
     compare_anew();
   }
   /// The camera moved, or samples differ from those before for another reason. A guide that rests wakes up,
-  /// and is compared anew. One that does not rest goes on, and is not compared again. O(1).
+  /// and is compared anew. Another one guides all paths from then on, and is not compared again. O(1).
   void compare_anew() {
     rests_.restart(samples_);
     gain_ = {};
@@ -171,6 +171,17 @@ class path_guider {
   bool guided() const { return is_guided(samples_); }
   /// Whether the guide rests in the current sample, since guiding gained less than least_gain.
   bool resting() const { return rests_now_; }
+  /// Whether the guide probes in the current sample, since it is not known whether guiding pays. Then few
+  /// paths are recorded and guided: those that are compared.
+  bool probing() const { return probes_now_; }
+  /// Weight that the current sample should have in the picture, from 1 to rest_constants::largest_weight.
+  /// Guided samples have less variance than others, by the gain of the comparisons before. The best weights
+  /// are inverse to the variance. 1 for samples that are not guided, or that probe.
+  ///
+  /// A weight depends on earlier samples, not on its own. So the weighted mean has a bias, which falls with
+  /// the number of compared paths, and with the number of samples. Pictures without weights have none, and
+  /// more noise.
+  float sample_weight() const { return guided() && !probes_now_ ? weight_ : 1.0f; }
 
   /// Returns counts and times since construction; see statistics.hpp. Waits for the work before it, so that
   /// calling it for each sample slows a device down. `dropped_vertices` and `deposits` tell of calls out of
@@ -197,7 +208,18 @@ class path_guider {
                           options_.include_emission, needs_.fraction_shift, needs_.directions,
                           Guide::records_paths && options_.records_waves, options_.silent_escapes}) {
     require(needs_.sample_stride >= 1, "sample_stride", needs_.sample_stride, "at least 1");
-    if (Guide::measures_gain) rests_ = rest_schedule(options_.least_gain, options_.unguided_samples);
+    if constexpr (Guide::measures_gain) {
+      if (!guide_.measures()) return;
+      rests_ = rest_schedule(least_gain(), options_.unguided_samples);
+      compared_ = {needs_.fraction_shift, static_cast<std::uint32_t>(seed_of(0)), guide_.rarer()};
+    }
+  }
+
+  /// Gain below which guiding does not pay: the option, or what suits the policy. A CPU policy's blocks have
+  /// one warp.
+  float least_gain() const {
+    return options_.least_gain.value_or(Exec::warps_per_block > 1 ? rest_constants::gpu_least_gain
+                                                                  : rest_constants::cpu_least_gain);
   }
 
   /// Checks the options that all guides have, and sets max_rays. The guide checks its own. Runs before any
@@ -229,7 +251,12 @@ class path_guider {
   sample_context<Exec> at(std::uint32_t sample) {
     // A sample that rests, and has not begun, is not counted yet.
     const std::uint32_t uncounted = rests_now_ && sample > samples_ ? 1 : 0;
-    return {exec_, number_of(sample) - uncounted, seed_of(sample), is_guided(sample), recorded_, clock_};
+    return {exec_,  number_of(sample) - uncounted, seed_of(sample),         is_guided(sample), recorded_,
+            clock_, guided_paths(sample),          guided_paths(sample + 1)};
+  }
+  /// Paths that a sample guides, if it guides any.
+  const recorded_runs& guided_paths(std::uint32_t sample) const {
+    return rests_.guides_few(sample) ? compared_ : all_paths_;
   }
   /// Keeps the recorded paths of an unguided sample, or compares those of a guided one with them.
   void measure();
@@ -251,14 +278,19 @@ class path_guider {
   Guide guide_;                   // keeps its learnt state in the caller's policy
   recording_needs needs_;         // of the guide, asked once
   path_recorder<Exec> recorder_;  // of no paths where the guide reads none
-  // A guide file holds the first three. begin_sample() sets the next three, and end_sample() the last.
+  // A guide file holds the first three. begin_sample() sets those of the current sample, and end_sample()
+  // measured_ and gain_.
   rest_schedule rests_;
   std::uint32_t samples_ = 0;                                     // number of the current sample
   std::uint32_t warm_up_end_ = recording_needs::warm_up_samples;  // the last sample of the warm-up
   bool recorded_ = true;                                          // the current sample
   bool rests_now_ = false;                                        // the current sample
+  bool probes_now_ = false;                                       // the current sample
+  float weight_ = 1.0f;                                           // the current sample, if it is guided
   bool measured_ = false;                                         // the current sample, in end_sample()
-  guiding_gain gain_;                                             // the last that was measured
+  guiding_gain gain_;                                             // mean of those that were measured
+  recorded_runs compared_;                                        // paths that are compared
+  recorded_runs all_paths_;
 };
 
 }  // namespace wfpg

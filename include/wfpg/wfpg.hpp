@@ -23,7 +23,6 @@
 #include <wfpg/guide/path_recorder.hpp>
 #include <wfpg/guide/recorded_fraction.hpp>
 #include <wfpg/guide/recorded_path.hpp>
-#include <wfpg/guide/recorded_runs.hpp>
 #include <wfpg/guide/recorded_surfaces.hpp>
 #include <wfpg/guide/recorded_wave.hpp>
 #include <wfpg/guide/rest_schedule.hpp>
@@ -58,6 +57,7 @@
 #include <wfpg/host/medium.hpp>
 #include <wfpg/host/phase.hpp>
 #include <wfpg/host/ray_caster.hpp>
+#include <wfpg/host/recorded_runs.hpp>
 #include <wfpg/host/wave.hpp>
 #include <wfpg/light/beam_map.hpp>
 #include <wfpg/light/bidirectional.hpp>

@@ -107,6 +107,6 @@ template wfpg::path_guider<wfpg::exec::tbb> guider_from_caster(const wfpg::exec:
                                                                const wfpg::bounds3&,
                                                                const wfpg::kept_guide_options&);
 template wfpg::path_guider<wfpg::exec::tbb> guider_from_first_sample(const wfpg::exec::tbb&, my::tracer&,
-                                                                     const wfpg::kept_guide_options&);
+                                                                     wfpg::kept_guide_options);
 template std::string faults_of_host(const wfpg::exec::tbb&, wfpg::path_guider<wfpg::exec::tbb>&, my::tracer&,
                                     const my::caster&);

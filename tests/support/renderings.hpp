@@ -75,7 +75,7 @@ struct rendering {
     options.binning.rays_per_bin = 128;
     options.binning.min_level = 2;
     options.samples_per_leaf = 500;
-    options.least_gain.reset();  // guided samples are what is tested
+    options.least_gain = 0.0f;  // guided samples are what is tested
     options.sarsa.update = update;
     options.sarsa.sampler = sampler;
     options.sarsa.resolution = 4;

@@ -111,8 +111,9 @@ single_samples measure_single_samples(const render::scene& scene, const render::
   const std::vector<render::image> first_unguided =
       render_alone(scene, options, sample_combination::pt_first);
   for (const auto& [name, combination] : render::combination_names())
-    result.combined[name] =
-        combine(wfpg::unguided_samples(combination) > 0 ? first_unguided : guided, combination, reference);
+    if (combination != sample_combination::inverse_variance)  // the guide alone knows its weights
+      result.combined[name] =
+          combine(wfpg::unguided_samples(combination) > 0 ? first_unguided : guided, combination, reference);
   return result;
 }
 

@@ -26,11 +26,14 @@ const std::map<std::string, device>& device_names() {
 
 const std::map<std::string, wfpg::sample_combination>& combination_names() {
   using combine = wfpg::sample_combination;
-  static const std::map<std::string, combine> names = {
-      {"pt-linear", combine::pt_linear},        {"pt-first", combine::pt_first},
-      {"constant", combine::constant},          {"linear", combine::linear},
-      {"quadratic", combine::quadratic},        {"one-two", combine::one_two},
-      {"discard-first", combine::discard_first}};
+  static const std::map<std::string, combine> names = {{"inverse-variance", combine::inverse_variance},
+                                                       {"pt-linear", combine::pt_linear},
+                                                       {"pt-first", combine::pt_first},
+                                                       {"constant", combine::constant},
+                                                       {"linear", combine::linear},
+                                                       {"quadratic", combine::quadratic},
+                                                       {"one-two", combine::one_two},
+                                                       {"discard-first", combine::discard_first}};
   return names;
 }
 

@@ -69,8 +69,9 @@ struct render_options {
   std::optional<std::uint32_t> deposits_per_leaf = wfpg::kept_guide_options().deposits_per_leaf;
   /// Fraction of directions drawn from the guide, in (0, 1]. Unset: the method's own default.
   std::optional<float> guide_fraction;
-  /// Gain below which a guide of wfpg or wfpg-product rests, at least 1. Unset: it never rests.
-  std::optional<float> least_gain = wfpg::sampling_options().least_gain;
+  /// Gain below which a guide of wfpg or wfpg-product rests, at least 1; 0: it never rests. Unset: what suits
+  /// the device.
+  std::optional<float> least_gain;
   /// Of a path, from its first vertex on, at least 1; with next-event estimation never the last of several.
   std::uint32_t guided_depths = wfpg::sampling_options().guided_depths;
   std::uint32_t light_groups = 32;  ///< that guided paths learn to choose lights from, in [1, 255]
@@ -82,7 +83,8 @@ struct render_options {
   wfpg::sarsa_grid_options sarsa;            ///< its own; what every guide is told follows from the others
   wfpg::irradiance_records_options records;  ///< likewise
   checkpoint_times checkpoints = checkpoint_times::none;  ///< when to keep the picture so far
-  /// Unset: pt_linear, and all alike for path tracing, records, and with a guide that was loaded.
+  /// Unset: inverse_variance for guides that measure their gain, pt_linear for others that learn. All alike
+  /// for path tracing, records, and with a guide that was loaded.
   std::optional<wfpg::sample_combination> combine;
   std::string load_guide;            ///< guide file, of the same scene, to begin with; empty: none
   std::string resume;                ///< state file of the rendering to go on with; empty: none
@@ -177,8 +179,12 @@ inline wfpg::bidirectional_options light_options_of(const render_options& option
 /// How the samples of these options are combined.
 inline wfpg::sample_combination combination_of(const render_options& options) {
   using wfpg::sample_combination;
-  const bool settled = !properties_of(options.method).learns || !options.load_guide.empty();
-  return options.combine.value_or(settled ? sample_combination::constant : sample_combination::pt_linear);
+  if (options.combine) return *options.combine;
+  if (!properties_of(options.method).learns || !options.load_guide.empty())
+    return sample_combination::constant;
+  const bool measures = is_wfpg(options.method) && options.octree != octree_source::samples &&
+                        options.least_gain.value_or(1.0f) > 0.0f;
+  return measures ? sample_combination::inverse_variance : sample_combination::pt_linear;
 }
 
 /// A picture on the way.

@@ -222,8 +222,8 @@ void add_method_options(CLI::App& app, render_options& options) {
                             "first sample's hits");
   add_choice<wfpg::sample_combination>(
       app, "--combine", options.combine, combination_names(),
-      "how samples add up (default: pt-linear; constant for methods that do not learn, and with "
-      "--load-guide)");
+      "how samples add up (default: inverse-variance, as the guide measures it; pt-linear for guides that "
+      "measure nothing; constant for methods that do not learn, and with --load-guide)");
 }
 
 void add_bidirectional_options(CLI::App& app, render_options& options) {
@@ -335,10 +335,9 @@ void add_guider_options(CLI::App& app, render_options& options) {
                   with_default("deposits a leaf of the octree in a sample that is recorded; 0: all, in each",
                                *options.deposits_per_leaf))
       ->transform(whole_number(0, largest_count));
-  add_unless_zero(app, "--least-gain", options.least_gain,
-                  with_default("guides rest where they lower the variance by less than this factor, at least "
-                               "1; 0: they never rest",
-                               *options.least_gain))
+  app.add_option("--least-gain", options.least_gain,
+                 "guides rest where they lower the variance by less than this factor, at least 1; 0: they "
+                 "never rest (default: 1.25 on GPUs, 1.75 on CPUs)")
       ->transform(number(0.0, 1.0e6));
   add_unless_zero(app, "--guide-fraction", options.guide_fraction,
                   "fraction of directions drawn from the guide (default: learnt where fields learn, else the "

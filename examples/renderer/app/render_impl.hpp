@@ -75,7 +75,8 @@ inline tracer_settings tracer_settings_of(const render_options& options) {
           static_cast<std::uint32_t>(options.roulette_depth),
           techniques_of(options),
           options.light,
-          options.technique_pictures};
+          options.technique_pictures,
+          combination_of(options) == wfpg::sample_combination::inverse_variance};
 }
 
 /// What every guide is told.

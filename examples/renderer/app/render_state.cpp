@@ -32,7 +32,7 @@ void add_guider_values(const render_options& o, named_values& values) {
   using std::to_string;
   char fraction[32], gain[32];
   std::snprintf(fraction, sizeof fraction, "%.9g", static_cast<double>(o.guide_fraction.value_or(0.0f)));
-  std::snprintf(gain, sizeof gain, "%.9g", static_cast<double>(o.least_gain.value_or(0.0f)));
+  std::snprintf(gain, sizeof gain, "%.9g", static_cast<double>(o.least_gain.value_or(-1.0f)));
   values.insert(values.end(), {{"--guiding", o.mode == guiding::plain ? "plain" : "oriented"},
                                {"--fields", o.lifetime == fields::kept ? "kept" : "transient"},
                                {"--cones", name_of(cones_names(), o.through)},

@@ -47,8 +47,10 @@ json rest_of(const rest_report& rest) {
               {"guided_mean", gain.guided_mean},
               {"unguided_variance", gain.unguided_variance},
               {"guided_variance", gain.guided_variance},
+              {"unguided_vertices", gain.unguided_vertices},
+              {"guided_vertices", gain.guided_vertices},
               {"gain", nullptr}};
-  if (gain.is_known()) result["gain"] = gain.value();
+  if (gain.is_known()) result["gain"] = gain.value_a_vertex();
   return result;
 }
 

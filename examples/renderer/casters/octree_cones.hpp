@@ -45,6 +45,7 @@ class octree_cone_guider {
   void end_sample() { guider_.end_sample(); }
   auto recorder() const { return guider_.recorder(); }
   auto lights() const { return guider_.lights(); }
+  float sample_weight() const { return guider_.sample_weight(); }
 
   template <class Wave, class Caster, class... Queries>
   void sample_directions(const Wave& wave, const Caster&,

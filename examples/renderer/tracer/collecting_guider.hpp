@@ -43,6 +43,7 @@ class collecting_guider {
         first_(exec, first_settings(options)) {
     // The first sample has no octree, whatever the options say.
     options_.unguided_samples = std::max(options.unguided_samples, 1u);
+    options_.least_gain = 0.0f;  // nor has its recorder paths to compare with
   }
 
   /// The guider. Precondition: a sample has ended.
@@ -61,6 +62,7 @@ class collecting_guider {
     learn_first_sample();
   }
   auto recorder() const { return guider_ ? guider_->recorder() : first_.view(); }
+  float sample_weight() const { return guider_ ? guider_->sample_weight() : 1.0f; }
   auto lights() const { return guider_ ? guider_->lights() : wfpg::light_guide_view(); }
 
   template <class Wave, class Caster, class... Queries>

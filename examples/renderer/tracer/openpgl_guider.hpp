@@ -127,6 +127,7 @@ class openpgl_guider {
   }
   const openpgl_recorder& recorder() const { return paths_.recorder(); }
   wfpg::light_guide_view lights() const { return {}; }
+  float sample_weight() const { return 1.0f; }
 
   template <class Wave, class Caster, class Queries = wfpg::no_queries>
   void sample_directions(const Wave& wave, const Caster&,

@@ -117,10 +117,12 @@ struct queued_surfaces {
   tiled_view<path_vertex> vertices;
 
   WFPG_HD wfpg::surface<bsdf> operator()(std::uint32_t slot) const {
-    if (queue.holds(slot)) return vertices[queue[slot]].surface();
-    wfpg::surface<bsdf> unused;
-    unused.active = false;
-    return unused;
+    wfpg::surface<bsdf> result;
+    result.active = queue.holds(slot);
+    if (!result.active) return result;
+    result = vertices[queue[slot]].surface();
+    result.path = static_cast<std::uint32_t>(queue[slot]);
+    return result;
   }
 };
 

@@ -23,6 +23,7 @@ class unguided {
   void end_sample() {}
   wfpg::no_path_recorder recorder() const { return {}; }
   wfpg::light_guide_view lights() const { return {}; }
+  float sample_weight() const { return 1.0f; }
 
   template <class Wave, class Caster, class Queries = wfpg::no_queries>
   void sample_directions(const Wave& wave, const Caster&,

@@ -24,6 +24,7 @@ struct tracer_settings {
   technique_set techniques = {};     ///< of paths from both ends
   wfpg::bidirectional_options light = {};  ///< of light paths: budget, radii, beam paths
   bool technique_pictures = false;         ///< whether they keep a picture a technique
+  bool weighs_by_gain = false;             ///< samples have the weights that the guider measures
 
   std::size_t pixels() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
 };
@@ -63,7 +64,8 @@ class path_tracer {
         hidden_(exec, is_inline || !world.next_event ? 0 : count_),
         clock_(exec) {}
 
-  /// Renders sample number `sample` (from 0) of each pixel with `weight` >= 0 in the picture, and waits.
+  /// Renders sample number `sample` (from 0) of each pixel with `weight` >= 0 in the picture, and waits. With
+  /// weighs_by_gain the guider's weight multiplies it.
   /// A Camera is a pinhole, or another type that makes rays:
   ///   wfpg::ray through(std::uint32_t pixel, vec2 offset) const;  offset in [0, 1)² of the pixel
   template <class Guider, class Camera>
@@ -73,6 +75,7 @@ class path_tracer {
       exec_.for_each(count_, start_paths<Camera>{camera, at.random, paths_.view(), radiance_.view()});
     });
     clock_.measure("update", [&] { guider.begin_sample(); });
+    if (settings_.weighs_by_gain) weight *= guider.sample_weight();
     world_.guide = guider.lights();
     for (path_queue queue{{}, true}; at.depth < at.max_depth; ++at.depth) {
       trace(guider, at, queue);

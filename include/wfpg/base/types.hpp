@@ -23,6 +23,8 @@ using uvec3 = glm::uvec3;
 using node_id = std::uint32_t;
 /// No node: its id is larger than any node's.
 inline constexpr node_id invalid_node = 0xffffffffu;
+/// Stands for the index of a path that is not told.
+inline constexpr std::uint32_t no_path = 0xffffffffu;
 
 /// A segment of a half-line. Distances are in scene units.
 struct ray {

@@ -37,6 +37,7 @@ struct ray_to_bin {
   vec3 position{0.0f};                          ///< world space; one that is not finite has no bin
   std::uint32_t orientation = orientation_any;  ///< below `orientations`: dominant_axis() or bin_orientation
   bool active = false;                          ///< false: the ray gets no bin and is not counted
+  std::uint32_t paths = 1;                      ///< paths that it stands for, where others have no active ray
 };
 
 /// Bins as kernels see them: groups of a partition of the rays. Each bin has at least one ray. Bin ids are

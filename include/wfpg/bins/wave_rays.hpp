@@ -6,6 +6,7 @@
 #include <wfpg/base/math.hpp>
 #include <wfpg/bins/spatial_binner.hpp>
 #include <wfpg/host/bsdf.hpp>
+#include <wfpg/host/recorded_runs.hpp>
 
 namespace wfpg {
 
@@ -15,14 +16,16 @@ namespace wfpg {
 /// every voxel.
 template <class Surfaces>
 struct wave_rays {
-  Surfaces surfaces;  ///< the host's: (std::uint32_t) -> surface
-  guiding_mode mode;  ///< whether bins are split by orientation
+  Surfaces surfaces;                ///< the host's: (std::uint32_t) -> surface
+  guiding_mode mode;                ///< whether bins are split by orientation
+  recorded_runs guided_paths = {};  ///< rays of other paths are inactive
   /// Describes ray i. In oriented mode, surfaces that reflect are split by the shading normal on the outgoing
   /// side, and surfaces that transmit share one orientation.
   WFPG_HD ray_to_bin operator()(std::size_t i) const {
     const auto s = surfaces(static_cast<std::uint32_t>(i));
     ray_to_bin result;
-    result.active = s.active && !s.bsdf.is_delta();
+    result.active = s.active && !s.bsdf.is_delta() && guided_paths.includes(s.path);
+    result.paths = s.path == no_path ? 1u : 1u << guided_paths.log2_divisor();
     if (!result.active) return result;
     // A position that is NaN lies in no voxel.
     result.position = is_normal(s.normal) ? s.position : vec3(bits_float(0x7fc00000u));

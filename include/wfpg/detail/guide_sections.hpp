@@ -30,7 +30,7 @@ namespace wfpg::detail {
 
 /// Magic, version and name of guide files. The magic has bytes that text conversion would change, so such
 /// damage is detected.
-inline constexpr file_kind guide_file_kind{{"\x89wfpgG\n\x1a", 8}, 4, "a guide file"};
+inline constexpr file_kind guide_file_kind{{"\x89wfpgG\n\x1a", 8}, 5, "a guide file"};
 
 /// An option that decides how a guide's state is laid out. A file is refused where one differs.
 struct shaping_option {
@@ -300,6 +300,7 @@ struct guide_sections {
       bytes.put(path.place);
       bytes.put(path.unguided);
       bytes.put(path.guided);
+      bytes.put(path.vertices);
     }
     file.section("paths", bytes);
   }
@@ -315,6 +316,7 @@ struct guide_sections {
       bytes.require(path.place < places || path.place == earlier_paths::nowhere, "has paths from no node");
       path.unguided = bytes.get<float>();
       path.guided = bytes.get<float>();
+      path.vertices = bytes.get<std::uint32_t>();
       bytes.require(is_finite(path.unguided) && is_finite(path.guided), "has radiance that is not finite");
     }
     bytes.end();

@@ -21,31 +21,57 @@ struct state_access {
   }
 
   /// Options that decide which paths are compared, and when: where one differs, a loaded guide never rests.
-  template <class Options>
-  static std::uint32_t comparison_key(const Options& o) {
+  template <class Exec, class Guide>
+  static std::uint32_t comparison_key(const path_guider<Exec, Guide>& guider) {
+    const auto& o = guider.options_;
     std::uint64_t key = hash(0, o.max_paths);
     key = hash(key, o.max_depth);
     key = hash(key, o.deposits_per_leaf.value_or(0));
     key = hash(key, o.seed);
     key = hash(key, o.unguided_samples);
-    return static_cast<std::uint32_t>(hash(key, float_bits(o.least_gain.value_or(0.0f))));
+    return static_cast<std::uint32_t>(
+        hash(key, float_bits(guider.guide_.measures() ? guider.least_gain() : -1.0f)));
   }
   template <class Exec, class Guide>
   static void put_rests(const path_guider<Exec, Guide>& guider, section_writer& bytes) {
-    bytes.put(comparison_key(guider.options_));
-    bytes.put(guider.rests_.unguided_sample());
-    bytes.put(guider.rests_.rested());
-    bytes.put(static_cast<std::uint32_t>(guider.rests_.resting()));
+    bytes.put(comparison_key(guider));
+    const rest_schedule::state state = guider.rests_.saved();
+    bytes.put(state.unguided);
+    bytes.put(state.rested);
+    bytes.put(state.takes_part);
+    bytes.put(state.weight);
+    put_gain(guider.gain_, bytes);
+  }
+  static void put_gain(const guiding_gain& gain, section_writer& bytes) {
+    bytes.put(gain.paths);
+    for (const double value : {gain.unguided_mean, gain.guided_mean, gain.unguided_variance,
+                               gain.guided_variance, gain.unguided_vertices, gain.guided_vertices})
+      bytes.put(value);
+  }
+  static guiding_gain take_gain(section_reader& bytes) {
+    guiding_gain gain;
+    gain.paths = bytes.get<std::uint64_t>();
+    for (double* const value : {&gain.unguided_mean, &gain.guided_mean, &gain.unguided_variance,
+                                &gain.guided_variance, &gain.unguided_vertices, &gain.guided_vertices}) {
+      *value = bytes.get<double>();
+      bytes.require(*value >= 0.0 && *value <= 1.0e30, "has a gain out of range");
+    }
+    return gain;
   }
   template <class Exec, class Guide>
   static void take_rests(section_reader& bytes, path_guider<Exec, Guide>& guider) {
-    const auto key = bytes.get<std::uint32_t>(), unguided = bytes.get<std::uint32_t>(),
-               rested = bytes.get<std::uint32_t>(), resting = bytes.get<std::uint32_t>();
-    bytes.require(rested <= guider.samples_, "rests in samples that are to come");
-    if (key != comparison_key(guider.options_)) return guider.rests_.restore_other(rested);
-    bytes.require(guider.rests_.restore(guider.samples_, unguided, rested, resting != 0),
-                  "rests in samples that are to come");
+    const auto key = bytes.get<std::uint32_t>();
+    rest_schedule::state state;
+    state.unguided = bytes.get<std::uint32_t>();
+    state.rested = bytes.get<std::uint32_t>();
+    state.takes_part = bytes.get<std::uint32_t>();
+    state.weight = bytes.get<float>();
+    const guiding_gain gain = take_gain(bytes);
+    bytes.require(state.rested <= guider.samples_, "rests in samples that are to come");
+    if (key != comparison_key(guider)) return guider.rests_.restore_other(state.rested);
+    bytes.require(guider.rests_.restore(guider.samples_, state), "has rests that no guider has");
     guider.rests_now_ = guider.rests_.rests(guider.samples_);
+    guider.gain_ = gain;
   }
 
   template <class Exec, class Guide>

@@ -62,12 +62,15 @@ inline bool is_up_to(float value, float most) {
 
 /// Reads and writes the members of a field_store that a guide file holds; its friend.
 struct kept_state {
-  // Section "levels": samples counted, the last busy sample, then each leaf's rays and its bin's level.
+  // Section "levels": samples counted, the last busy sample, samples before all
+  // paths were guided, the part of the paths that bins are for, then each leaf's rays and its bin's level.
   template <class Exec>
   static section_writer levels_to_bytes(const Exec& exec, const field_store<Exec>& store) {
     section_writer bytes;
     bytes.put(store.schedule_.counted_samples());
     bytes.put(store.schedule_.busy_until());
+    bytes.put(store.schedule_.before());
+    bytes.put(store.log2_divisor_);
     const std::vector<leaf_mark> leaves = store.marks_.leaves_.to_host(exec);
     for (const leaf_mark& leaf : leaves) bytes.put(leaf.rays);
     for (const leaf_mark& leaf : leaves) bytes.put(static_cast<std::uint8_t>(store.tree_.level_of(leaf.bin)));
@@ -79,8 +82,12 @@ struct kept_state {
   static void restore_levels(const Exec& exec, section_reader bytes, std::uint32_t samples,
                              field_store<Exec>& store) {
     const std::size_t leaf_count = store.tree_.leaf_count();
-    const auto counted = bytes.get<std::uint32_t>(), busy_until = bytes.get<std::uint32_t>();
-    bytes.require(store.schedule_.restore(samples, counted, busy_until), "has more samples than there were");
+    const auto counted = bytes.get<std::uint32_t>(), busy_until = bytes.get<std::uint32_t>(),
+               before = bytes.get<std::uint32_t>(), log2_divisor = bytes.get<std::uint32_t>();
+    bytes.require(store.schedule_.restore(samples, counted, busy_until, before),
+                  "has more samples than there were");
+    bytes.require(log2_divisor < 32, "has bins for too few paths");
+    store.log2_divisor_ = log2_divisor;
     const buffer<std::uint32_t, Exec> rays(exec, bytes.get_all<std::uint32_t>(leaf_count));
     const auto levels = bytes.get_all<std::uint8_t>(leaf_count);
     bytes.end();

@@ -23,8 +23,11 @@ path_guider<Exec, Guide>& path_guider<Exec, Guide>::operator=(path_guider&& othe
   warm_up_end_ = other.warm_up_end_;
   recorded_ = other.recorded_;
   rests_now_ = other.rests_now_;
+  probes_now_ = other.probes_now_;
+  weight_ = other.weight_;
   measured_ = other.measured_;
   gain_ = other.gain_;
+  compared_ = other.compared_;
   return *this;
 }
 
@@ -35,11 +38,14 @@ template <class Exec, class Guide>
 void path_guider<Exec, Guide>::begin_sample() {
   const std::uint32_t sample = samples_ + 1;
   rests_now_ = rests_.rests(sample);
-  const bool is_measured = rests_.is_unguided(sample) || rests_.compares(sample);
+  probes_now_ = rests_.probes(sample);
+  weight_ = rests_.weight();
+  const bool is_measured = probes_now_ || rests_.is_unguided(sample) || rests_.compares(sample);
   recorded_ = !rests_now_ && (is_measured || is_recorded(number_of(sample)));
-  // Samples that are compared record the same paths.
+  // Samples that are compared record the same paths, and those that probe record no others.
   const std::uint64_t chosen = is_measured ? seed_of(0) : seed_of(sample);
-  recorder_.begin_sample(exec_, static_cast<std::uint32_t>(chosen), recorded_);
+  recorder_.begin_sample(exec_, static_cast<std::uint32_t>(chosen), recorded_,
+                         probes_now_ ? compared_.rarer : 0);
   if (rests_now_)
     guide_.begin_rest(at(sample));
   else
@@ -73,9 +79,9 @@ template <class Exec, class Guide>
 void path_guider<Exec, Guide>::measure() {
   if (measured_ || guide_.empty()) return;
   if (rests_.is_unguided(samples_)) {
-    guide_.keep_unguided(exec_, recorder_);
+    guide_.keep_unguided(exec_, recorder_, compared_);
   } else if (rests_.compares(samples_) && is_guided(samples_)) {
-    gain_ = guide_.gain(exec_, recorder_);
+    gain_ = guide_.gain(exec_, recorder_, compared_).mean_with(gain_);
     rests_.decide(samples_, gain_);
   }
   measured_ = true;

@@ -45,6 +45,8 @@ namespace wfpg {
 // In guide/path_recorder.hpp, which guides that read paths include.
 template <class Exec>
 class path_recorder;
+// In host/recorded_runs.hpp, likewise.
+struct recorded_runs;
 
 /// The sample that a guide is called in. Valid during the call.
 template <class Exec>
@@ -58,6 +60,9 @@ struct sample_context {
   bool guided;
   bool recorded;       ///< whether paths of this sample are recorded: only then path_guider calls learn()
   stage_clock& clock;  ///< times stages of the guide's own; prepare, learn and update are timed already
+  /// Paths that are guided, where `guided` is true. Rays of others sample their BSDFs.
+  const recorded_runs& guided_paths;
+  const recorded_runs& guided_next;  ///< what guided_paths is in the next sample, as far as it is known
 };
 
 /// What a guide wants recorded of paths. path_guider reads it once, after it has made the guide.
@@ -121,9 +126,12 @@ struct guide_base {
   std::vector<memory_part> memory() const { return {}; }
 
   /// Whether the guide compares guided samples with an unguided one, so that it can rest. It then has
-  ///   void keep_unguided(const Exec&, const path_recorder<Exec>&);
-  ///   guiding_gain gain(const Exec&, const path_recorder<Exec>&);
-  /// and a default view_type guides no ray. Both run before learn(), the former after an unguided sample.
+  ///   bool measures() const;                        whether it does under its options
+  ///   std::uint32_t rarer() const;                  log2 of the recorded paths of which one is compared
+  ///   void keep_unguided(const Exec&, const path_recorder<Exec>&, const recorded_runs& compared);
+  ///   guiding_gain gain(const Exec&, const path_recorder<Exec>&, const recorded_runs& compared);
+  /// and a default view_type guides no ray. The last two run before learn(), keep_unguided() after an
+  /// unguided sample.
   static constexpr bool measures_gain = false;
   /// Runs in place of begin_sample() before a sample that the guide rests in.
   template <class Exec>

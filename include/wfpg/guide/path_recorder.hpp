@@ -19,8 +19,8 @@
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/support/atomic.hpp>
 #include <wfpg/exec/support/thrust.hpp>
-#include <wfpg/guide/recorded_runs.hpp>
 #include <wfpg/guide/recorded_wave.hpp>
+#include <wfpg/host/recorded_runs.hpp>
 #include <wfpg/sampling/sampled_direction.hpp>
 
 #include <thrust/fill.h>
@@ -258,7 +258,7 @@ class path_recorder_view {
 
   std::size_t paths_ = 0;
   std::size_t recorded_ = 0;  // 0 in a sample that records nothing
-  detail::recorded_runs runs_;
+  recorded_runs runs_;
   std::uint32_t max_depth_ = 0;
   bool include_emission_ = true;
   bool silent_escapes_ = false;
@@ -333,7 +333,7 @@ class path_recorder {
   /// A recorder without paths yet. Until the first begin_sample() it records all of `settings`' paths. Throws
   /// out_of_memory.
   path_recorder(const Exec& exec, const path_recorder_settings& settings)
-      : lengths_(exec, detail::recorded_runs{settings.fraction_shift}.size(settings.paths)),
+      : lengths_(exec, recorded_runs{settings.fraction_shift}.size(settings.paths)),
         places_(exec, lengths_.size() * settings.max_depth),
         light_(exec, lengths_.size() * settings.max_depth),
         directions_(exec, settings.directions ? lengths_.size() * settings.max_depth : 0),
@@ -367,15 +367,19 @@ class path_recorder {
 
   /// Whether scatter() and escape() are recorded.
   bool records_directions() const { return view_.records_directions(); }
+  /// Which paths this sample records, if it records any.
+  const recorded_runs& runs() const { return view_.runs_; }
   /// Size of the recorded part of this sample: recorded_path takes places in [0, recorded()). 0 in a sample
   /// that is not recorded. Some of these paths may have no vertices.
   std::size_t recorded() const { return view_.recorded(); }
 
   /// Begins a sample: clears all paths and chooses by `seed` which ones are recorded, or none if `records` is
-  /// false. Views made before are invalid. O(recorded()).
-  void begin_sample(const Exec& exec, std::uint32_t seed, bool records = true) {
+  /// false. Of those that the settings record, one in 2^rarer is. Views made before are invalid.
+  /// O(recorded()).
+  void begin_sample(const Exec& exec, std::uint32_t seed, bool records = true, std::uint32_t rarer = 0) {
     view_.runs_.seed = seed;
-    view_.recorded_ = records ? lengths_.size() : 0;
+    view_.runs_.rarer = rarer;
+    view_.recorded_ = records ? view_.runs_.size(view_.paths_) : 0;
     clear(exec);
     wave_.clear(exec);
   }

@@ -6,8 +6,8 @@
 
 #include <wfpg/exec/support/value_queue.hpp>
 #include <wfpg/guide/guide.hpp>
-#include <wfpg/guide/recorded_runs.hpp>
 #include <wfpg/guide/sampling_options.hpp>
+#include <wfpg/host/recorded_runs.hpp>
 
 #include <string>
 
@@ -44,7 +44,9 @@ class recorded_fraction {
   }
 
   /// Most paths that a recorded sample can have.
-  std::size_t paths() const { return recorded_runs{shift(wanted_)}.size(paths_); }
+  std::size_t paths() const { return part(0); }
+  /// Most paths of a sample that records one in 2^rarer of them.
+  std::size_t part(std::uint32_t rarer) const { return recorded_runs{shift(wanted_), 0, rarer}.size(paths_); }
 
  private:
   // A shift is log2 of a divisor: recorded_runs records so many paths fewer.

@@ -41,6 +41,7 @@ struct recorded_surfaces {
     const detail::wave_place at = places[path];
     s.position = at.position;
     s.geometric_normal = s.normal = s.outgoing = at.normal;
+    s.path = path;
     s.bsdf.transmits_below = (state & detail::wave_transmits) != 0;
     return s;
   }

@@ -27,14 +27,16 @@ struct sampling_options {
   bool include_emission = true;
   /// Samples at the beginning that only record: "PT first" in section 3.7.
   std::uint32_t unguided_samples = 1;
-  /// Gain below which guiding does not pay, at least 1; unset: the guide never rests. Samples 4, 8, 16 and so
-  /// on are compared with the unguided one. Where the variance of paths falls by less than this, the guide
-  /// rests until the next comparison. A sample that rests costs what path tracing costs.
+  /// Gain below which guiding does not pay: at least 1, or 0 for a guide that never rests. Unset: what suits
+  /// the policy, rest_constants::gpu_least_gain or cpu_least_gain. Samples 4, 8, 16 and so on are compared
+  /// with the unguided one. Where the variance of paths falls by less than this at equal numbers of vertices,
+  /// the guide rests until the next comparison. A sample that rests costs what path tracing costs.
   ///
-  /// The default pays on GPUs, where a guided sample takes 1.26 times path tracing's time. On CPUs it takes
-  /// more. Needs unguided_samples of at least 1, and a guide that measures. It also needs 4096 paths that are
-  /// recorded, and go through the same surfaces in all samples that are compared.
-  std::optional<float> least_gain = 1.25f;
+  /// Until it is known whether guiding pays, at least until sample 4, few paths are recorded. The guide takes
+  /// part in these alone, if surfaces tell their paths (surface::path). Needs unguided_samples of at least 1,
+  /// and a guide that measures. It also needs 2048 paths that are recorded, and go through the same surfaces
+  /// in all samples that are compared.
+  std::optional<float> least_gain;
   std::uint64_t seed = 0;  ///< seed of the guider's own random numbers; the renderer's come with each wave
   /// Most paths of a sample that the recorder has room for, less than 2^32 - 1. 0 records nothing. Times
   /// max_depth it must be less than 2^32 - 1, too.
@@ -64,7 +66,7 @@ inline void require_valid(const sampling_options& o) {
   const float fraction = o.guide_fraction.value_or(1.0f);
   require(fraction > 0.0f && fraction <= 1.0f, "guide_fraction", fraction, "in (0, 1]");
   const float least = o.least_gain.value_or(1.0f);
-  require(least >= 1.0f && least <= 1.0e6f, "least_gain", least, "in [1, 1e6], or unset");
+  require(least == 0.0f || (least >= 1.0f && least <= 1.0e6f), "least_gain", least, "0, or in [1, 1e6]");
   require(o.guided_depths >= 1, "guided_depths", o.guided_depths, "at least 1");
   require(o.max_depth >= 1 && o.max_depth <= 1024, "max_depth", o.max_depth, "in [1, 1024]");
   require(o.max_paths < 0xffffffffull, "max_paths", o.max_paths, "less than 2^32 - 1");

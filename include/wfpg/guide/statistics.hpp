@@ -48,41 +48,45 @@ struct kept_field_statistics {
 /// Gain of guiding at equal numbers of samples, measured over pixels whose paths were recorded. Radiance
 /// and variances are relative to what the cache expects of a pixel.
 struct guiding_gain {
-  /// Paths that are needed, for a variance to about a fifth.
-  static constexpr std::uint64_t least_paths = 4096;
+  /// Paths that are needed, for a variance to about a third.
+  static constexpr std::uint64_t least_paths = 2048;
   /// Part of the guided paths' light that unguided paths have to find. Where they miss more, their variance
   /// is not known: it lies in the paths that they seldom find.
   static constexpr double least_light = 0.95;
-  /// Part of the unguided paths' light that may be cut off, since it comes from few and very bright paths.
-  static constexpr double most_cut_off = 0.01;
-  /// More may be cut off where guided paths have at least this part of it. The guide does not find such light
-  /// by more and dimmer paths, then.
-  static constexpr double least_as_bright = 0.5;
-  /// Part of the unguided paths' light that may be cut off then.
-  static constexpr double most_as_bright = 0.1;
+  /// Difference of two paths up to which its square counts, relative to what the cache expects. Beyond, it
+  /// counts linearly (Huber's loss), so that a few bright paths do not decide alone.
+  static constexpr double most_square = 8.0;
 
   std::uint64_t paths = 0;     ///< pixels with paths in all samples that were compared
-  double unguided_mean = 0.0;  ///< mean radiance of paths that sample their BSDFs, without what is cut off
-  double cut_off_mean = 0.0;   ///< mean of what is cut off of these paths
-  double guided_mean = 0.0;    ///< mean radiance of guided paths, without what is cut off
-  double guided_cut_off_mean = 0.0;  ///< mean of what is cut off of guided paths
-  double unguided_variance = 0.0;    ///< variance of a path that samples its BSDFs
-  double guided_variance = 0.0;      ///< variance of a guided path
+  double unguided_mean = 0.0;  ///< mean radiance of paths that sample their BSDFs; a path counts 8 at most
+  double guided_mean = 0.0;    ///< mean radiance of guided paths; a path counts 8 at most
+  double unguided_variance = 0.0;  ///< variance of a path that samples its BSDFs, by Huber's loss
+  double guided_variance = 0.0;    ///< variance of a guided path, by Huber's loss
+  double unguided_vertices = 0.0;  ///< mean surfaces of a path that samples its BSDFs
+  double guided_vertices = 0.0;    ///< mean surfaces of a guided path
 
   /// Whether value() means something.
-  bool is_known() const {
-    return paths >= least_paths && unguided_mean >= least_light * guided_mean &&
-           (cut_off_mean <= most_cut_off * unguided_mean || is_as_bright());
-  }
-  /// Whether guided paths bring bright light by as few and bright paths as unguided ones do.
-  bool is_as_bright() const {
-    return cut_off_mean <= most_as_bright * unguided_mean &&
-           guided_cut_off_mean >= least_as_bright * cut_off_mean;
-  }
+  bool is_known() const { return paths >= least_paths && unguided_mean >= least_light * guided_mean; }
   /// Unguided variance over guided variance, at most 1e6; 1 where both are 0.
   double value() const {
     if (!(guided_variance > 1.0e-6 * unguided_variance)) return unguided_variance > 0.0 ? 1.0e6 : 1.0;
     return unguided_variance / guided_variance;
+  }
+  /// value() at equal numbers of surfaces: guided paths may be longer, since fewer of them leave the scene.
+  double value_a_vertex() const {
+    return guided_vertices > 0.0 ? value() * unguided_vertices / guided_vertices : value();
+  }
+  /// Mean with an earlier comparison, if it had paths: few bright paths decide less.
+  guiding_gain mean_with(const guiding_gain& before) const {
+    if (before.paths == 0) return *this;
+    const auto mean = [](double a, double b) { return 0.5 * (a + b); };
+    return {paths,
+            mean(unguided_mean, before.unguided_mean),
+            mean(guided_mean, before.guided_mean),
+            mean(unguided_variance, before.unguided_variance),
+            mean(guided_variance, before.guided_variance),
+            mean(unguided_vertices, before.unguided_vertices),
+            mean(guided_vertices, before.guided_vertices)};
   }
 };
 
@@ -93,7 +97,7 @@ struct guider_statistics {
                                      ///< did not rest
   /// Samples begun in which the guide rested, since guiding gained less than least_gain.
   std::uint32_t rested_samples = 0;
-  /// The last comparison of a guided sample with an unguided one; a guide file has none.
+  /// Mean of the comparisons of guided samples with an unguided one. Each weighs half of the one after it.
   guiding_gain gain;
   std::vector<depth_statistics> depths;  ///< one element a depth, max_depth of them; empty without fields
   kept_field_statistics kept;            ///< all 0 where fields are transient

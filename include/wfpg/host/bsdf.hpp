@@ -70,6 +70,9 @@ struct surface {
   Bsdf bsdf{};          ///< as is_bsdf_v describes it
   /// False: this ray of the capacity is not in use, and nothing else of it is read.
   bool active = true;
+  /// Index of the ray's path, as the recorder knows it. A guide that is not sure that it pays guides a few
+  /// paths. It asks for the same ones at all depths, so that it guides all where hosts leave this out.
+  std::uint32_t path = no_path;
 };
 
 /// Returns whether `n` is finite and of about unit length: in (0.5, 2), which rounding never leaves.

@@ -2,7 +2,7 @@
 // are counted for bins, and when bins are chosen anew. Pure functions of counters; every constant is here.
 // wfpg's own.
 //
-// Cost: O(1) a call. Memory: five counters.
+// Cost: O(1) a call. Memory: six counters.
 #pragma once
 
 #include <wfpg/base/config.hpp>
@@ -41,6 +41,9 @@ struct build_schedule_constants {
   static constexpr std::uint32_t counted_rays_a_leaf = 8;
   /// ... and the stride is at most this.
   static constexpr std::uint32_t max_count_stride = 32;
+  /// log2 of the rays of a bin over rays_per_bin, while few paths are guided. Bins are also a level larger at
+  /// least. Making fields is most of what probing costs.
+  static constexpr std::uint32_t larger_probing_bins = 2;
   /// Slots that one wave allocates at most: one block handles this many in microseconds.
   static constexpr std::uint32_t max_allocations = 1u << 12;
   /// Before this sample bins may become smaller. Later, fields have learnt, and smaller bins would learn
@@ -107,26 +110,35 @@ class build_schedule {
   bool counts_rays() const {
     const std::uint32_t period = sample_ <= constants::warm_up_samples ? constants::warm_up_count_period
                                                                        : constants::later_count_period;
-    return sample_ <= constants::counted_samples || sample_ % period == 0;
+    return age() <= constants::counted_samples || sample_ % period == 0;
   }
-  /// Which of the sample's rays are counted. With a stride above 1, successive samples count different rays.
-  counted_rays counted() const {
+  /// Which of the sample's rays are counted, where one path in 2^log2_divisor takes part. With a stride above
+  /// 1, successive samples count different rays.
+  counted_rays counted(std::uint32_t log2_divisor = 0) const {
     if (!counts_rays()) return {0, 0};
-    return {stride_, sample_ % stride_};
+    const std::uint32_t stride = max(stride_ >> min(log2_divisor, 31u), 1u);
+    return {stride, sample_ % stride};
   }
+  /// Begins choosing bins anew after this sample: from the next one on, as many paths are guided as ever.
+  void begin_anew() { before_ = sample_; }
+  /// Number of samples since all paths are guided, with this one; 0 before the first.
+  std::uint32_t age() const { return sample_ - before_; }
+  /// Number of samples before all paths were guided.
+  std::uint32_t before() const { return before_; }
   /// Number of samples whose rays were counted.
   std::uint32_t counted_samples() const { return counted_; }
-  /// Whether bins are chosen anew at the end of the sample: after samples 1, 2, 4, 8, ...
-  bool chooses_bins() const { return sample_ > 0 && (sample_ & (sample_ - 1)) == 0; }
+  /// Whether bins are chosen anew at the end of the sample: at the ages 1, 2, 4, 8, ...
+  bool chooses_bins() const { return age() > 0 && (age() & (age() - 1)) == 0; }
   /// The last sample in which every wave builds.
   std::uint32_t busy_until() const { return busy_until_; }
 
   /// Takes a saved state. Returns false where it cannot have come from `sample` samples.
-  bool restore(std::uint32_t sample, std::uint32_t counted, std::uint32_t busy_until) {
+  bool restore(std::uint32_t sample, std::uint32_t counted, std::uint32_t busy_until, std::uint32_t before) {
     sample_ = sample;
     counted_ = counted;
     busy_until_ = busy_until;
-    return counted <= sample && busy_until <= sample + constants::invalidated_samples;
+    before_ = before;
+    return counted <= sample && busy_until <= sample + constants::invalidated_samples && before <= sample;
   }
 
   /// Whether a field is due in a sample. `builds`: how often it was built; 0 is always due. `last_built`:
@@ -165,6 +177,7 @@ class build_schedule {
   std::uint32_t counted_ = 0;
   std::uint32_t stride_ = 1;
   std::uint32_t busy_until_ = constants::warm_up_samples;
+  std::uint32_t before_ = 0;
 };
 
 }  // namespace wfpg

@@ -42,7 +42,8 @@ struct kept_field_wave {
   product_points points;                       ///< of products; P divides the store's resolution
   /// On the device: the wave's counts are added to it. Null: they are not counted.
   depth_statistics* statistics = nullptr;
-  bool learns_fraction = true;  ///< fields keep what they learnt of it; false: they have `fraction`
+  bool learns_fraction = true;      ///< fields keep what they learnt of it; false: they have `fraction`
+  recorded_runs guided_paths = {};  ///< rays of other paths get no field
 };
 
 /// Owns the slots, in the memory of `Exec`. The octree must outlive it. Results do not depend on the number
@@ -64,11 +65,12 @@ class field_store {
   void begin_sample(const Exec& exec, std::uint32_t sample);
 
   /// Counts a wave's rays for bins, and guides none. For samples before guiding starts, so that bins are
-  /// known then. `Rays`: (std::size_t) -> ray_to_bin. O(n).
+  /// known then. `Rays`: (std::size_t) -> ray_to_bin, active for one path in
+  /// 2^log2_divisor. O(n).
   template <class Rays>
-  void count(const Exec& exec, std::size_t n, const Rays& rays) {
+  void count(const Exec& exec, std::size_t n, const Rays& rays, std::uint32_t log2_divisor = 0) {
     if (schedule_.counts_rays())
-      exec.for_each(n, detail::count_rays<Rays>{rays, tree_, marks_.view(), schedule_.counted()});
+      exec.for_each(n, detail::count_rays<Rays>{rays, tree_, marks_.view(), schedule_.counted(log2_divisor)});
   }
 
   /// Finds or makes the fields of a wave's rays, and refreshes those that are due. Returns what kernels
@@ -101,9 +103,10 @@ class field_store {
   learnt_radiance_view learnt(bool with_fractions = true) const { return pool_.learnt(with_fractions); }
 
   /// Ends the sample. Fields learn if anything was `recorded` in learnt(). After samples 1, 2, 4, 8, ...
-  /// chooses bins anew by the rays counted so far. O(cells of fields used + values), and O(nodes) where bins
-  /// are chosen.
-  void end_sample(const Exec& exec, bool recorded = true);
+  /// chooses bins anew by the rays counted so far. Also where another part of the paths is guided from the
+  /// next sample on: one in 2^log2_divisor. Bins are then as much larger, so that they have as many guided
+  /// rays. O(cells of fields used + values), and O(nodes) where bins are chosen.
+  void end_sample(const Exec& exec, bool recorded = true, std::uint32_t log2_divisor = 0);
 
   /// Forgets what fields learnt. Hits and distributions stay: a field changes when it is built next.
   void forget(const Exec& exec) { pool_.forget(exec); }
@@ -180,8 +183,9 @@ class field_store {
   detail::field_pool<Exec> pool_;
   buffer<std::uint32_t, Exec> field_of_ray_;
   buffer<field_wave_counts, Exec> counts_;
-  bool in_wave_ = false;  // also after one whose caster threw
-  bool adapted_ = false;  // bins to this sample: not twice where its end is made again
+  bool in_wave_ = false;            // also after one whose caster threw
+  std::uint32_t log2_divisor_ = 0;  // bins are for rays of one path in 2^this
+  bool adapted_ = false;            // bins to this sample: not twice where its end is made again
 };
 
 }  // namespace wfpg

@@ -5,13 +5,12 @@
 // guided paths. E (b - g)² is the sum of both variances.
 //
 // Differences are relative to what the cache expects of the path's first surface, and the mean of the scene.
-// So dark and bright parts count alike, and no part without light counts much. They are cut off at 8, since
-// a few bright paths would decide alone. What is cut off lowers the mean of unguided paths, by which
-// guiding_gain notices that they miss light. Where as much is cut off of guided paths, the guide has not
-// found that light, either.
+// So dark and bright parts count alike, and no part without light counts much. Squares count up to 8, and
+// larger differences linearly (Huber 1964), since a few bright paths would decide alone. The means of both
+// kinds of paths show where unguided ones miss light: a path counts 8 at most.
 //
 // Source: wfpg's own. Cost: a look-up and O(vertices) a path, over at most 65,536 paths, and a reduction.
-// Memory: 12 bytes a path, at most 768 KiB.
+// Memory: 16 bytes a path, at most 1 MiB.
 #pragma once
 
 #include <wfpg/exec/buffer.hpp>
@@ -23,30 +22,43 @@
 namespace wfpg {
 
 /// Compares the paths of guided samples with those of an unguided one. Movable, not copyable. Precondition:
-/// the recorder records the same paths in all samples that it is called for.
+/// the paths to compare are the same ones in all calls, and the recorder records them.
 template <class Exec>
 class gain_meter {
  public:
   /// Most paths that are measured: more would not change what is decided.
   static constexpr std::size_t most_paths = 65536;
+  /// Least paths to compare, where as many are recorded. Of all paths one in 16 is enough.
+  static constexpr std::size_t least_paths = 4096;
+
+  /// Returns log2 of the number of recorded paths of which one is compared. `paths`: of a sample.
+  static std::uint32_t rarer(std::size_t recorded, std::size_t paths) {
+    const std::size_t wanted = clamp(paths / 16, least_paths, most_paths);
+    std::uint32_t result = 0;
+    while (recorded >> (result + 1) >= wanted || recorded >> result > most_paths) ++result;
+    return result;
+  }
 
   /// A meter of no paths, whose gain is never known.
   gain_meter() = default;
-  /// A meter for recorders of up to `paths` recorded paths. With 0, gains are never known. Throws
-  /// out_of_memory.
+  /// A meter for up to `paths` paths to compare. With 0, gains are never known. Throws out_of_memory.
   gain_meter(const Exec& exec, std::size_t paths);
 
   /// Keeps what the recorded paths of an unguided sample brought, in place of all that was kept. Call it
   /// before the recorder is cleared. O(paths).
-  void keep_unguided(const Exec& exec, const path_recorder<Exec>& recorder, const exitance_cache_view& cache);
+  void keep_unguided(const Exec& exec, const path_recorder<Exec>& recorder, const recorded_runs& compared,
+                     const exitance_cache_view& cache);
   /// Measures the recorded paths of a guided sample, and keeps what they brought. The gain is known from the
   /// second call on. Call it before the recorder is cleared, and before the cache has these paths. Waits for
   /// the work before it. O(paths).
-  guiding_gain gain(const Exec& exec, const path_recorder<Exec>& recorder, const exitance_cache_view& cache);
+  guiding_gain gain(const Exec& exec, const path_recorder<Exec>& recorder, const recorded_runs& compared,
+                    const exitance_cache_view& cache);
 
   /// Forgets all that is kept. The next gain() then knows no path. O(paths).
   void forget(const Exec& exec);
-  /// Bytes in the policy's memory: 12 a path.
+  /// Most paths to compare.
+  std::size_t size() const { return kept_.size(); }
+  /// Bytes in the policy's memory: 16 a path.
   std::size_t bytes() const { return kept_.bytes(); }
 
  private:
@@ -57,17 +69,9 @@ class gain_meter {
   // Sum of what measure(i) adds, for i in [0, n).
   template <class Measure>
   static detail::path_sums sum(const Exec& exec, std::size_t n, const Measure& measure);
-  void keep(const Exec& exec, const detail::measured_paths& paths, std::size_t n, bool unguided);
-
-  // Every stride-th recorded path is measured, so that there is room.
-  std::size_t stride(const path_recorder<Exec>& recorder) const;
-  detail::measured_paths measured(const path_recorder<Exec>& recorder,
-                                  const exitance_cache_view& cache) const {
-    return {recorder.view(), cache, stride(recorder)};
-  }
-  std::size_t measured_count(const path_recorder<Exec>& recorder) const {
-    return min(recorder.recorded() / stride(recorder), kept_.size());
-  }
+  void keep(const Exec& exec, const detail::measured_paths& paths, bool unguided);
+  // Number of paths, for which there is room.
+  std::size_t count(const detail::measured_paths& paths) const { return min(paths.size(), kept_.size()); }
 
   buffer<detail::earlier_paths, Exec> kept_;  // a measured path
 };

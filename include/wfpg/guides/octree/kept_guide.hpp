@@ -88,7 +88,7 @@ class kept_guide : public octree_scene<Exec> {
   /// nodes + cells of the fields used).
   void update(const sample_context<Exec>& at) {
     const bool recorded = scene::update_cache(at);
-    store_.end_sample(at.exec, recorded);
+    store_.end_sample(at.exec, recorded, at.guided_next.log2_divisor());
     scene::end_scene_sample(at);
   }
 
@@ -151,7 +151,8 @@ class kept_guide : public octree_scene<Exec> {
             hash(at.seed, w.depth),
             scene::draw_points(at, w.depth),
             scene::depth_counts(w.depth),
-            learns_fractions()};
+            learns_fractions(),
+            at.guided_paths};
   }
   // `FieldSampler`: sample_field or sample_product, over `Sampler`.
   template <class FieldSampler, class Surfaces, class Random, class Caster, class Sampler>

@@ -15,9 +15,9 @@
 #include <wfpg/bins/spatial_binner.hpp>
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/support/value_queue.hpp>
-#include <wfpg/guide/recorded_runs.hpp>
 #include <wfpg/guides/octree/detail/learn_lights.hpp>
 #include <wfpg/guides/octree/options.hpp>
+#include <wfpg/host/recorded_runs.hpp>
 #include <wfpg/octree/sparse_voxel_octree.hpp>
 
 #include <vector>
@@ -107,7 +107,7 @@ class light_guide_view {
   // Inclusive sums of probabilities, row by row.
   const float* sums_ = nullptr;
   // Which paths are recorded in this sample.
-  detail::recorded_runs runs_;
+  recorded_runs runs_;
   detail::value_queue_view queue_;
 };
 

@@ -47,14 +47,18 @@ class octree_scene : public guide_base {
 
   /// True: path_guider calls the members below, and the guide may rest.
   static constexpr bool measures_gain = true;
-  /// Keeps what the paths of an unguided sample brought. O(recorded paths).
-  void keep_unguided(const Exec& exec, const path_recorder<Exec>& paths) {
-    meter_.keep_unguided(exec, paths, cache_.view());
+  /// Whether samples are compared. Not where a host deposits by itself: a guide that rests reads no deposits.
+  bool measures() const { return meter_.size() >= guiding_gain::least_paths && !empty(); }
+  /// log2 of the number of recorded paths of which one is compared.
+  std::uint32_t rarer() const { return gain_meter<Exec>::rarer(recorded().paths(), options_.max_paths); }
+  /// Keeps what the paths of an unguided sample brought. O(compared paths).
+  void keep_unguided(const Exec& exec, const path_recorder<Exec>& paths, const recorded_runs& compared) {
+    meter_.keep_unguided(exec, paths, compared, cache_.view());
   }
   /// Compares the paths of a guided sample with those that keep_unguided() kept, and with those of the call
-  /// before. Waits for the work before it. O(recorded paths).
-  guiding_gain gain(const Exec& exec, const path_recorder<Exec>& paths) {
-    return meter_.gain(exec, paths, cache_.view());
+  /// before. Waits for the work before it. O(compared paths).
+  guiding_gain gain(const Exec& exec, const path_recorder<Exec>& paths, const recorded_runs& compared) {
+    return meter_.gain(exec, paths, compared, cache_.view());
   }
   /// Begins a sample that the guide rests in. Choices of lights go on.
   /// Neither fields nor cache take part.
@@ -88,9 +92,12 @@ class octree_scene : public guide_base {
     return options.product_resolution.value_or(0);
   }
 
-  /// Whether samples are compared. Not where a host deposits by itself: a guide that rests reads no deposits.
-  static bool is_compared(const octree_guide_options& options) {
-    return options.least_gain && options.unguided_samples > 0 && options.deposit_capacity.value_or(0) == 0;
+  /// Paths that are compared: 0 where the options, or a host that deposits by itself, leave no comparison.
+  std::size_t compared_paths() const {
+    const octree_guide_options& o = options_;
+    const bool measures =
+        o.least_gain.value_or(1.0f) > 0.0f && o.unguided_samples > 0 && o.deposit_capacity.value_or(0) == 0;
+    return measures ? recorded().part(rarer()) : 0;
   }
   /// Which fraction of paths the recorder stores. `directions`: also directions and their fields.
   recording_needs recording(bool directions) const { return recorded().needs(directions); }
@@ -169,7 +176,7 @@ class octree_scene : public guide_base {
   sparse_voxel_octree<Exec> octree_;
   exitance_cache<Exec> cache_;
   light_guide<Exec> lights_;
-  // Paths of samples that are compared. Empty where none is: is_compared().
+  // Paths of samples that are compared. Empty where none is.
   gain_meter<Exec> meter_;
   // P² points over the hemisphere, then P² over the sphere.
   buffer<product_point, Exec> product_points_;  // P² over the hemisphere, then P² over the sphere

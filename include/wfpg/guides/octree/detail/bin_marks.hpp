@@ -67,7 +67,7 @@ struct mark_threshold {
   static constexpr std::uint32_t pressure_unit = build_schedule_constants::pressure_unit;
 
   // c_ray, and the samples whose rays were counted.
-  std::uint32_t rays_per_bin;
+  std::uint64_t rays_per_bin;
   std::uint32_t samples;
   std::uint64_t room;  // slots
   // On the device: how many times as many rays a bin should have as make all bins fit, in units of 1 /
@@ -75,7 +75,7 @@ struct mark_threshold {
   const std::uint32_t* pressure;
 
   WFPG_HD std::uint64_t operator()(std::uint32_t rays) const {
-    const std::uint64_t wanted = (std::uint64_t(rays_per_bin) * samples + 1) / 2;
+    const std::uint64_t wanted = (rays_per_bin * samples + 1) / 2;
     const std::uint64_t affordable =
         room > 0 ? std::uint64_t(rays) * *pressure / (room * pressure_unit) : wanted;
     return min<std::uint64_t>(max(wanted, affordable), bin_marks_view::most);
@@ -106,24 +106,28 @@ class bin_marks {
     options_.min_level = min(options_.min_level, tree.depth());
     ::thrust::fill_n(exec.thrust(), leaves_.data(), leaves_.size(), leaf_mark{});
     ::thrust::fill_n(exec.thrust(), inner_.data(), inner_.size(), 0u);
-    mark_bins(exec, {1, 1, 0, nullptr});
+    mark_bins(exec, {1, 1, 0, nullptr}, options_.min_level);
   }
 
   bin_marks_view view() const { return {tree_.first_leaf(), leaves_.data(), inner_.data()}; }
   std::size_t bytes() const { return leaves_.bytes() + inner_.bytes(); }
 
   /// Chooses bins anew from the counts of `samples` samples. `room`: slots for bins' fields. `pressure`: on
-  /// the device. O(nodes).
-  void mark(const Exec& exec, std::uint32_t samples, std::size_t room, const std::uint32_t* pressure) {
+  /// the device. `log2_divisor`: of the rays that are counted, one in 2^log2_divisor is guided. O(nodes).
+  void mark(const Exec& exec, std::uint32_t samples, std::size_t room, const std::uint32_t* pressure,
+            std::uint32_t log2_divisor = 0) {
     for_each_bottom_up(exec, tree_, 0, sum_running_counts{tree_, view()});
-    mark_bins(exec, {options_.rays_per_bin, samples, room, pressure});
+    const bool is_part = log2_divisor > 0;
+    const std::uint32_t larger = log2_divisor + (is_part ? build_schedule_constants::larger_probing_bins : 0),
+                        min_level = options_.min_level - (is_part && options_.min_level > 0 ? 1 : 0);
+    mark_bins(exec, {std::uint64_t(options_.rays_per_bin) << larger, samples, room, pressure}, min_level);
   }
 
  private:
   friend struct kept_state;
 
-  void mark_bins(const Exec& exec, const mark_threshold& threshold) {
-    exec.for_each(leaves_.size(), mark_leaves{tree_, view(), options_.min_level, threshold});
+  void mark_bins(const Exec& exec, const mark_threshold& threshold, std::uint32_t min_level) {
+    exec.for_each(leaves_.size(), mark_leaves{tree_, view(), min_level, threshold});
   }
 
   sparse_voxel_octree_view tree_;

@@ -50,15 +50,17 @@ void field_store<Exec>::begin_sample(const Exec& exec, std::uint32_t sample) {
 }
 
 template <class Exec>
-void field_store<Exec>::end_sample(const Exec& exec, bool recorded) {
+void field_store<Exec>::end_sample(const Exec& exec, bool recorded, std::uint32_t log2_divisor) {
   if (recorded) pool_.learn(exec, table_.view().slots, schedule_.sample());
-  if (!schedule_.chooses_bins()) return;
+  const bool changes = log2_divisor != log2_divisor_;
+  if (!schedule_.chooses_bins() && !changes) return;
   schedule_.expect_builds(build_schedule_constants::busy_samples);
-  if (schedule_.sample() > 1 && !adapted_) {  // in the first, bins are as large as they may be
-    table_.adapt_pressure(exec, schedule_.sample());
-    adapted_ = true;
-  }
-  marks_.mark(exec, schedule_.counted_samples(), table_.size(), &table_.state()->pressure);
+  // In the first sample bins are as large as they may be. Where few paths are guided, few fields are used.
+  if (schedule_.age() > 1 && log2_divisor_ == 0 && !adapted_) table_.adapt_pressure(exec, schedule_.age());
+  adapted_ = true;
+  marks_.mark(exec, schedule_.counted_samples(), table_.size(), &table_.state()->pressure, log2_divisor);
+  log2_divisor_ = log2_divisor;
+  if (changes && log2_divisor == 0) schedule_.begin_anew();
 }
 
 template <class Exec>
@@ -112,9 +114,12 @@ detail::find_field<wave_rays<Surfaces>> field_store<Exec>::finder(const kept_fie
                                                                   detail::wanted_builds wanted_now) {
   const detail::use_slot use{table_.view(), schedule_.sample(), wave.seed, wanted_now,
                              table_.builds(counts())};
-  return {
-      {wave.surfaces, wave.mode}, {counts(), wave.statistics}, marks_.view(), {tree_, use}, table_.wanted(),
-      schedule_.counted()};
+  return {{wave.surfaces, wave.mode, wave.guided_paths},
+          {counts(), wave.statistics},
+          marks_.view(),
+          {tree_, use},
+          table_.wanted(),
+          schedule_.counted(wave.guided_paths.log2_divisor())};
 }
 
 /// Gives rays their slots, new ones where there is room.

@@ -146,7 +146,7 @@ struct find_field {
       if (ray.active) counts.unbinned();
       return 0;
     }
-    if (counted.includes(i)) marks.count(leaf, counted.stride);
+    if (counted.includes(i)) marks.count(leaf, counted.stride * ray.paths);
     const std::uint32_t key = marks.bin(leaf) * orientations + ray.orientation;
     const std::uint32_t slot = use.slots.find(key);
     if (slot != no_slot) {
@@ -250,7 +250,7 @@ struct count_rays {
     const ray_to_bin ray = rays(i);
     if (!ray.active) return;
     const node_id leaf = leaf_of(tree, ray);
-    if (leaf != invalid_node) marks.count(leaf, counted.stride);
+    if (leaf != invalid_node) marks.count(leaf, counted.stride * ray.paths);
   }
 };
 

@@ -4,6 +4,8 @@
 #include <wfpg/base/math.hpp>
 #include <wfpg/guide/path_recorder.hpp>
 #include <wfpg/guide/recorded_path.hpp>
+#include <wfpg/guide/statistics.hpp>
+#include <wfpg/host/recorded_runs.hpp>
 #include <wfpg/octree/exitance_cache.hpp>
 
 #include <cstddef>
@@ -11,7 +13,7 @@
 
 namespace wfpg::detail {
 
-/// Radiance that paths of one index brought to the camera in earlier samples: luminance, W/(m² sr). 12 bytes.
+/// Radiance that paths of one index brought to the camera in earlier samples: luminance, W/(m² sr). 16 bytes.
 struct earlier_paths {
   /// Marks paths that hit no surface of the octree first.
   static constexpr std::uint32_t nowhere = 0xffffffffu;
@@ -20,42 +22,52 @@ struct earlier_paths {
   float unguided = -1.0f;         ///< in the unguided sample; negative where it is not known
   /// In the last guided sample that was measured; negative where it is not known, or began at another place.
   float guided = -1.0f;
+  std::uint32_t vertices = 0;  ///< surfaces of the unguided path
 };
 
-/// Sums over paths. Integers, so that any order of additions gives the same bits. Values are in units of
-/// 2^-30, squared differences in units of 2^-40.
+/// Sums over at most 2^17 paths. Integers, so that any order of additions gives the same bits. Values are in
+/// units of 2^-30, losses in units of 2^-36.
 struct path_sums {
   std::uint64_t paths = 0;
-  std::uint64_t unguided = 0;        ///< values of unguided paths
-  std::uint64_t cut_off = 0;         ///< what is cut off of them
-  std::uint64_t guided = 0;          ///< values of guided paths
-  std::uint64_t guided_cut_off = 0;  ///< what is cut off of them
-  std::uint64_t now_first = 0;       ///< squared differences of guided paths from unguided ones
-  std::uint64_t now_earlier = 0;     ///< squared differences of guided paths from earlier guided ones
-  std::uint64_t earlier_first = 0;   ///< squared differences of earlier guided paths from unguided ones
+  std::uint64_t unguided = 0;           ///< values of unguided paths
+  std::uint64_t guided = 0;             ///< values of guided paths
+  std::uint64_t now_first = 0;          ///< losses of differences of guided paths from unguided ones
+  std::uint64_t now_earlier = 0;        ///< losses of differences of guided paths from earlier guided ones
+  std::uint64_t earlier_first = 0;      ///< losses of differences of earlier guided paths from unguided ones
+  std::uint64_t unguided_vertices = 0;  ///< surfaces of unguided paths
+  std::uint64_t guided_vertices = 0;    ///< surfaces of guided paths
 
   WFPG_HD path_sums operator+(const path_sums& other) const {
     return {paths + other.paths,
             unguided + other.unguided,
-            cut_off + other.cut_off,
             guided + other.guided,
-            guided_cut_off + other.guided_cut_off,
             now_first + other.now_first,
             now_earlier + other.now_earlier,
-            earlier_first + other.earlier_first};
+            earlier_first + other.earlier_first,
+            unguided_vertices + other.unguided_vertices,
+            guided_vertices + other.guided_vertices};
   }
 };
 
-/// Recorded paths that are measured: every `stride`-th.
+/// Recorded paths that are measured: those that take part in `compared`.
 struct measured_paths {
   path_recorder_view recorded;
   exitance_cache_view cache;
-  std::size_t stride = 1;
+  recorded_runs compared;
 
+  /// Number of paths, which i counts. Some may not be recorded.
+  std::size_t size() const { return compared.size(recorded.paths()); }
+  /// Whether path i is recorded and hit a surface first.
+  WFPG_HD bool is_known(std::size_t i) const {
+    std::uint32_t place;
+    if (!recorded.has_place(compared.path(static_cast<std::uint32_t>(i)), place)) return false;
+    const recorded_path path(recorded, place);
+    return path.surfaces() > 0 && !path.is_gap(0);
+  }
   /// Radiance that path i brought to the camera, or -1.
   WFPG_HD float radiance(std::size_t i) const {
-    const recorded_path path(recorded, i * stride);
-    if (path.surfaces() == 0 || path.is_gap(0)) return -1.0f;
+    if (!is_known(i)) return -1.0f;
+    const recorded_path path = at(i);
     vec3 arriving(0.0f);
     for (std::uint32_t depth = path.vertices(); depth-- > 0;) arriving += path.contribution(depth);
     const float sum = luminance(arriving);
@@ -63,7 +75,7 @@ struct measured_paths {
   }
   /// Where path i hit a surface first: 2 * node + side, or nowhere. Precondition: it has a radiance.
   WFPG_HD std::uint32_t place(std::size_t i) const {
-    const recorded_path path(recorded, i * stride);
+    const recorded_path path = at(i);
     const sparse_voxel_octree_view& tree = cache.octree();
     const vec3 position = path.position(0);
     node_id node = is_finite(position) ? tree.nearest_leaf(position) : invalid_node;
@@ -76,6 +88,8 @@ struct measured_paths {
     }
     return 2 * node + side;
   }
+  /// Surfaces of path i. Precondition: it has a radiance.
+  WFPG_HD std::uint32_t vertices(std::size_t i) const { return at(i).surfaces(); }
   /// Unit of differences at a place that is not nowhere.
   WFPG_HD float scale(std::uint32_t place) const {
     return cache.read(place / 2, place % 2) + 0.5f * (cache.read(0, 0u) + cache.read(0, 1u));
@@ -83,7 +97,13 @@ struct measured_paths {
 
  private:
   // Above a leaf: nodes with some hundred times its deposits.
-  static constexpr int levels_up = 2;
+  static constexpr int levels_up = 4;
+
+  WFPG_HD recorded_path at(std::size_t i) const {
+    std::uint32_t place = 0;
+    recorded.has_place(compared.path(static_cast<std::uint32_t>(i)), place);
+    return {recorded, place};
+  }
 };
 
 /// Kernel: keeps what paths brought, of an unguided sample or of a guided one.
@@ -96,7 +116,7 @@ struct keep_paths {
     const float radiance = paths.radiance(i);
     const std::uint32_t place = radiance < 0.0f ? earlier_paths::nowhere : paths.place(i);
     if (unguided)
-      kept[i] = {place, radiance, -1.0f};
+      kept[i] = {place, radiance, -1.0f, radiance < 0.0f ? 0u : paths.vertices(i)};
     else
       kept[i].guided = place == kept[i].place ? radiance : -1.0f;
   }
@@ -117,22 +137,22 @@ struct measure_path {
     const float first = before.unguided / scale, earlier = before.guided / scale, last = now / scale;
     return {1,
             units(min(first, most)),
-            units(cut_off(first)),
             units(min(last, most)),
-            units(cut_off(last)),
-            squared_units(first - last),
-            squared_units(earlier - last),
-            squared_units(first - earlier)};
+            loss_units(first - last),
+            loss_units(earlier - last),
+            loss_units(first - earlier),
+            before.vertices,
+            paths.vertices(i)};
   }
 
  private:
-  static constexpr float most = 8.0f, brightest = 0x1p16f;
+  static constexpr float most = static_cast<float>(guiding_gain::most_square), brightest = 64.0f;
 
-  WFPG_HD static float cut_off(float value) { return max(min(value, brightest) - most, 0.0f); }
   WFPG_HD static std::uint64_t units(float value) { return static_cast<std::uint64_t>(value * 0x1p30f); }
-  WFPG_HD static std::uint64_t squared_units(float difference) {
-    const float cut = min(fabsf(difference), most);
-    return static_cast<std::uint64_t>(cut * cut * 0x1p40f);
+  // Huber's loss: the square of a difference up to `most`, and the line through it beyond.
+  WFPG_HD static std::uint64_t loss_units(float difference) {
+    const float d = min(fabsf(difference), brightest);
+    return static_cast<std::uint64_t>((d <= most ? d * d : most * (2.0f * d - most)) * 0x1p36f);
   }
 };
 

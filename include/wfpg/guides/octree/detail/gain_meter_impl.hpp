@@ -13,7 +13,7 @@
 namespace wfpg {
 
 template <class Exec>
-gain_meter<Exec>::gain_meter(const Exec& exec, std::size_t paths) : kept_(exec, min(paths, most_paths)) {
+gain_meter<Exec>::gain_meter(const Exec& exec, std::size_t paths) : kept_(exec, paths) {
   forget(exec);
   // Samples allocate nothing: the reduction's memory is allocated now, and retained.
   if (kept_.size() > 0) sum(exec, kept_.size(), detail::measure_nothing{});
@@ -29,23 +29,22 @@ detail::path_sums gain_meter<Exec>::sum(const Exec& exec, std::size_t n, const M
 
 template <class Exec>
 void gain_meter<Exec>::keep_unguided(const Exec& exec, const path_recorder<Exec>& recorder,
-                                     const exitance_cache_view& cache) {
+                                     const recorded_runs& compared, const exitance_cache_view& cache) {
   forget(exec);
-  keep(exec, measured(recorder, cache), measured_count(recorder), true);
+  keep(exec, {recorder.view(), cache, compared}, true);
 }
 
 template <class Exec>
 guiding_gain gain_meter<Exec>::gain(const Exec& exec, const path_recorder<Exec>& recorder,
-                                    const exitance_cache_view& cache) {
-  const std::size_t n = measured_count(recorder);
-  const detail::measured_paths paths = measured(recorder, cache);
-  const detail::path_sums sums = sum(exec, n, detail::measure_path{paths, kept_.view()});
-  keep(exec, paths, n, false);
+                                    const recorded_runs& compared, const exitance_cache_view& cache) {
+  const detail::measured_paths paths{recorder.view(), cache, compared};
+  const detail::path_sums sums = sum(exec, count(paths), detail::measure_path{paths, kept_.view()});
+  keep(exec, paths, false);
   return gain_of(sums);
 }
 
-// With the variances U, E and N of unguided, earlier and present paths, the mean squared differences are U +
-// N, E + N and U + E. Two of them less the third are twice a variance.
+// With the variances U, E and N of unguided, earlier and present paths, the mean losses of differences are
+// about U + N, E + N and U + E. Two of them less the third are twice a variance.
 template <class Exec>
 guiding_gain gain_meter<Exec>::gain_of(const detail::path_sums& sums) {
   guiding_gain result;
@@ -53,14 +52,14 @@ guiding_gain gain_meter<Exec>::gain_of(const detail::path_sums& sums) {
   if (sums.paths == 0) return result;
   const auto n = static_cast<double>(sums.paths);
   const auto mean = [n](std::uint64_t units) { return 0x1p-30 / n * static_cast<double>(units); };
-  const auto square = [n](std::uint64_t units) { return 0x1p-40 / n * static_cast<double>(units); };
+  const auto square = [n](std::uint64_t units) { return 0x1p-36 / n * static_cast<double>(units); };
   const double un = square(sums.now_first), en = square(sums.now_earlier), ue = square(sums.earlier_first);
   result.unguided_mean = mean(sums.unguided);
-  result.cut_off_mean = mean(sums.cut_off);
   result.guided_mean = mean(sums.guided);
-  result.guided_cut_off_mean = mean(sums.guided_cut_off);
   result.unguided_variance = max(0.5 * (un + ue - en), 0.0);
   result.guided_variance = max(0.5 * (un + en - ue), 0.0);
+  result.unguided_vertices = static_cast<double>(sums.unguided_vertices) / n;
+  result.guided_vertices = static_cast<double>(sums.guided_vertices) / n;
   return result;
 }
 
@@ -70,15 +69,8 @@ void gain_meter<Exec>::forget(const Exec& exec) {
 }
 
 template <class Exec>
-void gain_meter<Exec>::keep(const Exec& exec, const detail::measured_paths& paths, std::size_t n,
-                            bool unguided) {
-  exec.for_each(n, detail::keep_paths{paths, kept_.view(), unguided});
-}
-
-template <class Exec>
-std::size_t gain_meter<Exec>::stride(const path_recorder<Exec>& recorder) const {
-  const std::size_t room = max<std::size_t>(kept_.size(), 1);
-  return max<std::size_t>((recorder.recorded() + room - 1) / room, 1);
+void gain_meter<Exec>::keep(const Exec& exec, const detail::measured_paths& paths, bool unguided) {
+  exec.for_each(count(paths), detail::keep_paths{paths, kept_.view(), unguided});
 }
 
 }  // namespace wfpg

@@ -30,7 +30,7 @@ octree_scene<Exec>::octree_scene(const Exec& exec, const Exec& working, voxel_fr
       build_(fragments.report),
       octree_(exec, fragments),
       cache_(exec, octree_, fragments, deposits_of_sample()),
-      meter_(working, is_compared(options_) ? recorded().paths() : 0),
+      meter_(working, compared_paths()),
       product_points_(working, std::size_t(2) * product_resolution(options) * product_resolution(options)),
       counts_(working, options_.max_depth) {
   // The cache has read the sorted fragments: they are not needed any more.

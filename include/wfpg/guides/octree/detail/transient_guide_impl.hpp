@@ -23,7 +23,8 @@ bin_fields<Surfaces> transient_guide<Exec>::bin_wave(const sample_context<Exec>&
                                                      const wave<Surfaces, Random>& w) {
   // Counting is a part of binning, and is timed with it.
   const auto timed = at.clock.time(stage::bin);
-  const bins_view bins = binner_.bin(at.exec, w.ray_count, wave_rays<Surfaces>{w.surfaces, options_.mode});
+  const bins_view bins =
+      binner_.bin(at.exec, w.ray_count, wave_rays<Surfaces>{w.surfaces, options_.mode, at.guided_paths});
   const std::uint32_t size = field_resolution(w.depth);
   at.exec.for_each(1,
                    detail::add_counts{bins, binner_.unbinned(), size * size, scene::depth_counts(w.depth)});
