@@ -113,6 +113,20 @@ TEST_CASE("rest: a guide rests between comparisons, and only where its gain is k
   }
 }
 
+TEST_CASE("rest: where unguided paths are very noisy, a gain of 1 is enough to go on", "[rest]") {
+  guiding_gain noisy = gain_of(1.2);
+  noisy.unguided_variance *= 10.0;
+  noisy.guided_variance *= 10.0;
+  rest_schedule schedule(2.0f, 1), calm(2.0f, 1);
+  schedule.decide(32, noisy);
+  CHECK(!schedule.resting());
+  calm.decide(32, gain_of(1.2));
+  CHECK(calm.resting());
+  noisy.guided_variance *= 1.3;  // a gain of 0.92
+  schedule.decide(64, noisy);
+  CHECK(schedule.resting());
+}
+
 TEST_CASE("rest: longer paths have to gain more", "[rest]") {
   guiding_gain longer = gain_of(3.0);
   longer.unguided_vertices = 2.0;

@@ -29,6 +29,9 @@ struct rest_constants {
   /// From this sample on few paths are enough to let the guide take part in all of them. Before, the gain has
   /// to exceed least_gain, by up to half as much again.
   static constexpr std::uint32_t last_doubt = 16;
+  /// Variance of unguided paths, over the square of their mean, above which few paths do not measure it: it
+  /// lies in the brightest. Guiding has much to gain there, so that no more than a gain of 1 is asked for.
+  static constexpr double much_noise = 4.0;
   /// Most samples between two comparisons, a power of two: what the camera sees may change.
   static constexpr std::uint32_t longest_rest = 512;
   /// least_gain of policies whose blocks have several warps. On an H200 a guided vertex takes 1.3 times an
@@ -100,8 +103,9 @@ class rest_schedule {
   void decide(std::uint32_t sample, const guiding_gain& measured) {
     if (age_of(sample) < rest_constants::first_comparison) return;
     weight_ = weight_of(measured);
-    const double gain = measured.value_a_vertex();
-    if (measured.is_known() && gain < threshold(sample))
+    const double gain = measured.value_a_vertex(), mean = measured.unguided_mean;
+    const bool is_noisy = measured.unguided_variance > rest_constants::much_noise * mean * mean;
+    if (measured.is_known() && gain < (is_noisy ? 1.0f : threshold(sample)))
       takes_part_ = part::in_none;
     else if (!measured.is_known() || gain >= sure_gain(sample) || takes_part_ == part::in_all)
       takes_part_ = part::in_all;
