@@ -54,7 +54,7 @@ struct state_access {
     for (double* const value : {&gain.unguided_mean, &gain.guided_mean, &gain.unguided_variance,
                                 &gain.guided_variance, &gain.unguided_vertices, &gain.guided_vertices}) {
       *value = bytes.get<double>();
-      bytes.require(*value >= 0.0 && *value <= 1.0e30, "has a gain out of range");
+      bytes.require(is_finite(*value) && *value >= 0.0 && *value <= 1.0e30, "has a gain out of range");
     }
     return gain;
   }

@@ -153,7 +153,8 @@ class rest_schedule {
     const auto takes_part = static_cast<part>(from.takes_part);
     if (takes_part == part::in_none && (from.unguided == 0 || from.unguided > samples)) return false;
     if (takes_part == part::in_few && from.unguided == 0) return false;
-    if (!(from.weight >= 1.0f && from.weight <= rest_constants::largest_weight)) return false;
+    if (!is_finite(from.weight)) return false;
+    if (from.weight < 1.0f || from.weight > rest_constants::largest_weight) return false;
     unguided_ = from.unguided;
     rested_ = from.rested;
     takes_part_ = takes_part;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <wfpg/base/error.hpp>
+#include <wfpg/base/math.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -66,7 +67,8 @@ inline void require_valid(const sampling_options& o) {
   const float fraction = o.guide_fraction.value_or(1.0f);
   require(fraction > 0.0f && fraction <= 1.0f, "guide_fraction", fraction, "in (0, 1]");
   const float least = o.least_gain.value_or(1.0f);
-  require(least == 0.0f || (least >= 1.0f && least <= 1.0e6f), "least_gain", least, "0, or in [1, 1e6]");
+  require(is_finite(least) && (least == 0.0f || (least >= 1.0f && least <= 1.0e6f)), "least_gain", least,
+          "0, or in [1, 1e6]");
   require(o.guided_depths >= 1, "guided_depths", o.guided_depths, "at least 1");
   require(o.max_depth >= 1 && o.max_depth <= 1024, "max_depth", o.max_depth, "in [1, 1024]");
   require(o.max_paths < 0xffffffffull, "max_paths", o.max_paths, "less than 2^32 - 1");
