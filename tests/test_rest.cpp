@@ -73,7 +73,7 @@ wfpg::kept_guide_options rest_options() {
 struct chances {
   float unguided, guided;
 };
-constexpr chances gains_much{0.25f, 0.5f}, loses{0.5f, 0.4f};
+constexpr chances gains_much{0.25f, 0.5f}, gains_surely{0.5f, 0.75f}, loses{0.5f, 0.4f};
 
 template <class Exec, class Guide>
 void take_sample(const Exec& exec, wfpg::path_guider<Exec, Guide>& guider, std::uint32_t sample, chances p,
@@ -153,6 +153,24 @@ WFPG_TEST_CASE("rest: a guider measures the variances of its paths", "[rest]") {
   const guiding_gain biased = brute_force(scales, 4, 8, gains_much, 1.01);
   CHECK(measured.guided_variance != Approx(biased.guided_variance).epsilon(1.0e-4));
   CHECK(measured.unguided_variance != Approx(biased.unguided_variance).epsilon(1.0e-4));
+}
+
+WFPG_TEST_CASE("rest: large differences of paths count linearly", "[rest]") {
+  const Exec exec;
+  constexpr chances bright{0.03f, 0.06f};  // radiance of up to 33 times a pixel's mean
+  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), rest_options());
+  guided_samples(exec, guider, 1, 3, bright);
+  const std::vector<float> scales =
+      evaluate(exec, std::size_t(path_count), scale_of_path{guider.guide().cache()});
+  take_sample(exec, guider, 4, bright);
+  const guiding_gain measured = guider.statistics().gain;
+  const guiding_gain expected = brute_force(scales, 3, 4, bright);
+  std::size_t large = 0;  // paths whose differences may be above 8
+  for (std::uint32_t path = 0; path < path_count; ++path)
+    large += wall_path::of(path).mean / bright.guided > 8.0f * scales[path];
+  CHECK(large > 100);
+  CHECK(measured.unguided_variance == Approx(expected.unguided_variance).epsilon(1.0e-4));
+  CHECK(measured.guided_variance == Approx(expected.guided_variance).epsilon(1.0e-4));
 }
 
 WFPG_TEST_CASE("rest: a host that gives pixels other indices in each sample is not compared", "[rest]") {
@@ -379,7 +397,7 @@ struct probing_host {
                                    wfpg::kept_guide_options options = rest_options();
                                    options.max_paths = paths;
                                    options.deposits_per_leaf.reset();
-                                   options.least_gain = 2.0f;
+                                   options.least_gain = 3.5f;  // 3 is not sure before sample 16
                                    return options;
                                  }()};
 
@@ -402,7 +420,7 @@ struct probing_host {
 WFPG_TEST_CASE("rest: until it is known whether guiding pays, few paths are recorded and guided", "[rest]") {
   probing_host<Exec> host;
   constexpr std::uint32_t n = 8000;
-  host.take(1, 1, gains_much);
+  host.take(1, 1, gains_surely);
   host.guider.begin_sample();
   host.guided_rays(n, true);
   host.guider.end_sample();
@@ -420,9 +438,12 @@ WFPG_TEST_CASE("rest: until it is known whether guiding pays, few paths are reco
   host.guided_rays(n, true);  // of two fields that are asked for at once, one may have to wait
   CHECK(host.guided_rays(n, true) == among);
   CHECK(host.guided_rays(n, false) == n);  // where the host does not tell paths
+  host.exec.for_each(host.paths, record_wall_paths{host.guider.recorder(), 3, gains_surely.guided, 0});
   host.guider.end_sample();
 
-  host.take(4, 16, gains_much);  // 3 is more than 1.125, and than the least gain after sample 16
+  host.take(4, 15, gains_surely);
+  CHECK(host.guider.probing());
+  host.take(16, 16, gains_surely);
   host.guider.begin_sample();
   CHECK(!host.guider.probing());
   CHECK(host.guided_rays(n, true) == n);
@@ -460,7 +481,7 @@ WFPG_TEST_CASE("rest: a guide that probes, or did, is saved and goes on with the
 WFPG_TEST_CASE("rest: a sample weighs as much as the gain that was measured before it", "[rest]") {
   probing_host<Exec> host;
   for (std::uint32_t sample = 1; sample <= 20; ++sample) {
-    host.take(sample, sample, gains_much);
+    host.take(sample, sample, gains_surely);
     const float weight = host.guider.sample_weight();
     if (host.guider.probing() || !host.guider.guided()) CHECK(weight == 1.0f);
     // By the probabilities the gain is 3.
