@@ -192,6 +192,8 @@ class path_guider {
 
  private:
   friend struct detail::state_access;
+  // A part of the paths that is the whole.
+  static constexpr recorded_runs all_paths{};
   // Tells the private constructor from the public ones, which take any scene.
   struct in_scene {};
 
@@ -256,7 +258,7 @@ class path_guider {
   }
   /// Paths that a sample guides, if it guides any.
   const recorded_runs& guided_paths(std::uint32_t sample) const {
-    return rests_.guides_few(sample) ? compared_ : all_paths_;
+    return rests_.guides_few(sample) ? compared_ : all_paths;
   }
   /// Keeps the recorded paths of an unguided sample, or compares those of a guided one with them.
   void measure();
@@ -290,7 +292,6 @@ class path_guider {
   bool measured_ = false;                                         // the current sample, in end_sample()
   guiding_gain gain_;                                             // mean of those that were measured
   recorded_runs compared_;                                        // paths that are compared
-  recorded_runs all_paths_;
 };
 
 }  // namespace wfpg

@@ -5,6 +5,7 @@
 #include "casters/embree_caster.hpp"
 
 #include <wfpg/base/error.hpp>
+#include <wfpg/base/math.hpp>
 #include <wfpg/exec/omp.hpp>
 #include <wfpg/exec/seq.hpp>
 #include <wfpg/exec/tbb.hpp>
@@ -59,7 +60,7 @@ render_options completed(const scene& scene, render_options options) {
   const float fraction = options.guide_fraction.value_or(1.0f);
   require(fraction > 0.0f && fraction <= 1.0f, "guide_fraction", fraction, "above 0, at most 1");
   const float gain = options.least_gain.value_or(1.0f);
-  require(gain == 0.0f || (gain >= 1.0f && gain <= 1.0e6f), "least_gain", gain,
+  require(wfpg::is_finite(gain) && (gain == 0.0f || (gain >= 1.0f && gain <= 1.0e6f)), "least_gain", gain,
           "1 to 1e6, or 0 for guides that never rest");
   require(options.samples_per_leaf >= 8 && options.samples_per_leaf <= 1u << 30, "samples_per_leaf",
           options.samples_per_leaf, "8 to 2^30");

@@ -4,6 +4,8 @@
 #include <wfpg/detail/guide_sections.hpp>
 #include <wfpg/path_guider.hpp>
 
+#include <array>
+
 namespace wfpg::detail {
 
 /// To and from the members of a path_guider that a guide file holds.
@@ -42,17 +44,20 @@ struct state_access {
     bytes.put(state.weight);
     put_gain(guider.gain_, bytes);
   }
+  // The numbers of a gain, in the order of the file. `Gain`: guiding_gain, const or not.
+  template <class Gain>
+  static auto numbers_of(Gain& gain) {
+    return std::array{&gain.unguided_mean,   &gain.guided_mean,       &gain.unguided_variance,
+                      &gain.guided_variance, &gain.unguided_vertices, &gain.guided_vertices};
+  }
   static void put_gain(const guiding_gain& gain, section_writer& bytes) {
     bytes.put(gain.paths);
-    for (const double value : {gain.unguided_mean, gain.guided_mean, gain.unguided_variance,
-                               gain.guided_variance, gain.unguided_vertices, gain.guided_vertices})
-      bytes.put(value);
+    for (const double* const value : numbers_of(gain)) bytes.put(*value);
   }
   static guiding_gain take_gain(section_reader& bytes) {
     guiding_gain gain;
     gain.paths = bytes.get<std::uint64_t>();
-    for (double* const value : {&gain.unguided_mean, &gain.guided_mean, &gain.unguided_variance,
-                                &gain.guided_variance, &gain.unguided_vertices, &gain.guided_vertices}) {
+    for (double* const value : numbers_of(gain)) {
       *value = bytes.get<double>();
       bytes.require(is_finite(*value) && *value >= 0.0 && *value <= 1.0e30, "has a gain out of range");
     }

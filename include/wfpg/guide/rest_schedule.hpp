@@ -86,7 +86,7 @@ class rest_schedule {
   float threshold(std::uint32_t sample) const {
     const float part =
         static_cast<float>(age_of(sample)) / static_cast<float>(rest_constants::settled_samples);
-    return 1.0f + (least_gain_ - 1.0f) * (part < 1.0f ? part : 1.0f);
+    return 1.0f + (least_gain_ - 1.0f) * min(part, 1.0f);
   }
   /// Gain from which on the guide takes part in all paths after a sample that is compared. Between
   /// threshold() and this one a guide that takes part in few paths goes on so: few paths measure the gain to
@@ -142,7 +142,7 @@ class rest_schedule {
     std::uint32_t takes_part = 2;  ///< 0: in no path, 1: in few, 2: in all
     float weight = 1.0f;           ///< of guided samples in the picture
   };
-  /// What a guide file holds.
+  /// The schedule's state.
   state saved() const { return {unguided_, rested_, static_cast<std::uint32_t>(takes_part_), weight_}; }
   /// Takes the state of a guider that had made `samples` samples, under the same options. Returns false where
   /// it has no such state.
@@ -178,10 +178,7 @@ class rest_schedule {
     const bool misses_much =
         measured.unguided_mean < rest_constants::much_missed_light * measured.guided_mean;
     const float least = misses_much ? rest_constants::weight_of_missed_light : 1.0f;
-    const auto gain = static_cast<float>(measured.value());
-    return gain < least                            ? least
-           : gain < rest_constants::largest_weight ? gain
-                                                   : rest_constants::largest_weight;
+    return clamp(static_cast<float>(measured.value()), least, rest_constants::largest_weight);
   }
 
   float least_gain_ = 0.0f;  // 0: never rests

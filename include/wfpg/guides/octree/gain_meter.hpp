@@ -5,7 +5,7 @@
 // guided paths. E (b - g)² is the sum of both variances.
 //
 // Differences are relative to what the cache expects of the path's first surface, and the mean of the scene.
-// So dark and bright parts count alike, and no part without light counts much. Squares count up to 8, and
+// Dark and bright parts then count alike, and no part without light counts much. Squares count up to 8, and
 // larger differences linearly (Huber 1964), since a few bright paths would decide alone. The means of both
 // kinds of paths show where unguided ones miss light: a path counts 8 at most.
 //

@@ -49,6 +49,13 @@ struct path_sums {
   }
 };
 
+/// A path of a sample, as it is measured.
+struct measured_path {
+  float radiance = -1.0f;                        ///< that it brought to the camera, or -1
+  std::uint32_t place = earlier_paths::nowhere;  ///< where it hit a surface first: 2 * node + side
+  std::uint32_t vertices = 0;                    ///< its surfaces
+};
+
 /// Recorded paths that are measured: those that take part in `compared`.
 struct measured_paths {
   path_recorder_view recorded;
@@ -57,25 +64,28 @@ struct measured_paths {
 
   /// Number of paths, which i counts. Some may not be recorded.
   std::size_t size() const { return compared.size(recorded.paths()); }
-  /// Whether path i is recorded and hit a surface first.
-  WFPG_HD bool is_known(std::size_t i) const {
-    std::uint32_t place;
-    if (!recorded.has_place(compared.path(static_cast<std::uint32_t>(i)), place)) return false;
-    const recorded_path path(recorded, place);
-    return path.surfaces() > 0 && !path.is_gap(0);
-  }
-  /// Radiance that path i brought to the camera, or -1.
-  WFPG_HD float radiance(std::size_t i) const {
-    if (!is_known(i)) return -1.0f;
-    const recorded_path path = at(i);
+  /// Path i: without radiance where it is not recorded, or hit no surface first.
+  WFPG_HD measured_path operator()(std::size_t i) const {
+    std::uint32_t index;
+    if (!recorded.has_place(compared.path(static_cast<std::uint32_t>(i)), index)) return {};
+    const recorded_path path(recorded, index);
+    if (path.surfaces() == 0 || path.is_gap(0)) return {};
     vec3 arriving(0.0f);
     for (std::uint32_t depth = path.vertices(); depth-- > 0;) arriving += path.contribution(depth);
     const float sum = luminance(arriving);
-    return is_finite(sum) && sum >= 0.0f ? sum : -1.0f;
+    if (!is_finite(sum) || sum < 0.0f) return {};
+    return {sum, place(path), path.surfaces()};
   }
-  /// Where path i hit a surface first: 2 * node + side, or nowhere. Precondition: it has a radiance.
-  WFPG_HD std::uint32_t place(std::size_t i) const {
-    const recorded_path path = at(i);
+  /// Unit of differences at a place that is not nowhere.
+  WFPG_HD float scale(std::uint32_t place) const {
+    return cache.read(place / 2, place % 2) + 0.5f * (cache.read(0, 0u) + cache.read(0, 1u));
+  }
+
+ private:
+  // Above a leaf: nodes with some hundred times its deposits.
+  static constexpr int levels_up = 4;
+
+  WFPG_HD std::uint32_t place(const recorded_path& path) const {
     const sparse_voxel_octree_view& tree = cache.octree();
     const vec3 position = path.position(0);
     node_id node = is_finite(position) ? tree.nearest_leaf(position) : invalid_node;
@@ -88,22 +98,6 @@ struct measured_paths {
     }
     return 2 * node + side;
   }
-  /// Surfaces of path i. Precondition: it has a radiance.
-  WFPG_HD std::uint32_t vertices(std::size_t i) const { return at(i).surfaces(); }
-  /// Unit of differences at a place that is not nowhere.
-  WFPG_HD float scale(std::uint32_t place) const {
-    return cache.read(place / 2, place % 2) + 0.5f * (cache.read(0, 0u) + cache.read(0, 1u));
-  }
-
- private:
-  // Above a leaf: nodes with some hundred times its deposits.
-  static constexpr int levels_up = 4;
-
-  WFPG_HD recorded_path at(std::size_t i) const {
-    std::uint32_t place = 0;
-    recorded.has_place(compared.path(static_cast<std::uint32_t>(i)), place);
-    return {recorded, place};
-  }
 };
 
 /// Kernel: keeps what paths brought, of an unguided sample or of a guided one.
@@ -113,12 +107,11 @@ struct keep_paths {
   bool unguided;
 
   WFPG_HD void operator()(std::size_t i) const {
-    const float radiance = paths.radiance(i);
-    const std::uint32_t place = radiance < 0.0f ? earlier_paths::nowhere : paths.place(i);
+    const measured_path now = paths(i);
     if (unguided)
-      kept[i] = {place, radiance, -1.0f, radiance < 0.0f ? 0u : paths.vertices(i)};
+      kept[i] = {now.place, now.radiance, -1.0f, now.vertices};
     else
-      kept[i].guided = place == kept[i].place ? radiance : -1.0f;
+      kept[i].guided = now.place == kept[i].place ? now.radiance : -1.0f;
   }
 };
 
@@ -130,11 +123,11 @@ struct measure_path {
   WFPG_HD path_sums operator()(std::size_t i) const {
     const earlier_paths before = kept[i];
     if (before.place == earlier_paths::nowhere || before.unguided < 0.0f || before.guided < 0.0f) return {};
-    const float now = paths.radiance(i);
-    if (now < 0.0f || paths.place(i) != before.place) return {};
+    const measured_path now = paths(i);
+    if (now.radiance < 0.0f || now.place != before.place) return {};
     const float scale = paths.scale(before.place);
     if (!(scale > 0.0f) || !is_finite(scale)) return {};
-    const float first = before.unguided / scale, earlier = before.guided / scale, last = now / scale;
+    const float first = before.unguided / scale, earlier = before.guided / scale, last = now.radiance / scale;
     return {1,
             units(min(first, most)),
             units(min(last, most)),
@@ -142,7 +135,7 @@ struct measure_path {
             loss_units(earlier - last),
             loss_units(first - earlier),
             before.vertices,
-            paths.vertices(i)};
+            now.vertices};
   }
 
  private:
