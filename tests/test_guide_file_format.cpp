@@ -97,7 +97,7 @@ std::map<std::string, std::size_t> units_of(const wfpg::path_guider<one_policy>&
           {"cell", built * cells},
           {"row", built * options.kept.resolution},
           {"mean", payload_of(bytes, "lights").size() / 4},
-          {"path that is compared", payload_of(bytes, "paths").size() / 16}};
+          {"path that is compared", payload_of(bytes, "paths").size() / 28}};
 }
 
 TEST_CASE("the table in guide_file.hpp matches what is written", "[guide_file]") {

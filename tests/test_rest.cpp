@@ -65,6 +65,7 @@ wfpg::kept_guide_options rest_options() {
   options.max_paths = path_count;
   options.max_depth = 2;
   options.kept.budget_bytes = std::size_t(1) << 20;
+  options.least_gain = 1.25f;  // for all policies
   return options;
 }
 
@@ -73,7 +74,8 @@ wfpg::kept_guide_options rest_options() {
 struct chances {
   float unguided, guided;
 };
-constexpr chances gains_much{0.25f, 0.5f}, gains_surely{0.5f, 0.75f}, loses{0.5f, 0.4f};
+constexpr chances gains_much{0.25f, 0.5f}, gains_surely{0.5f, 0.75f}, gains_more{0.5f, 0.9f},
+    loses{0.5f, 0.4f};
 
 template <class Exec, class Guide>
 void take_sample(const Exec& exec, wfpg::path_guider<Exec, Guide>& guider, std::uint32_t sample, chances p,
@@ -92,7 +94,7 @@ numbers guided_samples(const Exec& exec, wfpg::path_guider<Exec, Guide>& guider,
   for (std::uint32_t sample = first; sample <= last; ++sample) {
     take_sample(exec, guider, sample, p);
     if (guider.guided()) found.push_back(sample);
-    if (guider.guided() == guider.resting()) found.push_back(0);  // the first sample is neither
+    if (guider.guided() && guider.resting()) found.push_back(0);  // unguided samples are neither
   }
   return found;
 }
@@ -109,40 +111,53 @@ struct scale_of_path {
   }
 };
 
-/// The variances by definition, in doubles. `bias`: multiplies squared differences of guided paths.
-guiding_gain brute_force(const std::vector<float>& scales, std::uint32_t earlier, std::uint32_t now,
-                         chances p, double bias = 1.0) {
-  double first_now = 0.0, first_earlier = 0.0, between = 0.0;
+/// The variances by definition, in doubles. `bias`: multiplies squared differences.
+guiding_gain brute_force(const std::vector<float>& scales, const numbers& unguided, std::uint32_t earlier,
+                         std::uint32_t now, chances p, double bias = 1.0) {
+  double of_unguided = 0.0, of_guided = 0.0;
+  const double pairs = static_cast<double>(unguided.size() * (unguided.size() - 1)) / 2.0;
   for (std::uint32_t path = 0; path < path_count; ++path) {
-    const auto square = [&](float a, float b) {
-      const double d = std::abs(double(a) - double(b)) / double(scales[path]);
-      return d <= 8.0 ? d * d : 16.0 * d - 64.0;
+    const auto loss = [&](std::uint32_t a, std::uint32_t b, float probability) {
+      const double d = std::abs(double(wall_path::radiance(path, a, probability)) -
+                                double(wall_path::radiance(path, b, probability))) /
+                       double(scales[path]);
+      return bias * (d <= 8.0 ? d * d : 16.0 * d - 64.0) / path_count;
     };
-    const float b = wall_path::radiance(path, 1, p.unguided);
-    const float g = wall_path::radiance(path, earlier, p.guided),
-                h = wall_path::radiance(path, now, p.guided);
-    first_now += square(b, h) / path_count;
-    first_earlier += square(b, g) / path_count;
-    between += bias * square(g, h) / path_count;
+    for (const std::uint32_t a : unguided)
+      for (const std::uint32_t b : unguided)
+        if (a < b) of_unguided += loss(a, b, p.unguided) / pairs;
+    of_guided += loss(earlier, now, p.guided);
   }
   guiding_gain result;
-  result.unguided_variance = (first_now + first_earlier - between) / 2.0;
-  result.guided_variance = (first_now + between - first_earlier) / 2.0;
+  result.unguided_variance = of_unguided / 2.0;
+  result.guided_variance = of_guided / 2.0;
+  return result;
+}
+
+/// The gain that sample 8 measures, and the units of its differences.
+struct measured_gain {
+  guiding_gain gain;
+  std::vector<float> scales;
+};
+template <class Exec>
+measured_gain gain_of_sample_8(const Exec& exec, float least_gain, chances p) {
+  wfpg::kept_guide_options options = rest_options();
+  options.least_gain = least_gain;
+  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
+  guided_samples(exec, guider, 1, 7, p);
+  measured_gain result{{}, evaluate(exec, std::size_t(path_count), scale_of_path{guider.guide().cache()})};
+  const guiding_gain before = guider.statistics().gain;
+  take_sample(exec, guider, 8, p);
+  result.gain = guider.statistics().gain;  // the mean of both comparisons
+  result.gain.guided_variance = 2.0 * result.gain.guided_variance - before.guided_variance;
+  result.gain.unguided_variance = 2.0 * result.gain.unguided_variance - before.unguided_variance;
   return result;
 }
 
 WFPG_TEST_CASE("rest: a guider measures the variances of its paths", "[rest]") {
   const Exec exec;
-  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), rest_options());
-  guided_samples(exec, guider, 1, 7, gains_much);
-  const std::vector<float> scales =
-      evaluate(exec, std::size_t(path_count), scale_of_path{guider.guide().cache()});
-  const guiding_gain before = guider.statistics().gain;
-  take_sample(exec, guider, 8, gains_much);
-  guiding_gain measured = guider.statistics().gain;  // the mean of both comparisons
-  measured.guided_variance = 2.0 * measured.guided_variance - before.guided_variance;
-  measured.unguided_variance = 2.0 * measured.unguided_variance - before.unguided_variance;
-  const guiding_gain expected = brute_force(scales, 4, 8, gains_much);
+  const auto [measured, scales] = gain_of_sample_8(exec, 1.25f, gains_much);
+  const guiding_gain expected = brute_force(scales, {1, 2}, 4, 8, gains_much);
   CHECK(measured.paths == path_count);
   CHECK(measured.guided_variance == Approx(expected.guided_variance).epsilon(1.0e-4));
   CHECK(measured.unguided_variance == Approx(expected.unguided_variance).epsilon(1.0e-4));
@@ -150,9 +165,17 @@ WFPG_TEST_CASE("rest: a guider measures the variances of its paths", "[rest]") {
   CHECK(std::abs(measured.value() - 3.0) < 0.3);
   CHECK(std::abs(measured.unguided_mean / measured.guided_mean - 1.0) < 0.1);
   // The check above would notice 1% of bias.
-  const guiding_gain biased = brute_force(scales, 4, 8, gains_much, 1.01);
+  const guiding_gain biased = brute_force(scales, {1, 2}, 4, 8, gains_much, 1.01);
   CHECK(measured.guided_variance != Approx(biased.guided_variance).epsilon(1.0e-4));
   CHECK(measured.unguided_variance != Approx(biased.unguided_variance).epsilon(1.0e-4));
+}
+
+WFPG_TEST_CASE("rest: a guide that goes on probing compares all pairs of three unguided samples", "[rest]") {
+  const Exec exec;
+  const auto [measured, scales] = gain_of_sample_8(exec, 8.0f, gains_surely);
+  const guiding_gain expected = brute_force(scales, {1, 2, 5}, 4, 8, gains_surely);
+  CHECK(measured.guided_variance == Approx(expected.guided_variance).epsilon(1.0e-4));
+  CHECK(measured.unguided_variance == Approx(expected.unguided_variance).epsilon(1.0e-4));
 }
 
 WFPG_TEST_CASE("rest: large differences of paths count linearly", "[rest]") {
@@ -164,7 +187,7 @@ WFPG_TEST_CASE("rest: large differences of paths count linearly", "[rest]") {
       evaluate(exec, std::size_t(path_count), scale_of_path{guider.guide().cache()});
   take_sample(exec, guider, 4, bright);
   const guiding_gain measured = guider.statistics().gain;
-  const guiding_gain expected = brute_force(scales, 3, 4, bright);
+  const guiding_gain expected = brute_force(scales, {1, 2}, 3, 4, bright);
   std::size_t large = 0;  // paths whose differences may be above 8
   for (std::uint32_t path = 0; path < path_count; ++path)
     large += wall_path::of(path).mean / bright.guided > 8.0f * scales[path];
@@ -197,17 +220,17 @@ numbers guided_of_40(const Exec& exec, const Options& options, chances p, std::u
 WFPG_TEST_CASE("rest: a guide that gains nothing guides only what is compared", "[rest]") {
   const Exec exec;
   std::uint32_t rested = 0;
-  CHECK(guided_of_40(exec, rest_options(), loses, &rested) == numbers{2, 3, 4, 8, 16, 32});
+  CHECK(guided_of_40(exec, rest_options(), loses, &rested) == numbers{3, 4, 8, 16, 32});
   CHECK(rested == 33);
   wfpg::transient_guide_options transient;
   static_cast<wfpg::octree_guide_options&>(transient) = rest_options();
-  CHECK(guided_of_40(exec, transient, loses) == numbers{2, 3, 4, 8, 16, 32});
+  CHECK(guided_of_40(exec, transient, loses) == numbers{3, 4, 8, 16, 32});
 }
 
 WFPG_TEST_CASE("rest: a guide that gains, one that must not rest, and one of few paths guide all samples",
                "[rest]") {
   const Exec exec;
-  CHECK(guided_of_40(exec, rest_options(), gains_much).size() == 39);
+  CHECK(guided_of_40(exec, rest_options(), gains_much).size() == 38);  // not sample 2, which is compared
   wfpg::kept_guide_options never = rest_options(), few = rest_options();
   never.least_gain = 0.0f;
   CHECK(guided_of_40(exec, never, loses).size() == 39);
@@ -218,10 +241,8 @@ WFPG_TEST_CASE("rest: a guide that gains, one that must not rest, and one of few
 WFPG_TEST_CASE("rest: a gain below the option's lets a guide rest once it is settled", "[rest]") {
   const Exec exec;
   wfpg::kept_guide_options options = rest_options();
-  options.least_gain =
-      8.0f;  // 3 is more than the 1.875 of sample 4, and less than the 2.75 of sample 8 and 4.5
-  const numbers found = guided_of_40(exec, options, gains_much);
-  CHECK(found == numbers{2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 32});
+  options.least_gain = 8.0f;  // 3 is more than the 2.75 of sample 4, and less than the 4.5 of sample 8
+  CHECK(guided_of_40(exec, options, gains_surely) == numbers{3, 4, 6, 7, 8, 16, 32});
 }
 
 WFPG_TEST_CASE("rest: directions of samples that rest are the BSDF's, and nothing is recorded", "[rest]") {
@@ -267,15 +288,24 @@ struct deposit_lights {
   }
 };
 
-WFPG_TEST_CASE("rest: choices of lights learn while the guide rests", "[rest]") {
-  const Exec exec;
+/// A guider with two lights, after samples 1 to `last`.
+template <class Exec>
+wfpg::path_guider<Exec> guider_of_lights(const Exec& exec, float least_gain, std::uint32_t last, chances p) {
   wfpg::kept_guide_options options = rest_options();
+  options.least_gain = least_gain;
   options.lights.weights = {1.0f, 1.0f};
   options.lights.resolution = 4;
   wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
-  guided_samples(exec, guider, 1, 4, loses);
+  guided_samples(exec, guider, 1, last, p);
+  return guider;
+}
+
+WFPG_TEST_CASE("rest: choices of lights learn while the guide rests, where they may be what gains",
+               "[rest]") {
+  const Exec exec;
+  wfpg::path_guider<Exec> guider = guider_of_lights(exec, 8.0f, 8, gains_surely);
   const float before = evaluate(exec, find_lights{guider.lights(), 1});
-  for (int sample = 5; sample < 8; ++sample) {
+  for (int sample = 9; sample < 12; ++sample) {
     guider.begin_sample();
     REQUIRE(guider.resting());
     exec.for_each(path_count, deposit_lights{guider.lights()});
@@ -283,6 +313,16 @@ WFPG_TEST_CASE("rest: choices of lights learn while the guide rests", "[rest]") 
   }
   CHECK(before == Approx(0.5f));
   CHECK(evaluate(exec, find_lights{guider.lights(), 1}) > 0.7f);
+}
+
+WFPG_TEST_CASE("rest: choices of lights rest where nothing is gained, but for samples that are compared",
+               "[rest]") {
+  const Exec exec;
+  wfpg::path_guider<Exec> guider = guider_of_lights(exec, 1.25f, 4, loses);
+  for (std::uint32_t sample = 5; sample <= 9; ++sample) {
+    take_sample(exec, guider, sample, loses);
+    CHECK(guider.lights().empty() == (sample != 8));
+  }
 }
 
 WFPG_TEST_CASE("rest: a sample that is ended again is not compared with itself", "[rest]") {
@@ -334,10 +374,12 @@ WFPG_TEST_CASE("rest: a guide wakes up where light, geometry or the camera moved
     guider_type guider(exec, box_mesh<Exec>(exec).view(), rest_options());
     guided_samples(exec, guider, 1, 10, loses);
     move(guider);
-    take_sample(exec, guider, 11, gains_much);  // the new unguided sample
-    CHECK(!guider.guided());
-    CHECK(!guider.resting());
-    CHECK(guided_samples(exec, guider, 12, 40, gains_much).size() == 29);
+    for (const std::uint32_t sample : {11u, 12u}) {  // the new unguided samples
+      take_sample(exec, guider, sample, gains_much);
+      CHECK(!guider.guided());
+      CHECK(!guider.resting());
+    }
+    CHECK(guided_samples(exec, guider, 13, 40, gains_much).size() == 28);
   }
 }
 
@@ -384,7 +426,7 @@ WFPG_TEST_CASE("rest: a guide that is loaded with other options never rests", "[
   std::istringstream in(saved(begun));
   wfpg::path_guider<Exec> loaded = wfpg::load_guide(exec, in, late);
   guided_samples(exec, loaded, 2, 3, loses);
-  CHECK(guided_samples(exec, loaded, 4, 20, loses) == numbers{4, 5, 6, 10, 18});
+  CHECK(guided_samples(exec, loaded, 4, 20, loses) == numbers{5, 6, 10, 18});
 }
 
 /// A host of many paths, of which few are guided while the guide probes.
@@ -397,7 +439,7 @@ struct probing_host {
                                    wfpg::kept_guide_options options = rest_options();
                                    options.max_paths = paths;
                                    options.deposits_per_leaf.reset();
-                                   options.least_gain = 3.5f;  // 3 is not sure before sample 16
+                                   options.least_gain = 3.3f;  // more than gains_surely has
                                    return options;
                                  }()};
 
@@ -422,7 +464,8 @@ WFPG_TEST_CASE("rest: until it is known whether guiding pays, few paths are reco
   constexpr std::uint32_t n = 8000;
   host.take(1, 1, gains_surely);
   host.guider.begin_sample();
-  host.guided_rays(n, true);
+  CHECK(host.guided_rays(n, true) == 0);
+  host.exec.for_each(host.paths, record_wall_paths{host.guider.recorder(), 2, gains_surely.unguided, 0});
   host.guider.end_sample();
   host.guider.begin_sample();
   CHECK(host.guider.guided());
@@ -441,9 +484,10 @@ WFPG_TEST_CASE("rest: until it is known whether guiding pays, few paths are reco
   host.exec.for_each(host.paths, record_wall_paths{host.guider.recorder(), 3, gains_surely.guided, 0});
   host.guider.end_sample();
 
-  host.take(4, 15, gains_surely);
+  host.take(4, 9, gains_surely);
+  host.take(10, 15, gains_more);
   CHECK(host.guider.probing());
-  host.take(16, 16, gains_surely);
+  host.take(16, 16, gains_more);
   host.guider.begin_sample();
   CHECK(!host.guider.probing());
   CHECK(host.guided_rays(n, true) == n);
@@ -458,8 +502,9 @@ WFPG_TEST_CASE("rest: a guide that probes, or did, is saved and goes on with the
       for (std::uint32_t sample = from; sample <= to; ++sample) {
         host.guider.begin_sample();
         host.guided_rays(4000, true);
+        const chances p = sample < 10 ? gains_surely : gains_more;
         host.exec.for_each(host.paths, record_wall_paths{host.guider.recorder(), sample,
-                                                         host.guider.guided() ? 0.5f : 0.25f, 0});
+                                                         host.guider.guided() ? p.guided : p.unguided, 0});
         host.guider.end_sample();
       }
       std::swap(host.guider, guider);
@@ -481,11 +526,11 @@ WFPG_TEST_CASE("rest: a guide that probes, or did, is saved and goes on with the
 WFPG_TEST_CASE("rest: a sample weighs as much as the gain that was measured before it", "[rest]") {
   probing_host<Exec> host;
   for (std::uint32_t sample = 1; sample <= 20; ++sample) {
-    host.take(sample, sample, gains_surely);
+    host.take(sample, sample, sample < 10 ? gains_surely : gains_more);
     const float weight = host.guider.sample_weight();
     if (host.guider.probing() || !host.guider.guided()) CHECK(weight == 1.0f);
-    // By the probabilities the gain is 3.
-    if (sample > 16) CHECK(std::abs(weight - 3.0f) < 0.6f);
+    // By the probabilities guided variances are 1/3 and 2/9, and their mean 5/18, of the unguided one.
+    if (sample > 16) CHECK(std::abs(weight - 3.6f) < 0.6f);
   }
   probing_host<Exec> resting;
   for (std::uint32_t sample = 1; sample <= 20; ++sample) {

@@ -20,6 +20,8 @@ guiding_gain gain_of(double value) {
   gain.unguided_mean = gain.guided_mean = 1.0;
   gain.unguided_variance = value;
   gain.guided_variance = 1.0;
+  gain.typical_unguided = value;
+  gain.typical_guided = 1.0;
   return gain;
 }
 
@@ -34,11 +36,12 @@ std::vector<std::uint32_t> samples_where(std::uint32_t n, const F& f) {
 
 using numbers = std::vector<std::uint32_t>;
 
-TEST_CASE("rest: samples 3, 4, 8, 16 and so on are measured, and count from the unguided one", "[rest]") {
+TEST_CASE("rest: samples 3, 4, 8, 16 and so on are measured, and count from the first unguided one",
+          "[rest]") {
   const rest_schedule one(1.25f, 1), three(1.25f, 3);
-  CHECK(samples_where(70, [&](std::uint32_t s) { return one.is_unguided(s); }) == numbers{1});
+  CHECK(samples_where(70, [&](std::uint32_t s) { return one.is_unguided(s); }) == numbers{1, 2, 5, 9});
   CHECK(samples_where(70, [&](std::uint32_t s) { return one.compares(s); }) == numbers{3, 4, 8, 16, 32, 64});
-  CHECK(samples_where(70, [&](std::uint32_t s) { return three.is_unguided(s); }) == numbers{3});
+  CHECK(samples_where(70, [&](std::uint32_t s) { return three.is_unguided(s); }) == numbers{3, 4, 7, 11});
   CHECK(samples_where(70, [&](std::uint32_t s) { return three.compares(s); }) ==
         numbers{5, 6, 10, 18, 34, 66});
 }
@@ -52,40 +55,69 @@ TEST_CASE("rest: with a least gain of 0, or without an unguided sample, nothing 
   }
 }
 
-TEST_CASE("rest: the least gain grows to the option's in 32 samples", "[rest]") {
+TEST_CASE("rest: a guide that takes part in all paths leaves out none later, and one that rests neither",
+          "[rest]") {
+  for (const double gain : {0.5, 3.0}) {
+    rest_schedule schedule(1.25f, 1);
+    schedule.decide(4, gain_of(gain));
+    CHECK(samples_where(70, [&](std::uint32_t s) { return schedule.is_unguided(s); }) == numbers{1, 2});
+  }
   const rest_schedule schedule(1.25f, 1);
-  CHECK(schedule.threshold(4) == Approx(1.0f + 0.25f / 8.0f));
-  CHECK(schedule.threshold(16) == Approx(1.125f));
-  CHECK(schedule.threshold(32) == Approx(1.25f));
+  numbers order;
+  for (const std::uint32_t sample : {1u, 2u, 5u, 9u, 3u}) order.push_back(schedule.unguided_number(sample));
+  CHECK(order == numbers{0, 1, 2, 3, 4});
+}
+
+TEST_CASE("rest: on CPUs less is asked for where triangles are many", "[rest]") {
+  using wfpg::rest_constants;
+  CHECK(rest_constants::cpu_least_gain(0) == 1.75f);  // not known
+  CHECK(rest_constants::cpu_least_gain(12) == Approx(2.26f));
+  CHECK(rest_constants::cpu_least_gain(30000) == Approx(1.325f));
+  for (const std::size_t many : {std::size_t(600000), std::size_t(1) << 40})
+    CHECK(rest_constants::cpu_least_gain(many) == rest_constants::gpu_least_gain);
+}
+
+TEST_CASE("rest: the least gain grows to the option's in 16 samples", "[rest]") {
+  const rest_schedule schedule(1.25f, 1);
+  CHECK(schedule.threshold(4) == Approx(1.0f + 0.25f / 4.0f));
+  CHECK(schedule.threshold(8) == Approx(1.125f));
+  CHECK(schedule.threshold(16) == Approx(1.25f));
   CHECK(schedule.threshold(1024) == Approx(1.25f));
 }
 
-TEST_CASE("rest: the gain that lets a guide take part in all paths shrinks to the least gain", "[rest]") {
-  const rest_schedule schedule(2.0f, 1);
-  CHECK(schedule.sure_gain(4) == Approx(2.0f * (1.0f + 0.5f * 12.0f / 16.0f)));
-  CHECK(schedule.sure_gain(8) == Approx(2.0f * (1.0f + 0.5f * 8.0f / 16.0f)));
-  for (const std::uint32_t late : {16u, 32u, 512u})
-    CHECK(schedule.sure_gain(late) == schedule.threshold(late));
+/// The numbers of a gain without doubt: as gain_of(), with less noise.
+guiding_gain calm_gain_of(double value) {
+  guiding_gain gain = gain_of(value);
+  gain.unguided_mean = gain.guided_mean = 10.0;
+  return gain;
 }
 
 TEST_CASE("rest: a guide takes part in few paths until it is known whether guiding pays", "[rest]") {
   rest_schedule schedule(2.0f, 1);
-  schedule.decide(3, gain_of(0.1));  // too early to decide
+  schedule.decide(3, calm_gain_of(0.1));  // too early to decide
   CHECK(samples_where(20, [&](std::uint32_t s) { return schedule.probes(s); }).size() == 20);
-  schedule.decide(4, gain_of(2.0));  // above 1.125 and below 2.75: not sure
+  schedule.decide(4, calm_gain_of(1.9));  // above 1.25 and below 2
   CHECK(schedule.probes(5));
-  schedule.decide(8, gain_of(1.5));
+  schedule.decide(8, calm_gain_of(1.6));
   CHECK(schedule.probes(9));
-  schedule.decide(16, gain_of(1.6));  // few paths decide at last
+  schedule.decide(16, calm_gain_of(2.05));
   CHECK(samples_where(40, [&](std::uint32_t s) { return schedule.probes(s) || schedule.rests(s); }).empty());
-  schedule.decide(32, gain_of(2.1));
+  schedule.decide(32, calm_gain_of(2.1));
   CHECK(samples_where(40, [&](std::uint32_t s) { return schedule.probes(s) || schedule.rests(s); }).empty());
 
   rest_schedule sure(2.0f, 1);
-  sure.decide(4, gain_of(2.8));
+  sure.decide(4, calm_gain_of(2.1));
   CHECK(!sure.probes(5));
-  sure.decide(8, gain_of(2.0));  // once it takes part in all paths, it goes on so
+  sure.decide(8, calm_gain_of(1.9));  // once it takes part in all paths, it goes on so
   CHECK(!sure.probes(9));
+  sure.decide(16, calm_gain_of(1.9));
+  CHECK(sure.resting());
+
+  rest_schedule again(2.0f, 1);
+  again.decide(4, calm_gain_of(0.5));
+  CHECK(again.resting());
+  again.decide(8, calm_gain_of(1.9));
+  CHECK(again.probes(9));
 }
 
 TEST_CASE("rest: a guide rests between comparisons, and only where its gain is known and too small",
@@ -96,14 +128,14 @@ TEST_CASE("rest: a guide rests between comparisons, and only where its gain is k
   CHECK(samples_where(40, [&](std::uint32_t s) { return s > 8 && schedule.probes(s); }) == numbers{16, 32});
   for (std::uint32_t sample = 9; sample <= 16; ++sample) schedule.count(sample);
   CHECK(schedule.rested() == 7);
-  schedule.decide(16, gain_of(1.13));
+  schedule.decide(16, gain_of(1.26));
   CHECK(!schedule.resting());
   schedule.decide(32, gain_of(1.13));
   CHECK(schedule.resting());
 
   guiding_gain few = gain_of(0.5), dark = gain_of(0.5);
   few.paths = guiding_gain::least_paths - 1;
-  dark.unguided_mean = 0.94;  // unguided paths miss light: their variance lies there
+  dark.unguided_mean = 0.92;  // unguided paths miss light: their variance lies there
   for (const guiding_gain& unknown : {few, dark, guiding_gain()}) {
     schedule.decide(64, gain_of(0.5));
     REQUIRE(schedule.resting());
@@ -111,28 +143,46 @@ TEST_CASE("rest: a guide rests between comparisons, and only where its gain is k
     CHECK(!schedule.resting());
     CHECK(!schedule.probes(65));
   }
+  guiding_gain by_chance = gain_of(0.5);
+  by_chance.unguided_mean = 0.94;  // of 4096 paths, as likely as not
+  CHECK(by_chance.is_known());
+  by_chance.paths *= 100;
+  CHECK(!by_chance.is_known());
 }
 
-TEST_CASE("rest: where unguided paths are very noisy, a gain of 1 is enough to go on", "[rest]") {
-  guiding_gain noisy = gain_of(1.2);
-  noisy.unguided_variance *= 10.0;
-  noisy.guided_variance *= 10.0;
-  rest_schedule schedule(2.0f, 1), calm(2.0f, 1);
-  schedule.decide(32, noisy);
-  CHECK(!schedule.resting());
-  calm.decide(32, gain_of(1.2));
-  CHECK(calm.resting());
-  noisy.guided_variance *= 1.3;  // a gain of 0.92
-  schedule.decide(64, noisy);
-  CHECK(schedule.resting());
+TEST_CASE("rest: where unguided paths are very noisy, a gain of about 1 is enough to go on", "[rest]") {
+  const auto noisy_gain_of = [](double value) {
+    guiding_gain gain = calm_gain_of(value);
+    gain.typical_unguided *= 1000.0;
+    gain.typical_guided *= 1000.0;
+    return gain;
+  };
+  for (const std::uint32_t sample : {4u, 32u}) {
+    rest_schedule calm(2.0f, 1), noisy(2.0f, 1), unsure(2.0f, 1), worse(2.0f, 1);
+    calm.decide(sample, calm_gain_of(1.2));
+    CHECK(calm.resting());
+    noisy.decide(sample, noisy_gain_of(0.96));
+    CHECK(!noisy.resting());
+    CHECK(!noisy.probes(sample + 1));
+    unsure.decide(sample, noisy_gain_of(0.93));
+    CHECK(unsure.probes(sample + 1));
+    worse.decide(sample, noisy_gain_of(0.88));
+    CHECK(worse.resting());
+  }
 }
 
-TEST_CASE("rest: longer paths have to gain more", "[rest]") {
-  guiding_gain longer = gain_of(3.0);
+TEST_CASE("rest: longer paths have to gain more, and bright ones decide nothing", "[rest]") {
+  guiding_gain bright = calm_gain_of(1.1);
+  bright.unguided_variance *= 100.0;
+  CHECK(bright.typical_value() == Approx(1.1));
+  rest_schedule unmoved(2.5f, 1);
+  unmoved.decide(32, bright);
+  CHECK(unmoved.resting());
+  guiding_gain longer = calm_gain_of(3.0);
   longer.unguided_vertices = 2.0;
   longer.guided_vertices = 3.0;
   CHECK(longer.value() == Approx(3.0));
-  CHECK(longer.value_a_vertex() == Approx(2.0));
+  CHECK(longer.typical_value() == Approx(2.0));
   rest_schedule schedule(2.5f, 1);
   schedule.decide(32, longer);
   CHECK(schedule.resting());
@@ -165,6 +215,7 @@ TEST_CASE("rest: a mean of gains is that of its variances, and begins with the f
   CHECK(second.mean_with(first).value() == Approx(4.0));
   CHECK(second.mean_with(first).paths == second.paths);
   CHECK(second.mean_with(second.mean_with(first)).value() == Approx(3.0));
+  CHECK(second.mean_with(first).typical_value() == Approx(4.0));
 }
 
 TEST_CASE("rest: gains have bounds where variances are 0", "[rest]") {
@@ -183,7 +234,8 @@ TEST_CASE("rest: after light or geometry moved a guide that rests begins again, 
   guiding.decide(8, gain_of(3.0));
   CHECK(guiding.weight() == 3.0f);
   for (rest_schedule* s : {&resting, &probing, &guiding}) s->restart(20);
-  CHECK(samples_where(60, [&](std::uint32_t s) { return resting.is_unguided(s); }) == numbers{21});
+  CHECK(samples_where(60, [&](std::uint32_t s) { return resting.is_unguided(s); }) ==
+        numbers{21, 22, 25, 29});
   CHECK(samples_where(60, [&](std::uint32_t s) { return resting.compares(s); }) ==
         numbers{23, 24, 28, 36, 52});
   CHECK(samples_where(60, [&](std::uint32_t s) {
@@ -226,16 +278,18 @@ TEST_CASE("rest: comparisons are at most 512 samples apart", "[rest]") {
 TEST_CASE("rest: a state that no schedule has is refused", "[rest]") {
   rest_schedule schedule(1.25f, 1);
   using state = rest_schedule::state;
-  CHECK(schedule.restore(20, state{1, 12, 0, 2.0f}));
+  CHECK(schedule.restore(20, state{1, 12, 0, 2.0f, 3.0f}));
   CHECK(schedule.rests(21));
   CHECK(schedule.weight() == 2.0f);
+  CHECK(schedule.threshold(32) == 3.0f);
   const state kept = schedule.saved();
   CHECK((kept.unguided == 1 && kept.rested == 12 && kept.takes_part == 0 && kept.weight == 2.0f));
   CHECK(schedule.restore(20, state{1, 12, 1, 1.0f}));
   CHECK(schedule.probes(21));
   for (const state& wrong :
        {state{1, 21, 0, 1.0f}, state{0, 2, 0, 1.0f}, state{23, 2, 2, 1.0f}, state{0, 2, 1, 1.0f},
-        state{1, 2, 3, 1.0f}, state{1, 2, 2, 0.5f}, state{1, 2, 2, 17.0f}, state{1, 2, 2, std::nanf("")}})
+        state{1, 2, 3, 1.0f}, state{1, 2, 2, 0.5f}, state{1, 2, 2, 17.0f}, state{1, 2, 2, std::nanf("")},
+        state{1, 2, 2, 1.0f, 0.5f}, state{1, 2, 2, 1.0f, std::nanf("")}})
     CHECK(!schedule.restore(20, wrong));
   CHECK(rest_schedule(1.25f, 3).restore(1, state{3, 0, 1, 1.0f}));  // before the unguided sample
   CHECK(rest_schedule(1.25f, 1).restore(20, state{21, 3, 1, 1.0f}));

@@ -6,7 +6,7 @@
 // Source: wfpg's own. Cost: O(bytes), and loading builds the octree. Memory: a file has about 40 bytes a leaf
 // and 10 F² a kept field.
 //
-// A guide file of version 5, little-endian; state/section_file.hpp has what is around the sections.
+// A guide file of version 6, little-endian; state/section_file.hpp has what is around the sections.
 //
 //   section  content                                              bytes
 //   options  scene_tag                                            8
@@ -24,7 +24,8 @@
 //            options and unguided sample of comparisons           8
 //            samples rested, in how many paths it takes part      8
 //            weight of guided samples                             4
-//            mean gain of comparisons                             56
+//            gain below which the guide rests                     4
+//            mean gain of comparisons                             72
 //            triangles left out, by reason                        12
 //            vertices dropped                                     4
 //            bins, rays, unbinned rays, cones                     32 a depth
@@ -46,7 +47,7 @@
 //            learnt radiance, where fields learn                  2 a cell
 //            what fractions learnt, where fields learn            32 a built field
 //   lights   learnt mean: of learning nodes, faces and groups     4 a mean
-//   paths    place, what two paths brought, surfaces of one       16 a path that is compared
+//   paths    place, surfaces, what five paths brought             28 a path that is compared
 //
 // Cells and rows are those of fields that are built. All else that a guider has follows from these.
 // detail/guide_sections.hpp says what is checked.

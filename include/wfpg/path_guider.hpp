@@ -159,8 +159,9 @@ class path_guider {
       return no_path_recorder{};
   }
   /// Returns the view that chooses lights for next-event estimation, valid for the current sample. A
-  /// light_guide_view, or no_light_choices for a guide that does not choose lights.
-  auto lights() const { return guide_.lights(); }
+  /// light_guide_view, or no_light_choices for a guide that does not choose lights. Empty where choices of
+  /// lights rest with the guide, since they gain little: rest_constants::light_gain.
+  auto lights() const { return lights_rest() ? decltype(guide_.lights())() : guide_.lights(); }
 
   /// The guide, to look at what it learnt.
   const Guide& guide() const { return guide_; }
@@ -212,16 +213,23 @@ class path_guider {
     require(needs_.sample_stride >= 1, "sample_stride", needs_.sample_stride, "at least 1");
     if constexpr (Guide::measures_gain) {
       if (!guide_.measures()) return;
-      rests_ = rest_schedule(least_gain(), options_.unguided_samples);
+      rests_ = rest_schedule(least_gain<std::decay_t<Scene>>(scene), options_.unguided_samples);
       compared_ = {needs_.fraction_shift, static_cast<std::uint32_t>(seed_of(0)), guide_.rarer()};
     }
   }
 
-  /// Gain below which guiding does not pay: the option, or what suits the policy. A CPU policy's blocks have
-  /// one warp.
-  float least_gain() const {
-    return options_.least_gain.value_or(Exec::warps_per_block > 1 ? rest_constants::gpu_least_gain
-                                                                  : rest_constants::cpu_least_gain);
+  /// Whether choices of lights rest in the current sample.
+  bool lights_rest() const { return rests_now_ && gain_.value() < rest_constants::light_gain; }
+  /// Gain below which guiding does not pay: the option, or what suits policy and scene. A CPU policy's blocks
+  /// have one warp.
+  template <class Scene>
+  float least_gain(const Scene& scene) const {
+    if (options_.least_gain) return *options_.least_gain;
+    if (Exec::warps_per_block > 1) return rest_constants::gpu_least_gain;
+    if constexpr (std::is_same_v<Scene, triangle_mesh_view>)
+      return rest_constants::cpu_least_gain(scene.triangles.size());
+    else
+      return rest_constants::cpu_least_gain(0);
   }
 
   /// Checks the options that all guides have, and sets max_rays. The guide checks its own. Runs before any

@@ -50,7 +50,7 @@ json rest_of(const rest_report& rest) {
               {"unguided_vertices", gain.unguided_vertices},
               {"guided_vertices", gain.guided_vertices},
               {"gain", nullptr}};
-  if (gain.is_known()) result["gain"] = gain.value_a_vertex();
+  if (gain.is_known()) result["gain"] = gain.typical_value();
   return result;
 }
 

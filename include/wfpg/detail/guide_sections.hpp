@@ -30,7 +30,7 @@ namespace wfpg::detail {
 
 /// Magic, version and name of guide files. The magic has bytes that text conversion would change, so such
 /// damage is detected.
-inline constexpr file_kind guide_file_kind{{"\x89wfpgG\n\x1a", 8}, 5, "a guide file"};
+inline constexpr file_kind guide_file_kind{{"\x89wfpgG\n\x1a", 8}, 6, "a guide file"};
 
 /// An option that decides how a guide's state is laid out. A file is refused where one differs.
 struct shaping_option {
@@ -298,9 +298,9 @@ struct guide_sections {
     section_writer bytes;
     for (const earlier_paths& path : scene.meter_.kept_.to_host(exec)) {
       bytes.put(path.place);
-      bytes.put(path.unguided);
-      bytes.put(path.guided);
       bytes.put(path.vertices);
+      for (const float unguided : path.unguided) bytes.put(unguided);
+      bytes.put(path.guided);
     }
     file.section("paths", bytes);
   }
@@ -314,15 +314,21 @@ struct guide_sections {
     for (earlier_paths& path : paths) {
       path.place = bytes.get<std::uint32_t>();
       bytes.require(path.place < places || path.place == earlier_paths::nowhere, "has paths from no node");
-      path.unguided = bytes.get<float>();
-      path.guided = bytes.get<float>();
       path.vertices = bytes.get<std::uint32_t>();
-      bytes.require(is_finite(path.unguided) && is_finite(path.guided), "has radiance that is not finite");
+      for (float& unguided : path.unguided) unguided = radiance(bytes);
+      path.guided = radiance(bytes);
     }
     bytes.end();
     const buffer<earlier_paths, Exec>& kept = scene.meter_.kept_;
     paths.resize(kept.size());
     exec.copy_from_host(kept.data(), paths.data(), kept.bytes());
+  }
+
+ private:
+  static float radiance(section_reader& bytes) {
+    const auto value = bytes.get<float>();
+    bytes.require(is_finite(value), "has radiance that is not finite");
+    return value;
   }
 };
 

@@ -32,7 +32,7 @@ struct state_access {
     key = hash(key, o.seed);
     key = hash(key, o.unguided_samples);
     return static_cast<std::uint32_t>(
-        hash(key, float_bits(guider.guide_.measures() ? guider.least_gain() : -1.0f)));
+        hash(key, float_bits(guider.guide_.measures() ? o.least_gain.value_or(0.5f) : -1.0f)));
   }
   template <class Exec, class Guide>
   static void put_rests(const path_guider<Exec, Guide>& guider, section_writer& bytes) {
@@ -42,13 +42,15 @@ struct state_access {
     bytes.put(state.rested);
     bytes.put(state.takes_part);
     bytes.put(state.weight);
+    bytes.put(state.least_gain);
     put_gain(guider.gain_, bytes);
   }
   // The numbers of a gain, in the order of the file. `Gain`: guiding_gain, const or not.
   template <class Gain>
   static auto numbers_of(Gain& gain) {
-    return std::array{&gain.unguided_mean,   &gain.guided_mean,       &gain.unguided_variance,
-                      &gain.guided_variance, &gain.unguided_vertices, &gain.guided_vertices};
+    return std::array{&gain.unguided_mean,     &gain.guided_mean,      &gain.unguided_variance,
+                      &gain.guided_variance,   &gain.typical_unguided, &gain.typical_guided,
+                      &gain.unguided_vertices, &gain.guided_vertices};
   }
   static void put_gain(const guiding_gain& gain, section_writer& bytes) {
     bytes.put(gain.paths);
@@ -71,6 +73,7 @@ struct state_access {
     state.rested = bytes.get<std::uint32_t>();
     state.takes_part = bytes.get<std::uint32_t>();
     state.weight = bytes.get<float>();
+    state.least_gain = bytes.get<float>();
     const guiding_gain gain = take_gain(bytes);
     bytes.require(state.rested <= guider.samples_, "rests in samples that are to come");
     if (key != comparison_key(guider)) return guider.rests_.restore_other(state.rested);

@@ -67,10 +67,10 @@ void path_guider<Exec, Guide>::end_sample() {
     guide_.learn(now(), recorder_);
   }
   const auto timed = clock_.time(stage::cache);
-  if (rests_now_)
-    guide_.end_rest(now());
-  else
+  if (!rests_now_)
     guide_.update(now());
+  else if (!lights_rest())
+    guide_.end_rest(now());
 }
 
 // Runs before the guide learns, so that the cache does not have the paths that are measured. Once a sample:
@@ -79,7 +79,7 @@ template <class Exec, class Guide>
 void path_guider<Exec, Guide>::measure() {
   if (measured_ || guide_.empty()) return;
   if (rests_.is_unguided(samples_)) {
-    guide_.keep_unguided(exec_, recorder_, compared_);
+    guide_.keep_unguided(exec_, recorder_, compared_, rests_.unguided_number(samples_));
   } else if (rests_.compares(samples_) && is_guided(samples_)) {
     gain_ = guide_.gain(exec_, recorder_, compared_).mean_with(gain_);
     rests_.decide(samples_, gain_);

@@ -125,10 +125,11 @@ struct guide_base {
   /// Parts of the guide's memory, for path_guider::memory(). This base holds none.
   std::vector<memory_part> memory() const { return {}; }
 
-  /// Whether the guide compares guided samples with an unguided one, so that it can rest. It then has
+  /// Whether the guide compares guided samples with unguided ones, so that it can rest. It then has
   ///   bool measures() const;                        whether it does under its options
   ///   std::uint32_t rarer() const;                  log2 of the recorded paths of which one is compared
-  ///   void keep_unguided(const Exec&, const path_recorder<Exec>&, const recorded_runs& compared);
+  ///   void keep_unguided(const Exec&, const path_recorder<Exec>&, const recorded_runs& compared,
+  ///                      std::uint32_t number);         of the unguided sample, from 0
   ///   guiding_gain gain(const Exec&, const path_recorder<Exec>&, const recorded_runs& compared);
   /// and a default view_type guides no ray. The last two run before learn(), keep_unguided() after an
   /// unguided sample.

@@ -2,10 +2,12 @@
 // Samples without guiding cost what path tracing costs. Pure functions of counters, and of what was measured;
 // every constant is here.
 //
-// The first sample is not guided. In the next ones the guide probes: it takes part in few paths, which are
-// compared with those of the first sample. Samples 3, 4, 8, 16 and so on are compared, also with each other.
-// From sample 4 on each comparison lets the guide take part in all paths, or lets it rest until the next one.
-// A guide that rests probes in the samples that are compared. Comparisons are at most 512 samples apart.
+// The first two samples are not guided. In the next ones the guide probes: it takes part in few paths, which
+// are compared with those of unguided samples. Samples 3, 4, 8, 16 and so on are compared, also with each
+// other. From sample 4 on each comparison lets the guide take part in all paths, or lets it rest until the
+// next one. A guide that goes on probing leaves out samples 5 and 9, so that the variance of unguided paths
+// is known better. A guide that rests probes in the samples that are compared. Comparisons are at most 512
+// samples apart.
 //
 // Source: wfpg's own. Costs of guiding are weighed against what it saves in Rath et al., "EARS" (2022), too.
 // Samples are weighed by their variance in Müller, "Path Guiding in Production" (2019), too.
@@ -15,31 +17,43 @@
 #include <wfpg/base/math.hpp>
 #include <wfpg/guide/statistics.hpp>
 
+#include <cstddef>
 #include <cstdint>
 
 namespace wfpg {
 
 /// Constants of the schedule of rests.
 struct rest_constants {
-  /// The first sample that decides, counted from the unguided one. Guides have learnt little before.
+  /// The first sample that decides, counted from the first that is compared. Guides have learnt little
+  /// before.
   static constexpr std::uint32_t first_comparison = 4;
   /// From this sample on the whole of least_gain is asked for. Before, guides still learn. Sample i then asks
-  /// for i / 32 of what least_gain exceeds 1 by.
-  static constexpr std::uint32_t settled_samples = 32;
-  /// From this sample on few paths are enough to let the guide take part in all of them. Before, the gain has
-  /// to exceed least_gain, by up to half as much again.
-  static constexpr std::uint32_t last_doubt = 16;
-  /// Variance of unguided paths, over the square of their mean, above which few paths do not measure it: it
-  /// lies in the brightest. Guiding has much to gain there, so that no more than a gain of 1 is asked for.
-  static constexpr double much_noise = 4.0;
+  /// for i / 16 of what least_gain exceeds 1 by.
+  static constexpr std::uint32_t settled_samples = 16;
+  /// Variance of typical unguided paths, over the square of the mean, above which bright paths decide. They
+  /// hold most of what there is to gain, and a few thousand do not measure it.
+  static constexpr double much_noise = 2.0;
+  /// Gain that lets a guide take part in all paths there, in place of least_gain, and the one below which it
+  /// rests. Bright paths gain more than typical ones.
+  static constexpr float gain_in_noise = 0.95f, loss_in_noise = 0.9f;
   /// Most samples between two comparisons, a power of two: what the camera sees may change.
   static constexpr std::uint32_t longest_rest = 512;
   /// least_gain of policies whose blocks have several warps. On an H200 a guided vertex takes 1.3 times an
   /// unguided one's time.
   static constexpr float gpu_least_gain = 1.25f;
-  /// least_gain of other policies. On one thread a guided vertex takes 1.3 to 2.2 times an unguided one's
-  /// time: the less, the longer a ray takes.
-  static constexpr float cpu_least_gain = 1.75f;
+  /// least_gain of other policies, for a scene of `triangles`; 0: it is not known. On one thread a guided
+  /// vertex takes 2.2 times an unguided one's time among 32 triangles, and 1.6 times among 600,000. What
+  /// guiding costs does not depend on them. A ray takes the longer, the more they are.
+  static float cpu_least_gain(std::size_t triangles) {
+    if (triangles == 0) return 1.75f;
+    const int bits = bits_of(static_cast<std::uint32_t>(min<std::size_t>(triangles, 1u << 31)));
+    return max(2.6f - 0.085f * static_cast<float>(bits), gpu_least_gain);
+  }
+  /// Most unguided samples whose paths are compared: of the ages 1, 2, 5 and 9.
+  static constexpr std::uint32_t most_unguided = 4;
+  /// Gain, at equal numbers of samples, below which choices of lights rest with the guide. Where lights are
+  /// many, learnt choices take a third more time than others.
+  static constexpr double light_gain = 1.25;
   /// Largest weight of a guided sample in the picture, over an unguided one's.
   static constexpr float largest_weight = 16.0f;
   /// Least weight where unguided paths find less than this part of the guided paths' light. The gain is
@@ -49,14 +63,14 @@ struct rest_constants {
   static constexpr double much_missed_light = 0.8;
 };
 
-/// In which samples a guider guides. Ages count samples from the last unguided one on, which has age 1.
+/// In which samples a guider guides. Ages count samples from the first one that is compared, which has age 1.
 class rest_schedule {
  public:
   /// A guide that takes part in all paths, and is never compared.
   rest_schedule() = default;
   /// `least_gain`: gain below which the guide rests; 0: it never does. `unguided_samples`: samples at the
-  /// beginning that are not guided. The last one of them is compared; where there are none, the guide never
-  /// rests.
+  /// beginning that are not guided. The last one of them is compared, and the one after it is not guided,
+  /// too. Where there are none, the guide never rests.
   rest_schedule(float least_gain, std::uint32_t unguided_samples)
       : least_gain_(least_gain), unguided_(least_gain > 0.0f ? unguided_samples : 0) {
     if (unguided_ > 0) takes_part_ = part::in_few;
@@ -71,10 +85,22 @@ class rest_schedule {
   }
   /// Whether a sample guides few paths, or none.
   bool guides_few(std::uint32_t sample) const { return probes(sample) || rests(sample); }
-  /// Whether a sample is not guided so that others can be compared with it.
-  bool is_unguided(std::uint32_t sample) const { return unguided_ > 0 && sample == unguided_; }
+  /// Whether a sample is not guided so that others can be compared with it. So are those of the ages 1 and 2,
+  /// and of 5 and 9 while the guide takes part in few paths.
+  bool is_unguided(std::uint32_t sample) const {
+    return unguided_number(sample) < rest_constants::most_unguided;
+  }
+  /// Number of an unguided sample among those of its comparisons, from 0. Of others:
+  /// rest_constants::most_unguided.
+  std::uint32_t unguided_number(std::uint32_t sample) const {
+    constexpr std::uint32_t ages[rest_constants::most_unguided] = {1, 2, 5, 9};
+    if (unguided_ == 0 || sample < unguided_) return rest_constants::most_unguided;
+    std::uint32_t number = 0;
+    while (number < rest_constants::most_unguided && ages[number] != age_of(sample)) ++number;
+    return number < 2 || takes_part_ == part::in_few ? number : rest_constants::most_unguided;
+  }
   /// Whether a sample is guided, recorded, and measured: at the ages 3, 4, 8, ..., 512, 1024, 1536, ... Each
-  /// is compared with the unguided sample, and with the one that was measured before.
+  /// is compared with the unguided samples, and with the one that was measured before.
   bool compares(std::uint32_t sample) const {
     if (unguided_ == 0 || sample <= unguided_) return false;
     const std::uint32_t age = age_of(sample), first = rest_constants::first_comparison;
@@ -88,28 +114,22 @@ class rest_schedule {
         static_cast<float>(age_of(sample)) / static_cast<float>(rest_constants::settled_samples);
     return 1.0f + (least_gain_ - 1.0f) * min(part, 1.0f);
   }
-  /// Gain from which on the guide takes part in all paths after a sample that is compared. Between
-  /// threshold() and this one a guide that takes part in few paths goes on so: few paths measure the gain to
-  /// a third.
-  float sure_gain(std::uint32_t sample) const {
-    const std::uint32_t age = age_of(sample), last = rest_constants::last_doubt;
-    if (age >= last) return threshold(sample);
-    const float doubt = static_cast<float>(last - age) / static_cast<float>(last);
-    return max(least_gain_, 1.0f) * (1.0f + 0.5f * doubt);
-  }
   /// Takes what was measured in a sample. From the next one on the guide rests where the gain is known and
-  /// less than threshold(). It takes part in all paths where the gain is at least sure_gain(), or not known.
-  /// Nothing is decided before the first comparison. Precondition: compares(sample).
+  /// less than threshold(). It takes part in all paths where the gain is at least least_gain, or not known.
+  /// Between them it goes on as it did. Nothing is decided before the first comparison. Precondition:
+  /// compares(sample).
   void decide(std::uint32_t sample, const guiding_gain& measured) {
     if (age_of(sample) < rest_constants::first_comparison) return;
     weight_ = weight_of(measured);
-    const double gain = measured.value_a_vertex(), mean = measured.unguided_mean;
-    const bool is_noisy = measured.unguided_variance > rest_constants::much_noise * mean * mean;
-    if (measured.is_known() && gain < (is_noisy ? 1.0f : threshold(sample)))
-      takes_part_ = part::in_none;
-    else if (!measured.is_known() || gain >= sure_gain(sample) || takes_part_ == part::in_all)
+    const double gain = measured.typical_value(), mean = measured.unguided_mean;
+    const bool is_noisy = measured.typical_unguided > rest_constants::much_noise * mean * mean;
+    const float least = is_noisy ? rest_constants::loss_in_noise : threshold(sample),
+                enough = is_noisy ? rest_constants::gain_in_noise : least_gain_;
+    if (!measured.is_known() || gain >= enough)
       takes_part_ = part::in_all;
-    else
+    else if (gain < least)
+      takes_part_ = part::in_none;
+    else if (resting())
       takes_part_ = part::in_few;
   }
   /// Weight of a guided sample in the picture, over an unguided one's: the gain of the last comparison, from
@@ -141,9 +161,12 @@ class rest_schedule {
     std::uint32_t rested = 0;      ///< rested()
     std::uint32_t takes_part = 2;  ///< 0: in no path, 1: in few, 2: in all
     float weight = 1.0f;           ///< of guided samples in the picture
+    float least_gain = 0.0f;       ///< below which it rests; 0: it never does
   };
   /// The schedule's state.
-  state saved() const { return {unguided_, rested_, static_cast<std::uint32_t>(takes_part_), weight_}; }
+  state saved() const {
+    return {unguided_, rested_, static_cast<std::uint32_t>(takes_part_), weight_, least_gain_};
+  }
   /// Takes the state of a guider that had made `samples` samples, under the same options. Returns false where
   /// it has no such state.
   bool restore(std::uint32_t samples, const state& from) {
@@ -155,6 +178,8 @@ class rest_schedule {
     if (takes_part == part::in_few && from.unguided == 0) return false;
     if (!is_finite(from.weight)) return false;
     if (from.weight < 1.0f || from.weight > rest_constants::largest_weight) return false;
+    if (!is_finite(from.least_gain) || (from.least_gain != 0.0f && from.least_gain < 1.0f)) return false;
+    least_gain_ = from.least_gain;
     unguided_ = from.unguided;
     rested_ = from.rested;
     takes_part_ = takes_part;

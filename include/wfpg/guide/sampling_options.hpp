@@ -29,14 +29,14 @@ struct sampling_options {
   /// Samples at the beginning that only record: "PT first" in section 3.7.
   std::uint32_t unguided_samples = 1;
   /// Gain below which guiding does not pay: at least 1, or 0 for a guide that never rests. Unset: what suits
-  /// the policy, rest_constants::gpu_least_gain or cpu_least_gain. Samples 4, 8, 16 and so on are compared
-  /// with the unguided one. Where the variance of paths falls by less than this at equal numbers of vertices,
-  /// the guide rests until the next comparison. A sample that rests costs what path tracing costs.
+  /// policy and scene, rest_constants::gpu_least_gain or cpu_least_gain(). Samples 4, 8, 16 and so on are
+  /// compared with unguided ones. Where the variance of paths falls by less than this at equal numbers of
+  /// vertices, the guide rests until the next comparison. A sample that rests costs what path tracing costs.
   ///
   /// Until it is known whether guiding pays, at least until sample 4, few paths are recorded. The guide takes
-  /// part in these alone, if surfaces tell their paths (surface::path). Needs unguided_samples of at least 1,
-  /// and a guide that measures. It also needs 2048 paths that are recorded, and go through the same surfaces
-  /// in all samples that are compared.
+  /// part in these alone, if surfaces tell their paths (surface::path), and in none of sample 2. Needs
+  /// unguided_samples of at least 1, and a guide that measures. It also needs 2048 paths that are recorded,
+  /// and go through the same surfaces in all samples that are compared.
   std::optional<float> least_gain;
   std::uint64_t seed = 0;  ///< seed of the guider's own random numbers; the renderer's come with each wave
   /// Most paths of a sample that the recorder has room for, less than 2^32 - 1. 0 records nothing. Times

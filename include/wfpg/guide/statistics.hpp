@@ -8,6 +8,7 @@
 #include <wfpg/octree/statistics.hpp>
 
 #include <chrono>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -54,27 +55,35 @@ struct guiding_gain {
   /// is not known: it lies in the paths that they seldom find.
   static constexpr double least_light = 0.95;
   /// Difference of two paths up to which its square counts, relative to what the cache expects. Beyond, it
-  /// counts linearly (Huber's loss), so that a few bright paths do not decide alone.
+  /// counts linearly (Huber's loss), so that a few bright paths do not decide alone; and no more beyond 64.
   static constexpr double most_square = 8.0;
+  /// That difference for the variance of typical paths; beyond 16 it counts no more. A few thousand paths
+  /// measure it to a tenth, where bright paths leave the other one uncertain.
+  static constexpr double most_typical = 2.0;
 
   std::uint64_t paths = 0;     ///< pixels with paths in all samples that were compared
   double unguided_mean = 0.0;  ///< mean radiance of paths that sample their BSDFs; a path counts 8 at most
   double guided_mean = 0.0;    ///< mean radiance of guided paths; a path counts 8 at most
   double unguided_variance = 0.0;  ///< variance of a path that samples its BSDFs, by Huber's loss
   double guided_variance = 0.0;    ///< variance of a guided path, by Huber's loss
+  double typical_unguided = 0.0;   ///< unguided_variance without bright paths: of most_typical
+  double typical_guided = 0.0;     ///< guided_variance without bright paths
   double unguided_vertices = 0.0;  ///< mean surfaces of a path that samples its BSDFs
   double guided_vertices = 0.0;    ///< mean surfaces of a guided path
 
-  /// Whether value() means something.
-  bool is_known() const { return paths >= least_paths && unguided_mean >= least_light * guided_mean; }
-  /// Unguided variance over guided variance, at most 1e6; 1 where both are 0.
-  double value() const {
-    if (!(guided_variance > 1.0e-6 * unguided_variance)) return unguided_variance > 0.0 ? 1.0e6 : 1.0;
-    return unguided_variance / guided_variance;
+  /// Whether value() means something: paths are enough, and unguided ones miss no light but by chance.
+  bool is_known() const {
+    if (paths < least_paths) return false;
+    const double chance = std::sqrt((unguided_variance + guided_variance) / static_cast<double>(paths));
+    return unguided_mean >= least_light * guided_mean - chance;
   }
-  /// value() at equal numbers of surfaces: guided paths may be longer, since fewer of them leave the scene.
-  double value_a_vertex() const {
-    return guided_vertices > 0.0 ? value() * unguided_vertices / guided_vertices : value();
+  /// Unguided variance over guided variance, at most 1e6; 1 where both are 0.
+  double value() const { return ratio(unguided_variance, guided_variance); }
+  /// Ratio of the variances of typical paths at equal numbers of surfaces: guided paths may be longer, since
+  /// fewer of them leave the scene. It decides whether guiding pays.
+  double typical_value() const {
+    const double gain = ratio(typical_unguided, typical_guided);
+    return guided_vertices > 0.0 ? gain * unguided_vertices / guided_vertices : gain;
   }
   /// Mean with an earlier comparison, if it had paths: few bright paths decide less.
   guiding_gain mean_with(const guiding_gain& before) const {
@@ -85,8 +94,16 @@ struct guiding_gain {
             mean(guided_mean, before.guided_mean),
             mean(unguided_variance, before.unguided_variance),
             mean(guided_variance, before.guided_variance),
+            mean(typical_unguided, before.typical_unguided),
+            mean(typical_guided, before.typical_guided),
             mean(unguided_vertices, before.unguided_vertices),
             mean(guided_vertices, before.guided_vertices)};
+  }
+
+ private:
+  static double ratio(double unguided, double guided) {
+    if (!(guided > 1.0e-6 * unguided)) return unguided > 0.0 ? 1.0e6 : 1.0;
+    return unguided / guided;
   }
 };
 
@@ -94,7 +111,7 @@ struct guiding_gain {
 struct guider_statistics {
   std::uint32_t samples = 0;         ///< samples begun
   std::uint32_t guided_samples = 0;  ///< samples begun after unguided_samples, where the guide can guide and
-                                     ///< did not rest
+                                     ///< did not rest; up to three were left out, to be compared
   /// Samples begun in which the guide rested, since guiding gained less than least_gain.
   std::uint32_t rested_samples = 0;
   /// Mean of the comparisons of guided samples with an unguided one. Each weighs half of the one after it.

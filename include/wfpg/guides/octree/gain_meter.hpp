@@ -1,8 +1,8 @@
 // Measures what guiding gains: the variance of paths that sampled their BSDFs, over that of guided paths.
 //
 // Paths of one index in several samples go through one pixel, so that differences between them are noise.
-// With b an unguided path's radiance, and g and h those of guided ones, E (g - h)² is twice the variance of
-// guided paths. E (b - g)² is the sum of both variances.
+// Half the mean square of differences of two guided paths is the variance of guided paths. Differences of up
+// to four unguided paths give that of unguided ones.
 //
 // Differences are relative to what the cache expects of the path's first surface, and the mean of the scene.
 // Dark and bright parts then count alike, and no part without light counts much. Squares count up to 8, and
@@ -10,7 +10,7 @@
 // kinds of paths show where unguided ones miss light: a path counts 8 at most.
 //
 // Source: wfpg's own. Cost: a look-up and O(vertices) a path, over at most 65,536 paths, and a reduction.
-// Memory: 16 bytes a path, at most 1 MiB.
+// Memory: 28 bytes a path, at most 1.75 MiB.
 #pragma once
 
 #include <wfpg/exec/buffer.hpp>
@@ -21,7 +21,7 @@
 
 namespace wfpg {
 
-/// Compares the paths of guided samples with those of an unguided one. Movable, not copyable. Precondition:
+/// Compares the paths of guided samples with those of unguided ones. Movable, not copyable. Precondition:
 /// the paths to compare are the same ones in all calls, and the recorder records them.
 template <class Exec>
 class gain_meter {
@@ -44,13 +44,14 @@ class gain_meter {
   /// A meter for up to `paths` paths to compare. With 0, gains are never known. Throws out_of_memory.
   gain_meter(const Exec& exec, std::size_t paths);
 
-  /// Keeps what the recorded paths of an unguided sample brought, in place of all that was kept. Call it
-  /// before the recorder is cleared. O(paths).
+  /// Keeps what the recorded paths of an unguided sample brought. `number`: that sample's among unguided
+  /// ones, less than rest_constants::most_unguided. 0: all that was kept is forgotten. Call it before the
+  /// recorder is cleared. O(paths).
   void keep_unguided(const Exec& exec, const path_recorder<Exec>& recorder, const recorded_runs& compared,
-                     const exitance_cache_view& cache);
+                     const exitance_cache_view& cache, std::uint32_t number);
   /// Measures the recorded paths of a guided sample, and keeps what they brought. The gain is known from the
-  /// second call on. Call it before the recorder is cleared, and before the cache has these paths. Waits for
-  /// the work before it. O(paths).
+  /// second call on, after two unguided samples. Call it before the recorder is cleared, and before the cache
+  /// has these paths. Waits for the work before it. O(paths).
   guiding_gain gain(const Exec& exec, const path_recorder<Exec>& recorder, const recorded_runs& compared,
                     const exitance_cache_view& cache);
 
@@ -58,7 +59,7 @@ class gain_meter {
   void forget(const Exec& exec);
   /// Most paths to compare.
   std::size_t size() const { return kept_.size(); }
-  /// Bytes in the policy's memory: 16 a path.
+  /// Bytes in the policy's memory: 28 a path.
   std::size_t bytes() const { return kept_.bytes(); }
 
  private:
@@ -69,7 +70,6 @@ class gain_meter {
   // Sum of what measure(i) adds, for i in [0, n).
   template <class Measure>
   static detail::path_sums sum(const Exec& exec, std::size_t n, const Measure& measure);
-  void keep(const Exec& exec, const detail::measured_paths& paths, bool unguided);
   // Number of paths, for which there is room.
   std::size_t count(const detail::measured_paths& paths) const { return min(paths.size(), kept_.size()); }
 

@@ -51,16 +51,18 @@ class octree_scene : public guide_base {
   bool measures() const { return meter_.size() >= guiding_gain::least_paths && !empty(); }
   /// log2 of the number of recorded paths of which one is compared.
   std::uint32_t rarer() const { return gain_meter<Exec>::rarer(recorded().paths(), options_.max_paths); }
-  /// Keeps what the paths of an unguided sample brought. O(compared paths).
-  void keep_unguided(const Exec& exec, const path_recorder<Exec>& paths, const recorded_runs& compared) {
-    meter_.keep_unguided(exec, paths, compared, cache_.view());
+  /// Keeps what the paths of an unguided sample brought. `number`: among unguided ones, from 0. O(compared
+  /// paths).
+  void keep_unguided(const Exec& exec, const path_recorder<Exec>& paths, const recorded_runs& compared,
+                     std::uint32_t number) {
+    meter_.keep_unguided(exec, paths, compared, cache_.view(), number);
   }
   /// Compares the paths of a guided sample with those that keep_unguided() kept, and with those of the call
   /// before. Waits for the work before it. O(compared paths).
   guiding_gain gain(const Exec& exec, const path_recorder<Exec>& paths, const recorded_runs& compared) {
     return meter_.gain(exec, paths, compared, cache_.view());
   }
-  /// Begins a sample that the guide rests in. Choices of lights go on.
+  /// Begins a sample that the guide rests in. Choices of lights may go on.
   /// Neither fields nor cache take part.
   void begin_rest(const sample_context<Exec>& at) { begin_scene_sample(at); }
   /// Ends a sample without the guide: light choices learn from it.

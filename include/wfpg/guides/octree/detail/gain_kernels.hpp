@@ -4,6 +4,7 @@
 #include <wfpg/base/math.hpp>
 #include <wfpg/guide/path_recorder.hpp>
 #include <wfpg/guide/recorded_path.hpp>
+#include <wfpg/guide/rest_schedule.hpp>
 #include <wfpg/guide/statistics.hpp>
 #include <wfpg/host/recorded_runs.hpp>
 #include <wfpg/octree/exitance_cache.hpp>
@@ -13,27 +14,36 @@
 
 namespace wfpg::detail {
 
-/// Radiance that paths of one index brought to the camera in earlier samples: luminance, W/(m² sr). 16 bytes.
+/// Radiance that paths of one index brought to the camera in earlier samples: luminance, W/(m² sr). Negative
+/// where it is not known, or the path began at another place. 28 bytes.
 struct earlier_paths {
   /// Marks paths that hit no surface of the octree first.
   static constexpr std::uint32_t nowhere = 0xffffffffu;
 
-  std::uint32_t place = nowhere;  ///< of the unguided path's first surface: 2 * node + side
-  float unguided = -1.0f;         ///< in the unguided sample; negative where it is not known
-  /// In the last guided sample that was measured; negative where it is not known, or began at another place.
-  float guided = -1.0f;
-  std::uint32_t vertices = 0;  ///< surfaces of the unguided path
+  std::uint32_t place = nowhere;  ///< of the first unguided path's first surface: 2 * node + side
+  std::uint32_t vertices = 0;     ///< surfaces of the first unguided path
+  float unguided[rest_constants::most_unguided] = {-1.0f, -1.0f, -1.0f, -1.0f};  ///< in unguided samples
+  float guided = -1.0f;  ///< in the last guided sample that was measured
+};
+
+/// Losses of differences of paths, as guiding_gain has them.
+struct path_losses {
+  std::uint64_t all = 0;      ///< of guiding_gain::most_square
+  std::uint64_t typical = 0;  ///< of guiding_gain::most_typical
+
+  WFPG_HD path_losses operator+(const path_losses& other) const {
+    return {all + other.all, typical + other.typical};
+  }
 };
 
 /// Sums over at most 2^17 paths. Integers, so that any order of additions gives the same bits. Values are in
 /// units of 2^-30, losses in units of 2^-36.
 struct path_sums {
   std::uint64_t paths = 0;
-  std::uint64_t unguided = 0;           ///< values of unguided paths
+  std::uint64_t unguided = 0;           ///< mean values of unguided paths
   std::uint64_t guided = 0;             ///< values of guided paths
-  std::uint64_t now_first = 0;          ///< losses of differences of guided paths from unguided ones
-  std::uint64_t now_earlier = 0;        ///< losses of differences of guided paths from earlier guided ones
-  std::uint64_t earlier_first = 0;      ///< losses of differences of earlier guided paths from unguided ones
+  path_losses unguided_losses;          ///< mean losses of differences of two unguided paths
+  path_losses guided_losses;            ///< losses of differences of guided paths from earlier guided ones
   std::uint64_t unguided_vertices = 0;  ///< surfaces of unguided paths
   std::uint64_t guided_vertices = 0;    ///< surfaces of guided paths
 
@@ -41,9 +51,8 @@ struct path_sums {
     return {paths + other.paths,
             unguided + other.unguided,
             guided + other.guided,
-            now_first + other.now_first,
-            now_earlier + other.now_earlier,
-            earlier_first + other.earlier_first,
+            unguided_losses + other.unguided_losses,
+            guided_losses + other.guided_losses,
             unguided_vertices + other.unguided_vertices,
             guided_vertices + other.guided_vertices};
   }
@@ -100,52 +109,80 @@ struct measured_paths {
   }
 };
 
-/// Kernel: keeps what paths brought, of an unguided sample or of a guided one.
-struct keep_paths {
+/// Kernel: keeps what the paths of a guided sample brought.
+struct keep_guided_paths {
   measured_paths paths;
   array_view<earlier_paths> kept;
-  bool unguided;
 
   WFPG_HD void operator()(std::size_t i) const {
     const measured_path now = paths(i);
-    if (unguided)
-      kept[i] = {now.place, now.radiance, -1.0f, now.vertices};
-    else
-      kept[i].guided = now.place == kept[i].place ? now.radiance : -1.0f;
+    kept[i].guided = now.place == kept[i].place ? now.radiance : -1.0f;
   }
 };
 
-/// Terms of a guided path in the sums: 0 where one of the three paths is missing, or began elsewhere.
+/// Kernel: keeps what the paths of unguided sample `number` brought. The first one forgets all others.
+struct keep_unguided_paths {
+  measured_paths paths;
+  array_view<earlier_paths> kept;
+  std::uint32_t number;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const measured_path now = paths(i);
+    earlier_paths& to = kept[i];
+    if (number == 0) {
+      to = {};
+      to.place = now.place;
+      to.vertices = now.vertices;
+    }
+    to.unguided[number] = now.place == to.place ? now.radiance : -1.0f;
+  }
+};
+
+/// Terms of a guided path in the sums: 0 where no earlier guided path, or fewer than two unguided ones, began
+/// where it did.
 struct measure_path {
   measured_paths paths;
   array_view<const earlier_paths> kept;
 
   WFPG_HD path_sums operator()(std::size_t i) const {
     const earlier_paths before = kept[i];
-    if (before.place == earlier_paths::nowhere || before.unguided < 0.0f || before.guided < 0.0f) return {};
+    if (before.place == earlier_paths::nowhere || before.guided < 0.0f) return {};
     const measured_path now = paths(i);
     if (now.radiance < 0.0f || now.place != before.place) return {};
     const float scale = paths.scale(before.place);
     if (!(scale > 0.0f) || !is_finite(scale)) return {};
-    const float first = before.unguided / scale, earlier = before.guided / scale, last = now.radiance / scale;
+    path_losses of_pairs;
+    float value = 0.0f;
+    std::uint32_t n = 0;
+    for (const float path : before.unguided) {
+      if (path < 0.0f) continue;
+      for (const float other : before.unguided)
+        if (other >= 0.0f) of_pairs = of_pairs + losses((path - other) / scale);
+      value += min(path / scale, most);
+      ++n;
+    }
+    if (n < 2) return {};
+    const std::uint32_t pairs = n * (n - 1);
     return {1,
-            units(min(first, most)),
-            units(min(last, most)),
-            loss_units(first - last),
-            loss_units(earlier - last),
-            loss_units(first - earlier),
+            units(value / static_cast<float>(n)),
+            units(min(now.radiance / scale, most)),
+            {of_pairs.all / pairs, of_pairs.typical / pairs},
+            losses((before.guided - now.radiance) / scale),
             before.vertices,
             now.vertices};
   }
 
  private:
-  static constexpr float most = static_cast<float>(guiding_gain::most_square), brightest = 64.0f;
+  static constexpr float most = static_cast<float>(guiding_gain::most_square);
 
   WFPG_HD static std::uint64_t units(float value) { return static_cast<std::uint64_t>(value * 0x1p30f); }
-  // Huber's loss: the square of a difference up to `most`, and the line through it beyond.
-  WFPG_HD static std::uint64_t loss_units(float difference) {
-    const float d = min(fabsf(difference), brightest);
-    return static_cast<std::uint64_t>((d <= most ? d * d : most * (2.0f * d - most)) * 0x1p36f);
+  // Huber's loss: the square of a difference up to `least`, and the line through it up to eight times that.
+  WFPG_HD static std::uint64_t loss(float difference, float least) {
+    const float d = min(fabsf(difference), 8.0f * least);
+    return static_cast<std::uint64_t>((d <= least ? d * d : least * (2.0f * d - least)) * 0x1p36f);
+  }
+  WFPG_HD static path_losses losses(float difference) {
+    return {loss(difference, most), loss(difference, static_cast<float>(guiding_gain::most_typical))};
   }
 };
 

@@ -29,9 +29,11 @@ detail::path_sums gain_meter<Exec>::sum(const Exec& exec, std::size_t n, const M
 
 template <class Exec>
 void gain_meter<Exec>::keep_unguided(const Exec& exec, const path_recorder<Exec>& recorder,
-                                     const recorded_runs& compared, const exitance_cache_view& cache) {
-  forget(exec);
-  keep(exec, {recorder.view(), cache, compared}, true);
+                                     const recorded_runs& compared, const exitance_cache_view& cache,
+                                     std::uint32_t number) {
+  const detail::measured_paths paths{recorder.view(), cache, compared};
+  if (number == 0) forget(exec);
+  exec.for_each(count(paths), detail::keep_unguided_paths{paths, kept_.view(), number});
 }
 
 template <class Exec>
@@ -39,12 +41,11 @@ guiding_gain gain_meter<Exec>::gain(const Exec& exec, const path_recorder<Exec>&
                                     const recorded_runs& compared, const exitance_cache_view& cache) {
   const detail::measured_paths paths{recorder.view(), cache, compared};
   const detail::path_sums sums = sum(exec, count(paths), detail::measure_path{paths, kept_.view()});
-  keep(exec, paths, false);
+  exec.for_each(count(paths), detail::keep_guided_paths{paths, kept_.view()});
   return gain_of(sums);
 }
 
-// With the variances U, E and N of unguided, earlier and present paths, the mean losses of differences are
-// about U + N, E + N and U + E. Two of them less the third are twice a variance.
+// The mean loss of differences of two paths of a kind is about twice the kind's variance.
 template <class Exec>
 guiding_gain gain_meter<Exec>::gain_of(const detail::path_sums& sums) {
   guiding_gain result;
@@ -52,12 +53,13 @@ guiding_gain gain_meter<Exec>::gain_of(const detail::path_sums& sums) {
   if (sums.paths == 0) return result;
   const auto n = static_cast<double>(sums.paths);
   const auto mean = [n](std::uint64_t units) { return 0x1p-30 / n * static_cast<double>(units); };
-  const auto square = [n](std::uint64_t units) { return 0x1p-36 / n * static_cast<double>(units); };
-  const double un = square(sums.now_first), en = square(sums.now_earlier), ue = square(sums.earlier_first);
+  const auto variance = [n](std::uint64_t losses) { return 0x1p-37 / n * static_cast<double>(losses); };
   result.unguided_mean = mean(sums.unguided);
   result.guided_mean = mean(sums.guided);
-  result.unguided_variance = max(0.5 * (un + ue - en), 0.0);
-  result.guided_variance = max(0.5 * (un + en - ue), 0.0);
+  result.unguided_variance = variance(sums.unguided_losses.all);
+  result.guided_variance = variance(sums.guided_losses.all);
+  result.typical_unguided = variance(sums.unguided_losses.typical);
+  result.typical_guided = variance(sums.guided_losses.typical);
   result.unguided_vertices = static_cast<double>(sums.unguided_vertices) / n;
   result.guided_vertices = static_cast<double>(sums.guided_vertices) / n;
   return result;
@@ -66,11 +68,6 @@ guiding_gain gain_meter<Exec>::gain_of(const detail::path_sums& sums) {
 template <class Exec>
 void gain_meter<Exec>::forget(const Exec& exec) {
   ::thrust::fill_n(exec.thrust(), kept_.data(), kept_.size(), detail::earlier_paths{});
-}
-
-template <class Exec>
-void gain_meter<Exec>::keep(const Exec& exec, const detail::measured_paths& paths, bool unguided) {
-  exec.for_each(count(paths), detail::keep_paths{paths, kept_.view(), unguided});
 }
 
 }  // namespace wfpg
