@@ -1,6 +1,6 @@
 // Joins the ranks that render one picture: processes, GPUs or threads, which learn one guide. Each rank has a
-// part of the paths of every sample. At a sample's end the ranks add up what their paths found, in integers,
-// so that the guide has the same bytes for any number of ranks.
+// part of the paths of every sample. At a sample's end the ranks add up what their paths found, in integers.
+// The guide then has the same bytes for any number of ranks.
 //
 // An abstract class, so that kernels and guiders do not depend on what carries the messages: its functions
 // are called a few times a sample. Adapters: ranks/threads.hpp, ranks/mpi.hpp, ranks/nccl.hpp. A host derives
@@ -26,9 +26,10 @@ class rank_error : public std::runtime_error {
   explicit rank_error(const std::string& reason) : std::runtime_error("wfpg: " + reason) {}
 };
 
-/// Joins ranks 0 to size() - 1. All ranks call the same functions in the same order with as many values. Arrays
-/// lie in the memory of the policy for which the communicator was made; a call is ordered after the policy's
-/// calls before it, and those after it see its result. One thread at a time may call one rank's communicator.
+/// Joins ranks 0 to size() - 1. All ranks call the same functions in the same order with as many values.
+/// Arrays lie in the memory of the policy for which the communicator was made. A call is ordered after the
+/// policy's calls before it, and calls after it see its result. One thread at a time may call one rank's
+/// communicator.
 ///
 /// Functions throw rank_error where another rank does not come within the adapter's time limit.
 class communicator {
@@ -43,6 +44,7 @@ class communicator {
   virtual void all_reduce_sum(array_view<std::uint64_t> values) = 0;
   /// Replaces each value by the largest of all ranks.
   virtual void all_reduce_max(array_view<std::uint32_t> values) = 0;
+  virtual void all_reduce_max(array_view<std::uint64_t> values) = 0;
   /// Replaces the bytes of all ranks by those of the rank `root`.
   virtual void broadcast(array_view<unsigned char> bytes, std::uint32_t root) = 0;
 };
