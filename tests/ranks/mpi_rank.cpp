@@ -83,8 +83,8 @@ void check_sums(ranks& joined, std::size_t count) {
   }
 }
 
+template <class T>
 void check_maxima(ranks& joined, std::size_t count) {
-  using T = std::uint32_t;
   const wfpg::buffer<T, exec> values(
       exec(), values_of<T>(count, [&](std::size_t i) { return value_of<T>(joined.rank(), i); }));
   joined.all_reduce_max(values.view());
@@ -116,7 +116,8 @@ void check_functions() {
     for (std::size_t count : {std::size_t(0), std::size_t(1), std::size_t(24), std::size_t(1000)}) {
       check_sums<std::uint32_t>(joined, count);
       check_sums<std::uint64_t>(joined, count);
-      check_maxima(joined, count);
+      check_maxima<std::uint32_t>(joined, count);
+      check_maxima<std::uint64_t>(joined, count);
       check_broadcast(joined, count);
     }
   }

@@ -137,10 +137,15 @@ class mpi_communicator final : public communicator {
   void all_reduce_sum(array_view<std::uint64_t> values) override {
     reduce(detail::rank_function::sum64, values, MPI_UINT64_T, MPI_SUM);
   }
-  /// Takes the largest values.
+  /// Takes the largest values of 32 bits.
   /// Throws rank_error likewise.
   void all_reduce_max(array_view<std::uint32_t> values) override {
     reduce(detail::rank_function::max32, values, MPI_UINT32_T, MPI_MAX);
+  }
+  /// Takes the largest values of 64 bits.
+  /// Throws rank_error likewise.
+  void all_reduce_max(array_view<std::uint64_t> values) override {
+    reduce(detail::rank_function::max64, values, MPI_UINT64_T, MPI_MAX);
   }
   /// Sends the bytes of the rank `root` to all others.
   /// Throws rank_error likewise.

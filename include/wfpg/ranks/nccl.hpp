@@ -143,10 +143,15 @@ class nccl_communicator final : public communicator {
   void all_reduce_sum(array_view<std::uint64_t> values) override {
     reduce(detail::rank_function::sum64, values, ncclUint64, ncclSum);
   }
-  /// Takes the largest values.
+  /// Takes the largest values of 32 bits.
   /// Throws rank_error likewise.
   void all_reduce_max(array_view<std::uint32_t> values) override {
     reduce(detail::rank_function::max32, values, ncclUint32, ncclMax);
+  }
+  /// Takes the largest values of 64 bits.
+  /// Throws rank_error likewise.
+  void all_reduce_max(array_view<std::uint64_t> values) override {
+    reduce(detail::rank_function::max64, values, ncclUint64, ncclMax);
   }
   /// Sends the bytes of the rank `root` to all others.
   /// Throws rank_error likewise.

@@ -16,12 +16,13 @@
 namespace wfpg::detail {
 
 /// The functions of a communicator.
-enum class rank_function : std::uint32_t { sum32, sum64, max32, broadcast };
+enum class rank_function : std::uint32_t { sum32, sum64, max32, max64, broadcast };
 
 /// Returns the function's name, for messages.
 inline const char* name_of(rank_function function) {
   if (function == rank_function::broadcast) return "broadcast";
-  return function == rank_function::max32 ? "all_reduce_max" : "all_reduce_sum";
+  const bool is_sum = function == rank_function::sum32 || function == rank_function::sum64;
+  return is_sum ? "all_reduce_sum" : "all_reduce_max";
 }
 
 /// One call of a communicator's function by one rank.
