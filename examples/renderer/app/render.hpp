@@ -19,6 +19,10 @@
 #include <utility>
 #include <vector>
 
+namespace wfpg {
+class communicator;
+}
+
 namespace render {
 
 enum class guiding { oriented, plain };
@@ -34,6 +38,9 @@ enum class checkpoint_times {
   all
 };                                                 ///< after samples 1, 2, 4, 8, ... and the last; all
 enum class device { cpu, omp, seq, cuda, optix };  ///< TBB, OpenMP, one thread, a GPU, and with OptiX
+
+/// How ranks share a picture: the pixels of each sample, or several samples that end together.
+enum class rank_split { tiles, samples };
 
 inline constexpr int largest_side = 32768;  ///< pixels
 inline constexpr std::int64_t most_pixels = std::int64_t(1) << 28;
@@ -86,10 +93,16 @@ struct render_options {
   /// Unset: inverse_variance for guides that measure their gain, pt_linear for others that learn. All alike
   /// for path tracing, records, and with a guide that was loaded.
   std::optional<wfpg::sample_combination> combine;
-  std::string load_guide;            ///< guide file, of the same scene, to begin with; empty: none
-  std::string resume;                ///< state file of the rendering to go on with; empty: none
-  bool keep_guide = false;           ///< the result has the guide
-  bool keep_state = false;           ///< the result has what `resume` takes
+  std::string load_guide;               ///< guide file, of the same scene, to begin with; empty: none
+  std::string resume;                   ///< state file of the rendering to go on with; empty: none
+  bool keep_guide = false;              ///< the result has the guide
+  bool keep_state = false;              ///< the result has what `resume` takes
+  std::optional<rank_split> split;      ///< unset: one rank renders alone
+  int samples_a_wave = 24;              ///< of each pixel, where ranks share samples
+  double rank_seconds = 30.0;           ///< for which a rank waits for others
+  wfpg::communicator* ranks = nullptr;  ///< that share the picture, of the host's memory; null: one rank
+  wfpg::communicator* policy_ranks =
+      nullptr;                       ///< the same ranks, of the policy's memory; where `ranks` is not null
   std::function<bool()> is_stopped;  ///< asked after each sample: true ends the rendering; may be empty
 };
 
@@ -185,6 +198,12 @@ inline wfpg::sample_combination combination_of(const render_options& options) {
   const bool measures = is_wfpg(options.method) && options.octree != octree_source::samples &&
                         options.least_gain.value_or(1.0f) > 0.0f;
   return measures ? sample_combination::inverse_variance : sample_combination::pt_linear;
+}
+
+/// Samples of a picture that has weight: more than one wave where the first wave is discarded.
+inline int least_samples(const render_options& options) {
+  const int wave = options.split == rank_split::samples ? options.samples_a_wave : 1;
+  return combination_of(options) == wfpg::sample_combination::discard_first ? wave + 1 : 1;
 }
 
 /// A picture on the way.

@@ -175,6 +175,17 @@ const std::vector<requirement>& requirements() {
       {{"--save-state", "--resume"},
        "--method " + names_of_methods(&method_properties::can_be_saved),
        [](options o) { return properties_of(o.method).can_be_saved; }},
+      {{"--samples-a-wave"}, "--split samples", [](options o) { return o.split == rank_split::samples; }},
+      {{"--rank-seconds"}, "--split", [](options o) { return o.split.has_value(); }},
+      {{"--split"},
+       "--method " + names_of_methods(&method_properties::can_be_split),
+       [](options o) { return properties_of(o.method).can_be_split; }},
+      {{"--split"},
+       "--octree triangles or caster",
+       [](options o) { return o.octree != octree_source::samples; }},
+      {{"--save-state", "--resume"},
+       "--split tiles, or none",
+       [](options o) { return o.split != rank_split::samples; }},
       {{"--sarsa-update", "--sarsa-sampler", "--sarsa-resolution", "--sarsa-directions", "--sarsa-step",
         "--sarsa-learning-rate"},
        "--method sarsa",
@@ -265,6 +276,20 @@ void add_bidirectional_options(CLI::App& app, render_options& options) {
 void add_device_option(CLI::App& app, render_options& options) {
   add_choice<device>(app, "--device", options.where, device_names(),
                      "TBB (default), OpenMP, one thread, or a GPU");
+}
+
+void add_rank_options(CLI::App& app, render_options& options) {
+  add_choice<rank_split>(
+      app, "--split", options.split, {{"tiles", rank_split::tiles}, {"samples", rank_split::samples}},
+      "processes that mpirun starts share the pixels of each sample, or several samples; the "
+      "picture has the same bytes for any number of them");
+  app.add_option(
+         "--samples-a-wave", options.samples_a_wave,
+         with_default("samples that end together, which --split samples shares", options.samples_a_wave))
+      ->transform(whole_number(1, 1 << 16));
+  app.add_option("--rank-seconds", options.rank_seconds,
+                 with_default("for which a process waits for others", options.rank_seconds))
+      ->transform(positive_number(1.0e6));
 }
 
 void add_nee_option(CLI::App& app, render_options& options) {
