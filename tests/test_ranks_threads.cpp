@@ -1,6 +1,7 @@
 // Ranks as threads of one process: what their calls return, and how they fail.
 #include "support/catch.hpp"
 #include "support/policies.hpp"
+#include "support/ranks.hpp"
 
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/ranks/single.hpp>
@@ -16,25 +17,6 @@ namespace {
 
 using namespace wfpg_test;
 
-/// Runs f(communicator) in n threads, and returns what each of them threw: "" for nothing.
-template <class F>
-std::vector<std::string> run_ranks(std::uint32_t n, std::chrono::milliseconds limit, const F& f) {
-  wfpg::thread_ranks ranks(n, limit);
-  std::vector<std::string> errors(n);
-  std::vector<std::thread> threads;
-  for (std::uint32_t r = 0; r < n; ++r)
-    threads.emplace_back([&, r] {
-      try {
-        wfpg::thread_communicator<host_policy> here(host_policy(), ranks, r);
-        f(here);
-      } catch (const wfpg::rank_error& error) {
-        errors[r] = error.what();
-      }
-    });
-  for (std::thread& thread : threads) thread.join();
-  return errors;
-}
-
 template <class T>
 wfpg::array_view<T> view_of(std::vector<T>& values) {
   return {values.data(), values.size()};
@@ -48,7 +30,7 @@ TEST_CASE("threads reduce sums and maxima, and broadcast", "[ranks_threads]") {
   for (const std::uint32_t n : {1u, 2u, 3u, 8u}) {
     CAPTURE(n);
     std::vector<std::uint32_t> wrong(n, 0);
-    const std::vector<std::string> errors = run_ranks(n, later, [&](wfpg::communicator& ranks) {
+    const std::vector<std::string> errors = run_ranks<host_policy>(n, later, [&](wfpg::communicator& ranks) {
       const std::uint32_t r = ranks.rank();
       for (std::uint32_t turn = 0; turn < 50; ++turn) {
         std::vector<std::uint32_t> sum32{r + turn, 0xffffffffu}, max32{r * turn, 7u};
@@ -99,14 +81,14 @@ TEST_CASE("ranks that are late, end, or differ are errors of all ranks", "[ranks
       CHECK(error.find(words) != std::string::npos);
     }
   };
-  all_say(run_ranks(3, soon,
-                    [&](communicator& ranks) {
-                      std::vector<std::uint32_t> values{1};
-                      if (ranks.rank() == 1) std::this_thread::sleep_for(5 * soon);
-                      ranks.all_reduce_sum(view_of(values));
-                    }),
+  all_say(run_ranks<host_policy>(3, soon,
+                                 [&](communicator& ranks) {
+                                   std::vector<std::uint32_t> values{1};
+                                   if (ranks.rank() == 1) std::this_thread::sleep_for(5 * soon);
+                                   ranks.all_reduce_sum(view_of(values));
+                                 }),
           "rank 1 did not come within 100 ms");
-  const std::vector<std::string> ended = run_ranks(3, later, [&](communicator& ranks) {
+  const std::vector<std::string> ended = run_ranks<host_policy>(3, later, [&](communicator& ranks) {
     std::vector<std::uint32_t> values{1};
     ranks.all_reduce_sum(view_of(values));
     if (ranks.rank() != 2) ranks.all_reduce_sum(view_of(values));
@@ -114,20 +96,20 @@ TEST_CASE("ranks that are late, end, or differ are errors of all ranks", "[ranks
   CHECK(ended[0].find("rank 2 has ended") != std::string::npos);
   CHECK(ended[1] == ended[0]);
   CHECK(ended[2].empty());
-  all_say(run_ranks(2, later,
-                    [&](communicator& ranks) {
-                      std::vector<std::uint32_t> values(1 + ranks.rank());
-                      ranks.all_reduce_sum(view_of(values));
-                    }),
+  all_say(run_ranks<host_policy>(2, later,
+                                 [&](communicator& ranks) {
+                                   std::vector<std::uint32_t> values(1 + ranks.rank());
+                                   ranks.all_reduce_sum(view_of(values));
+                                 }),
           "all ranks must have the same options");
-  all_say(run_ranks(2, later,
-                    [&](communicator& ranks) {
-                      std::vector<std::uint32_t> values(2);
-                      if (ranks.rank() == 0)
-                        ranks.all_reduce_sum(view_of(values));
-                      else
-                        ranks.all_reduce_max(view_of(values));
-                    }),
+  all_say(run_ranks<host_policy>(2, later,
+                                 [&](communicator& ranks) {
+                                   std::vector<std::uint32_t> values(2);
+                                   if (ranks.rank() == 0)
+                                     ranks.all_reduce_sum(view_of(values));
+                                   else
+                                     ranks.all_reduce_max(view_of(values));
+                                 }),
           "maximum of 32 bits of 8 bytes");
 }
 

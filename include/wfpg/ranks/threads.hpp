@@ -78,6 +78,7 @@ class thread_ranks {
   // A turn was completed, or a rank was lost.
   std::condition_variable changed_;
   std::vector<bool> came_;  // ranks that made this turn's call
+  // How long a rank waits for others.
   std::chrono::milliseconds limit_;
   // Why no further call is made. Empty: calls are made.
   std::string lost_;
@@ -131,6 +132,7 @@ class thread_communicator final : public communicator {
     if (bytes > 0) exec_.copy_from_host(values.data(), host_.data(), bytes);
   }
 
+  // As the constructor got it.
   Exec exec_;  // copies between the policy's memory and the host's
   thread_ranks& ranks_;
   std::uint32_t rank_;

@@ -30,15 +30,17 @@ kept_field_options field_store<Exec>::completed(kept_field_options o, std::size_
 template <class Exec>
 field_store<Exec>::field_store(const Exec& exec, const sparse_voxel_octree_view& tree,
                                const binning_options& binning, const kept_field_options& options,
-                               std::size_t max_rays, std::size_t max_values)
+                               std::size_t max_rays, std::size_t max_values, communicator* ranks,
+                               std::optional<std::size_t> own_rays)
     : tree_(tree),
       options_(completed(checked(options, tree.node_count()), max_values)),
       schedule_(max_rays, tree.leaf_count()),
-      marks_(exec, tree, binning),
+      marks_(exec, tree, binning, ranks != nullptr),
       table_(exec,
              tree.empty() ? 0 : options.budget_bytes / bytes_a_slot(options.resolution, options_.learn)),
-      pool_(exec, table_.size(), options_.resolution, options_.learn ? max_values : 0),
-      field_of_ray_(exec, max_rays),
+      pool_(exec, table_.size(), options_.resolution, options_.learn ? max_values : 0, ranks),
+      ranks_(exec, table_.size(), options_.learn, ranks),
+      field_of_ray_(exec, own_rays.value_or(max_rays)),
       counts_(exec, std::vector<field_wave_counts>(2)) {}
 
 template <class Exec>
@@ -51,6 +53,11 @@ void field_store<Exec>::begin_sample(const Exec& exec, std::uint32_t sample) {
 
 template <class Exec>
 void field_store<Exec>::end_sample(const Exec& exec, bool recorded, std::uint32_t log2_divisor) {
+  if (ranks_) {
+    ranks_.share_use(exec, table_.view().slots);
+    if (recorded) ranks_.share_fractions(exec, table_.view().slots, schedule_.sample(), pool_.fractions());
+    if (schedule_.counts_rays()) marks_.sum_ranks(exec, ranks_.ranks());
+  }
   if (recorded) pool_.learn(exec, table_.view().slots, schedule_.sample());
   const bool changes = log2_divisor != log2_divisor_;
   if (!schedule_.chooses_bins() && !changes) return;
@@ -81,9 +88,15 @@ guide_view field_store<Exec>::prepare(const Exec& exec, const kept_field_wave<Su
                               options_.resolution,
                               options_.recast,
                               schedule_.sample(),
-                              &table_.state()->refreshed};
-  if (builds_in_wave())
-    build(exec, kept_field_builder<kept_field_wave<Surfaces>>{wave, kept}, caster, caster_buffer_bytes);
+                              &table_.state()->refreshed,
+                              ranks_.origins()};
+  if (builds_in_wave()) {
+    const kept_field_builder<kept_field_wave<Surfaces>> builder{wave, kept};
+    if (ranks_)
+      ranks_.send_origins(exec, builder, rays_of(wave), wave.ray_count, field_of_ray_.data(),
+                          table_.listed(true), counts());
+    build(exec, builder, caster, caster_buffer_bytes);
+  }
   end_wave();
   return {{field_of_ray_.data(), wave.ray_count}, fields(wave.points)};
 }
@@ -114,12 +127,9 @@ detail::find_field<wave_rays<Surfaces>> field_store<Exec>::finder(const kept_fie
                                                                   detail::wanted_builds wanted_now) {
   const detail::use_slot use{table_.view(), schedule_.sample(), wave.seed, wanted_now,
                              table_.builds(counts())};
-  return {{wave.surfaces, wave.mode, wave.guided_paths},
-          {counts(), wave.statistics},
-          marks_.view(),
-          {tree_, use},
-          table_.wanted(),
-          schedule_.counted(wave.guided_paths.log2_divisor())};
+  return {rays_of(wave),   {counts(), wave.statistics},
+          marks_.view(),   {tree_, use},
+          table_.wanted(), schedule_.counted(wave.guided_paths.log2_divisor())};
 }
 
 /// Gives rays their slots, new ones where there is room.
@@ -127,17 +137,20 @@ template <class Exec>
 template <class Surfaces>
 void field_store<Exec>::find(const Exec& exec, const kept_field_wave<Surfaces>& wave) {
   using detail::wanted_builds;
-  const auto find = finder(wave, !builds_in_wave() ? wanted_builds::none
-                                 : limits_builds() ? wanted_builds::marked
-                                                   : wanted_builds::listed);
+  const auto find = finder(wave, !builds_in_wave()  ? wanted_builds::none
+                                 : chooses_builds() ? wanted_builds::marked
+                                                    : wanted_builds::listed);
   const detail::ray_blocks blocks{wave.ray_count, field_of_ray_.data(), find.counts};
   exec.for_each_block(blocks.size(), 0,
                       detail::find_fields<wave_rays<Surfaces>>{find, blocks, other_counts()});
   if (!builds_in_wave()) return;
   const std::uint32_t cells = pool_.cells_a_field();
+  if (ranks_) ranks_.share_wanted(exec, table_.wanted_buckets(), counts());
   table_.allocate(exec, counts(), options_.max_wave_cones / cells);
-  exec.for_each_block(blocks.size(), 0, detail::find_missing_fields{blocks, find.ancestor});
-  if (limits_builds())
+  exec.for_each_block(blocks.size(), 0,
+                      detail::find_missing_fields<wave_rays<Surfaces>>{blocks, find.ancestor, find.rays});
+  if (ranks_) ranks_.share_origins(exec, table_.view().slots, table_.scratch());
+  if (chooses_builds())
     table_.list_builds_within(exec, {options_.max_wave_cones, cells, refresh_cones()}, counts(), wave.seed);
 }
 

@@ -115,13 +115,47 @@ struct keep_paths {
   }
 };
 
+/// Kernel: what a rank's paths brought, as differences from what is kept of unknown paths. Sums over ranks
+/// are then the differences of all paths, since a path is one rank's. Words are 0 before.
+struct write_path_words {
+  measured_paths paths;
+  array_view<const earlier_paths> kept;
+  bool unguided;
+  std::uint32_t* words;  // 3 a path of an unguided sample, else 1
+  WFPG_HD void operator()(std::size_t i) const {
+    const measured_path now = paths(i);
+    const std::size_t place = i + paths.compared.first_place();
+    if (unguided) {
+      words[3 * place] = now.place - earlier_paths::nowhere;
+      words[3 * place + 1] = float_bits(now.radiance) - float_bits(-1.0f);
+      words[3 * place + 2] = now.vertices;
+    } else if (now.place == kept[place].place) {
+      words[place] = float_bits(now.radiance) - float_bits(-1.0f);
+    }
+  }
+};
+
+/// Kernel: keeps what the words of all ranks say.
+struct keep_path_words {
+  const std::uint32_t* words;
+  bool unguided;
+  array_view<earlier_paths> kept;
+  WFPG_HD void operator()(std::size_t i) const {
+    if (unguided)
+      kept[i] = {words[3 * i] + earlier_paths::nowhere, bits_float(words[3 * i + 1] + float_bits(-1.0f)),
+                 -1.0f, words[3 * i + 2]};
+    else
+      kept[i].guided = bits_float(words[i] + float_bits(-1.0f));
+  }
+};
+
 /// Terms of a guided path in the sums: 0 where one of the three paths is missing, or began elsewhere.
 struct measure_path {
   measured_paths paths;
   array_view<const earlier_paths> kept;
 
   WFPG_HD path_sums operator()(std::size_t i) const {
-    const earlier_paths before = kept[i];
+    const earlier_paths before = kept[i + paths.compared.first_place()];
     if (before.place == earlier_paths::nowhere || before.unguided < 0.0f || before.guided < 0.0f) return {};
     const measured_path now = paths(i);
     if (now.radiance < 0.0f || now.place != before.place) return {};

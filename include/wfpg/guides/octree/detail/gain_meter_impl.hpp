@@ -13,7 +13,11 @@
 namespace wfpg {
 
 template <class Exec>
-gain_meter<Exec>::gain_meter(const Exec& exec, std::size_t paths) : kept_(exec, paths) {
+gain_meter<Exec>::gain_meter(const Exec& exec, std::size_t paths, communicator* ranks)
+    : ranks_(ranks),
+      kept_(exec, paths),
+      words_(exec, ranks ? 3 * paths : 0),
+      sums_(exec, ranks ? sizeof(detail::path_sums) / sizeof(std::uint64_t) : 0) {
   forget(exec);
   // Samples allocate nothing: the reduction's memory is allocated now, and retained.
   if (kept_.size() > 0) sum(exec, kept_.size(), detail::measure_nothing{});
@@ -38,7 +42,12 @@ template <class Exec>
 guiding_gain gain_meter<Exec>::gain(const Exec& exec, const path_recorder<Exec>& recorder,
                                     const recorded_runs& compared, const exitance_cache_view& cache) {
   const detail::measured_paths paths{recorder.view(), cache, compared};
-  const detail::path_sums sums = sum(exec, count(paths), detail::measure_path{paths, kept_.view()});
+  detail::path_sums sums = sum(exec, count(paths), detail::measure_path{paths, kept_.view()});
+  if (ranks_) {
+    exec.copy_from_host(sums_.data(), &sums, sizeof sums);
+    ranks_->all_reduce_sum(sums_.view());
+    exec.copy_to_host(&sums, sums_.data(), sizeof sums);
+  }
   keep(exec, paths, false);
   return gain_of(sums);
 }
@@ -70,7 +79,17 @@ void gain_meter<Exec>::forget(const Exec& exec) {
 
 template <class Exec>
 void gain_meter<Exec>::keep(const Exec& exec, const detail::measured_paths& paths, bool unguided) {
+  if (ranks_) return keep_of_ranks(exec, paths, unguided);
   exec.for_each(count(paths), detail::keep_paths{paths, kept_.view(), unguided});
+}
+
+template <class Exec>
+void gain_meter<Exec>::keep_of_ranks(const Exec& exec, const detail::measured_paths& paths, bool unguided) {
+  const array_view<std::uint32_t> words = words_.view().subview(0, (unguided ? 3 : 1) * kept_.size());
+  exec.fill_bytes(words.data(), 0, words.size() * sizeof(std::uint32_t));
+  exec.for_each(count(paths), detail::write_path_words{paths, kept_.view(), unguided, words.data()});
+  ranks_->all_reduce_sum(words);
+  exec.for_each(kept_.size(), detail::keep_path_words{words.data(), unguided, kept_.view()});
 }
 
 }  // namespace wfpg
