@@ -99,6 +99,19 @@ TEST_CASE("A picture has the same bytes for any number of processes", "[renderer
   check_same(files);
 }
 
+TEST_CASE("Guides have the same bytes for any number of processes", "[renderer][mpi]") {
+  const std::string split = GENERATE("--split tiles", "--split samples --samples-a-wave 3");
+  const std::string what =
+      "many-lamps --method wfpg --size 33x17 --spp 20 --least-gain 0 --field-budget 1MiB " + split;
+  std::vector<written> guides, pictures;
+  for (const int ranks : {1, 2, 3}) {
+    guides.push_back(rendered(ranks, what, "--save-guide", ".guide"));
+    pictures.push_back(rendered(ranks, what, "-o", ".exr"));
+  }
+  check_same(guides);
+  check_same(pictures);
+}
+
 TEST_CASE("A state is that of one process, and other numbers of them go on from it", "[renderer][mpi]") {
   const std::string what = "ajar --method pt --size 33x17 --seed 5";
   const written state = rendered(3, what + " --spp 4 --split tiles", "--save-state", "");

@@ -12,11 +12,16 @@ namespace render {
 void require_shared(const render_options& options) {
   using wfpg::require;
   const std::string& method = name_of(method_names(), options.method);
+  const bool has_gpus = options.where == device::cuda || options.where == device::optix;
+  require(options.devices.empty() || has_gpus, "device", name_of(device_names(), options.where),
+          "cuda or optix where GPUs are numbered");
   require(options.split || !options.ranks, "split", std::string("unset"),
           "tiles or samples for several ranks");
   if (!options.split) return;
   require(properties_of(options.method).can_be_split, "method", method,
           (names_of_methods(&method_properties::can_be_split) + " where ranks share a picture").c_str());
+  require(!is_wfpg(options.method) || options.lifetime == fields::kept, "fields", std::string("transient"),
+          "kept where ranks share a picture");
   require(options.octree != octree_source::samples, "octree", std::string("samples"),
           "triangles or caster where ranks share a picture");
   require(options.samples_a_wave >= 1, "samples_a_wave", options.samples_a_wave, "at least 1");

@@ -7,6 +7,9 @@
 
 #include <wfpg/ranks/communicator.hpp>
 
+#include <optional>
+#include <vector>
+
 namespace render {
 
 /// Samples of a pixel in one wave: what the ranks share.
@@ -78,6 +81,24 @@ class staged_communicator final : public wfpg::communicator {
 
   Exec exec_;
   wfpg::communicator& ranks_;
+};
+
+/// Options whose ranks take arrays of a device's memory.
+template <class Exec>
+class device_options {
+ public:
+  device_options(const Exec& exec, const render_options& options) : options_(options) {
+    if (options.ranks) options_.policy_ranks = &ranks_.emplace(exec, *options.ranks);
+  }
+  // Options refer to its ranks.
+  device_options(const device_options&) = delete;
+  device_options& operator=(const device_options&) = delete;
+
+  const render_options& get() const { return options_; }
+
+ private:
+  render_options options_;
+  std::optional<staged_communicator<Exec>> ranks_;
 };
 
 }  // namespace render

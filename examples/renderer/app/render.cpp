@@ -2,6 +2,7 @@
 #include "app/render.hpp"
 
 #include "app/option_names.hpp"
+#include "app/rank_threads.hpp"
 #include "app/ranks.hpp"
 #include "casters/embree_caster.hpp"
 
@@ -105,6 +106,7 @@ render_result render_completed(const scene& scene, const render_options& options
 }  // namespace
 
 render_result render(const scene& scene, const render_options& options, const progress_callback& progress) {
+  if (options.devices.size() > 1) return render_on_devices(scene, options, progress);
   const render_options complete = completed(scene, options);
   require_same_rendering(scene, complete);
   render_result result = render_completed(scene, complete, progress);

@@ -53,7 +53,8 @@ struct render_options {
   cones through = cones::scene;
   octree_source octree = octree_source::triangles;
   device where = device::cpu;
-  int spp = 64;          ///< samples a pixel, positive; not used where `seconds` is
+  std::vector<int> devices;  ///< numbers of GPUs of cuda or optix; several share the picture; none: the first
+  int spp = 64;              ///< samples a pixel, positive; not used where `seconds` is
   double seconds = 0.0;  ///< time for samples, building not counted; the last may use more; 0: spp decides
   int width = 0;  ///< pixels, both positive, at most `largest_side`, and `most_pixels` together; 0 x 0: the
                   ///< scene's own

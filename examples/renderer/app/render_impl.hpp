@@ -100,7 +100,11 @@ inline wfpg::sampling_options sampling_options_of(const render_options& options)
   guided.guided_depths = guided_depths(options);
   guided.unguided_samples = wfpg::unguided_samples(combination_of(options));
   guided.seed = options.seed;
-  guided.max_paths = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  const wave_share share = share_of(options);
+  guided.max_paths = share.count;
+  guided.ranks = options.policy_ranks;
+  guided.first_path = share.first;
+  guided.all_paths = share.all_paths();
   guided.max_depth = static_cast<std::uint32_t>(options.max_depth);
   return guided;
 }

@@ -230,7 +230,8 @@ int run_program(int argc, const char* const* argv, std::ostream& out, std::ostre
   }
   std::optional<processes> joined;
   try {
-    if (!given.options.split) return render_scene(given, out, log);
+    // Several GPUs are threads of this process, which mpirun has not started.
+    if (!given.options.split || given.options.devices.size() > 1) return render_scene(given, out, log);
     given.options.ranks = &joined.emplace(given.options.rank_seconds).ranks();
     std::ostream none(nullptr);
     const bool is_first = given.options.ranks->rank() == 0;
