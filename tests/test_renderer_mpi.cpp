@@ -122,10 +122,13 @@ TEST_CASE("A state is that of one process, and other numbers of them go on from 
 }
 
 TEST_CASE("Processes that disagree are told so", "[renderer][mpi]") {
-  const std::string picture = program + " ajar --method pt --size 8x8 --spp 2 --split tiles --stats ";
   const temporary_folder folder;
-  const std::string file = folder.file("stats");
-  const printed all = mpirun(1, picture + file + " : -n 1 " + picture + file + " --seed 4");
+  const std::string same = " --size 8x8 --spp 2 --split tiles --stats " + folder.file("stats");
+  const std::string other =
+      GENERATE("ajar --method pt --seed 4", "ajar --method wfpg", "cornell-box --method pt");
+  const printed all =
+      mpirun(1, program + " ajar --method pt" + same + " : -n 1 " + program + " " + other + same);
+  INFO(all.text);
   CHECK_THAT(all.text, WFPG_TEST_CONTAINS("and another rank have different scenes, options or versions"));
 }
 

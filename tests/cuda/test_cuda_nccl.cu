@@ -14,8 +14,8 @@
 namespace {
 
 using wfpg::buffer;
-using wfpg::nccl_communicator;
 using exec = wfpg::exec::cuda;
+using nccl_communicator = wfpg::nccl_communicator<exec>;
 
 std::uint64_t value_of(std::uint32_t rank, std::size_t i) {
   return 0x9e3779b97f4a7c15ull * (i + 1) * (rank + 1);
@@ -33,7 +33,7 @@ template <class F>
 std::vector<std::string> on_all_devices(const wfpg::nccl_options& options, const F& f) {
   int count = 0;
   wfpg::check_cuda(cudaGetDeviceCount(&count), "cudaGetDeviceCount");
-  std::vector<wfpg::nccl_device> devices;
+  std::vector<wfpg::nccl_device<exec>> devices;
   for (int device = 0; device < count; ++device) {
     wfpg::check_cuda(cudaSetDevice(device), "cudaSetDevice");
     devices.push_back({device, exec()});

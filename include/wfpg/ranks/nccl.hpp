@@ -2,7 +2,6 @@
 // GPUs may lie in one machine or in many, in one process or in many.
 // Values stay in device memory.
 // NCCL gives each rank a GPU of its own; for ranks that share a GPU there is ranks/threads.hpp.
-// Include it in files that nvcc compiles.
 // It needs NCCL 2.18 or later, the first with communicators that do not block.
 // The CMake target wfpg::nccl brings its header and library.
 //
@@ -13,11 +12,11 @@
 #pragma once
 
 #include <wfpg/base/error.hpp>
-#include <wfpg/exec/cuda.hpp>
 #include <wfpg/ranks/communicator.hpp>
 #include <wfpg/ranks/detail/nccl_calls.hpp>
 #include <wfpg/ranks/detail/same_call.hpp>
 
+#include <cuda_runtime_api.h>
 #include <nccl.h>
 
 #include <chrono>
@@ -41,12 +40,25 @@ struct nccl_options {
 
 /// A GPU that takes part, for join_devices().
 /// The policy was made while that GPU was current.
+template <class Exec>
 struct nccl_device {
-  int device = 0;   ///< the runtime's number of the GPU
-  exec::cuda exec;  ///< the policy on a stream of that GPU
+  int device = 0;  ///< the runtime's number of the GPU
+  Exec exec;       ///< the policy on a stream of that GPU
 };
 
+/// Returns what all ranks of a new communicator must be given.
+/// One rank makes it.
+/// The host brings its bytes to the others, by MPI for example.
+/// It serves one communicator.
+/// Throws rank_error.
+inline ncclUniqueId make_nccl_id() {
+  ncclUniqueId id;
+  detail::check_nccl(ncclGetUniqueId(&id), "ncclGetUniqueId");
+  return id;
+}
+
 /// The ranks of an NCCL communicator.
+/// Exec is a policy that has a stream(), such as exec::cuda.
 /// Arrays lie in device memory, of the GPU whose stream the policy has.
 /// That GPU must be current in all calls, as for the policy.
 ///
@@ -54,11 +66,11 @@ struct nccl_device {
 /// One process a GPU, with MPI between them:
 ///
 ///   ncclUniqueId id = {};
-///   if (rank == 0) id = wfpg::nccl_communicator::make_id();
+///   if (rank == 0) id = wfpg::make_nccl_id();
 ///   MPI_Bcast(&id, sizeof id, MPI_BYTE, 0, MPI_COMM_WORLD);
 ///   cudaSetDevice(device);
 ///   const wfpg::exec::cuda exec;
-///   wfpg::nccl_communicator ranks(exec, rank, size, id);
+///   wfpg::nccl_communicator<wfpg::exec::cuda> ranks(exec, rank, size, id);
 ///
 /// After rank_error, further calls throw at once.
 /// What NCCL had begun is aborted, so that the stream can be used.
@@ -66,23 +78,13 @@ struct nccl_device {
 ///
 /// One thread at a time may call one rank's communicator.
 /// Ranks of one process need a thread each, since calls wait for the other ranks.
+template <class Exec>
 class nccl_communicator final : public communicator {
  public:
-  /// Returns what all ranks of a new communicator must be given.
-  /// One rank makes it.
-  /// The host brings its bytes to the others, by MPI for example.
-  /// It serves one communicator.
-  /// Throws rank_error.
-  static ncclUniqueId make_id() {
-    ncclUniqueId id;
-    detail::check_nccl(ncclGetUniqueId(&id), "ncclGetUniqueId");
-    return id;
-  }
-
   /// Joins ranks 0 to size - 1, which all must make one with the same `id`.
   /// Throws rank_error where a rank does not come within the time limit.
   /// Throws std::invalid_argument where `rank` is not less than `size`, or for options out of range.
-  nccl_communicator(const exec::cuda& exec, std::uint32_t rank, std::uint32_t size, const ncclUniqueId& id,
+  nccl_communicator(const Exec& exec, std::uint32_t rank, std::uint32_t size, const ncclUniqueId& id,
                     const nccl_options& options = {})
       : nccl_communicator(exec, rank, size, options) {
     begin(id);
@@ -107,25 +109,25 @@ class nccl_communicator final : public communicator {
   /// Returns the communicators of GPUs of this process, all of them, in the order of `devices`.
   /// Each is then for a thread of its own.
   /// The current GPU stays what it was.
-  /// Throws rank_error, cuda_error, or std::invalid_argument where there is no GPU.
-  static std::vector<std::unique_ptr<nccl_communicator>> join_devices(const std::vector<nccl_device>& devices,
-                                                                      const nccl_options& options = {}) {
+  /// Throws rank_error, device_error, or std::invalid_argument where there is no GPU.
+  static std::vector<std::unique_ptr<nccl_communicator>> join_devices(
+      const std::vector<nccl_device<Exec>>& devices, const nccl_options& options = {}) {
     require(!devices.empty(), "devices", devices.size(), "one or more");
     int before = 0;
-    check_cuda(cudaGetDevice(&before), "cudaGetDevice");
+    detail::check_runtime(cudaGetDevice(&before), "cudaGetDevice");
     std::vector<std::unique_ptr<nccl_communicator>> all;
-    const ncclUniqueId id = make_id();
+    const ncclUniqueId id = make_nccl_id();
     const auto size = static_cast<std::uint32_t>(devices.size());
     // A group, so that no call waits for those after it.
     detail::check_nccl(ncclGroupStart(), "ncclGroupStart");
     for (std::uint32_t rank = 0; rank < size; ++rank) {
-      check_cuda(cudaSetDevice(devices[rank].device), "cudaSetDevice");
+      detail::check_runtime(cudaSetDevice(devices[rank].device), "cudaSetDevice");
       all.emplace_back(new nccl_communicator(devices[rank].exec, rank, size, options));
       all.back()->begin(id);
     }
     detail::check_nccl(ncclGroupEnd(), "ncclGroupEnd");
     for (const std::unique_ptr<nccl_communicator>& one : all) one->wait_for_nccl("ncclCommInitRankConfig");
-    check_cuda(cudaSetDevice(before), "cudaSetDevice");
+    detail::check_runtime(cudaSetDevice(before), "cudaSetDevice");
     return all;
   }
 
@@ -170,13 +172,8 @@ class nccl_communicator final : public communicator {
   /// Joins nobody yet.
   /// Checks arguments, and takes memory of the current GPU.
   /// begin() and wait_for_nccl() do the rest, so that several can begin before one waits.
-  nccl_communicator(const exec::cuda& exec, std::uint32_t rank, std::uint32_t size,
-                    const nccl_options& options)
-      : exec_(exec),
-        options_(options),
-        rank_(rank),
-        size_(size),
-        words_(exec, detail::rank_call::word_count) {
+  nccl_communicator(const Exec& exec, std::uint32_t rank, std::uint32_t size, const nccl_options& options)
+      : exec_(exec), options_(options), rank_(rank), size_(size) {
     require(rank < size, "rank", rank, "less than the number of ranks");
     require(options.seconds > 0.0 && options.seconds <= 1.0e6, "seconds", options.seconds,
             "above 0, up to 1e6");
@@ -214,12 +211,12 @@ class nccl_communicator final : public communicator {
   void require_same(const detail::rank_call& call) {
     if (!ranks_) throw rank_error("the communicator is of no more use, since an earlier call has failed");
     // The rank's own work comes first, so that the time limit is for the others alone.
-    check_cuda(cudaStreamSynchronize(exec_.stream()), "cudaStreamSynchronize");
+    detail::check_runtime(cudaStreamSynchronize(exec_.stream()), "cudaStreamSynchronize");
     std::uint64_t words[detail::rank_call::word_count];
     call.write(words);
-    exec_.copy_from_host(words_.data(), words, sizeof words);
+    exec_.copy_from_host(words_.view().data(), words, sizeof words);
     all_reduce(words_.view(), ncclUint64, ncclMax, detail::name_of(call.function));
-    exec_.copy_to_host(words, words_.data(), sizeof words);
+    exec_.copy_to_host(words, words_.view().data(), sizeof words);
     if (call.agrees(words)) return;
     // Ranks are no longer in step, so that later calls must fail, too.
     abandon();
@@ -233,10 +230,10 @@ class nccl_communicator final : public communicator {
     if (begun != ncclSuccess && begun != ncclInProgress) abandon();
     detail::check_nccl(begun, doing);
     wait_for_nccl(doing);  // until it is on the stream
-    check_cuda(cudaEventRecord(done_.get(), exec_.stream()), "cudaEventRecord");
+    detail::check_runtime(cudaEventRecord(done_.get(), exec_.stream()), "cudaEventRecord");
     wait(doing, [&] {
       const cudaError_t code = cudaEventQuery(done_.get());
-      if (code != cudaErrorNotReady) check_cuda(code, doing);
+      if (code != cudaErrorNotReady) detail::check_runtime(code, doing);
       return code == cudaSuccess;
     });
   }
@@ -278,12 +275,12 @@ class nccl_communicator final : public communicator {
   void abandon() { ncclCommAbort(std::exchange(ranks_, nullptr)); }
 
   /// The policy on whose stream the collectives are.
-  exec::cuda exec_;
+  Exec exec_;
   /// As given; ranks are not asked whether they have the same.
   nccl_options options_;
   std::uint32_t rank_ = 0, size_ = 0;
   /// What ranks compare before each exchange.
-  buffer<std::uint64_t, exec::cuda> words_;
+  detail::rank_words words_;
   /// Comes after a collective on the stream.
   detail::cuda_event done_;
   /// Null after a failure.

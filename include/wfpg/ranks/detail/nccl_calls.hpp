@@ -1,12 +1,15 @@
-// Calls of NCCL as exceptions, and a CUDA event with an owner.
-// Cost: one comparison a call. Memory: the runtime's, of an event.
+// Calls of NCCL and of CUDA's runtime as exceptions. Owners of a CUDA event and of device memory.
+// Cost: one comparison a call. Memory: that which they own.
 #pragma once
 
-#include <wfpg/exec/cuda.hpp>
+#include <wfpg/base/error.hpp>
 #include <wfpg/ranks/communicator.hpp>
+#include <wfpg/ranks/detail/same_call.hpp>
 
+#include <cuda_runtime_api.h>
 #include <nccl.h>
 
+#include <cstdint>
 #include <string>
 
 static_assert(NCCL_VERSION_CODE >= NCCL_VERSION(2, 18, 0), "wfpg/ranks/nccl.hpp needs NCCL 2.18 or later");
@@ -21,12 +24,19 @@ inline void check_nccl(ncclResult_t code, const char* function) {
                    "; NCCL_DEBUG=INFO in the environment tells more");
 }
 
+/// Throws device_error that names the failed function of CUDA's runtime.
+inline void check_runtime(cudaError_t code, const char* function) {
+  if (code == cudaSuccess) return;
+  cudaGetLastError();  // clears it
+  throw device_error(static_cast<int>(code), cudaGetErrorString(code), function);
+}
+
 /// An event of the current device that ends with its owner.
 class cuda_event {
  public:
-  /// Throws cuda_error.
+  /// Throws device_error.
   cuda_event() {
-    check_cuda(cudaEventCreateWithFlags(&event_, cudaEventDisableTiming), "cudaEventCreateWithFlags");
+    check_runtime(cudaEventCreateWithFlags(&event_, cudaEventDisableTiming), "cudaEventCreateWithFlags");
   }
   /// Not copyable: an event has one owner.
   cuda_event(const cuda_event&) = delete;
@@ -38,6 +48,27 @@ class cuda_event {
 
  private:
   cudaEvent_t event_ = nullptr;
+};
+
+/// Memory of the current device for the words that ranks compare.
+class rank_words {
+ public:
+  /// Throws device_error.
+  rank_words() {
+    check_runtime(cudaMalloc(&words_, rank_call::word_count * sizeof(std::uint64_t)), "cudaMalloc");
+  }
+  /// Not copyable: the memory has one owner.
+  rank_words(const rank_words&) = delete;
+  rank_words& operator=(const rank_words&) = delete;
+  /// Errors are ignored, as destructors must not throw.
+  ~rank_words() { cudaFree(words_); }
+  /// Returns a view of the words, in device memory.
+  array_view<std::uint64_t> view() const {
+    return {static_cast<std::uint64_t*>(words_), rank_call::word_count};
+  }
+
+ private:
+  void* words_ = nullptr;
 };
 
 }  // namespace wfpg::detail
