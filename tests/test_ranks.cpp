@@ -1,12 +1,14 @@
 // Ranks that share the paths of a sample. n ranks learn one guide: its file has the same bytes for any n, and
 // every path samples the same directions.
 #include "support/catch.hpp"
+#include "support/evaluate.hpp"
 #include "support/guiding.hpp"
 #include "support/policies.hpp"
 #include "support/ranks.hpp"
 #include "support/scenes.hpp"
 
 #include <wfpg/guide_file.hpp>
+#include <wfpg/guides/sarsa/sarsa_grid.hpp>
 #include <wfpg/ranks/single.hpp>
 
 #include <chrono>
@@ -15,14 +17,16 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 namespace {
 
 using namespace wfpg_test;
 using wfpg::kept_guide_options;
+using wfpg::transient_guide_options;
 
-constexpr std::chrono::seconds limit(30);
+constexpr std::chrono::seconds limit(10);
 
 /// The numbers of a path depend on its index among all paths.
 struct numbers_of_paths {
@@ -51,8 +55,9 @@ struct finding {
 };
 
 /// A run to make: samples of paths of up to 3 directions.
+template <class Options>
 struct rank_run {
-  kept_guide_options options;
+  Options options;
   std::uint32_t samples = 6;
   std::size_t paths = 600;
   std::vector<std::size_t> ends = {};  // of the ranks' paths; empty: parts of about equal size
@@ -73,11 +78,41 @@ kept_guide_options ranks_options() {
   return options;
 }
 
-/// One rank of a run.
+/// The guide that options are of.
+template <class Exec, class Options>
+struct guide_of {
+  using type = wfpg::octree_guide_for<Exec, Options>;
+};
 template <class Exec>
+struct guide_of<Exec, wfpg::sarsa_grid_options> {
+  using type = wfpg::sarsa_grid<Exec>;
+};
+
+/// What a guide has learnt: its file, or the bits of a grid's radiance.
+template <class Exec, class Guide>
+std::string saved(const Exec&, const wfpg::path_guider<Exec, Guide>& guider) {
+  std::ostringstream out;
+  wfpg::save_guide(guider, out);
+  return out.str();
+}
+template <class Exec>
+std::string saved(const Exec& exec, const wfpg::path_guider<Exec, wfpg::sarsa_grid<Exec>>& guider) {
+  const wfpg::sarsa_grid_view view = guider.guide().view();
+  const std::vector<float> values = evaluate(exec, 5000, [=] WFPG_HD(std::size_t i) {
+    const hashed_numbers numbers{i};
+    const vec2 a = numbers(0, 0), b = numbers(0, 1), c = numbers(0, 2);
+    return view.radiance(vec3(a.x, a.y, b.x), glm::normalize(vec3(b.y, c.x, c.y) - 0.5f));
+  });
+  return std::string(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float));
+}
+
+/// One rank of a run.
+template <class Exec, class Options>
 class tracing_rank {
  public:
-  tracing_rank(const rank_run& run, wfpg::communicator* ranks, std::size_t first, std::size_t end)
+  using guider_type = wfpg::path_guider<Exec, typename guide_of<Exec, Options>::type>;
+
+  tracing_rank(const rank_run<Options>& run, wfpg::communicator* ranks, std::size_t first, std::size_t end)
       : run_(run), first_(static_cast<std::uint32_t>(first)), count_(end - first) {
     options_ = run.options;
     options_.ranks = ranks;
@@ -91,28 +126,21 @@ class tracing_rank {
 
   /// Traces the run. `directions`: of all ranks.
   void trace(finding& found) {
-    wfpg::path_guider<Exec> guider(exec_, box_mesh<Exec>(exec_).view(), options_);
+    guider_type guider(exec_, box_mesh<Exec>(exec_).view(), options_);
     for (std::uint32_t sample = 0; sample < run_.samples; ++sample) {
-      if (sample > 0 && sample == run_.resumed_after) {
-        std::istringstream in(saved(guider));
-        guider = wfpg::load_guide(exec_, in, options_);
-      }
+      if constexpr (!std::is_same_v<Options, wfpg::sarsa_grid_options>)
+        if (sample > 0 && sample == run_.resumed_after) {
+          std::istringstream in(saved(exec_, guider));
+          guider = wfpg::load_guide(exec_, in, options_);
+        }
       trace_sample(guider, sample, found.directions);
     }
     if (first_ > 0) return;
-    found.file = saved(guider);
+    found.file = saved(exec_, guider);
     found.statistics = guider.statistics();
   }
 
- private:
-  static std::string saved(const wfpg::path_guider<Exec>& guider) {
-    std::ostringstream out;
-    wfpg::save_guide(guider, out);
-    return out.str();
-  }
-
-  void trace_sample(wfpg::path_guider<Exec>& guider, std::uint32_t sample,
-                    std::vector<std::uint64_t>& found) {
+  void trace_sample(guider_type& guider, std::uint32_t sample, std::vector<std::uint64_t>& found) {
     std::vector<test_surface> all = mixed_surfaces(run_.paths, 7);
     std::vector<test_surface> own(all.begin() + first_,
                                   all.begin() + static_cast<std::ptrdiff_t>(first_ + count_));
@@ -142,7 +170,7 @@ class tracing_rank {
         found[(std::size_t(sample) * 3 + depth) * run_.paths + first_ + i] = hash_of(host[i]);
       const std::uint32_t first = first_;
       exec_.for_each(count_, [=] WFPG_HD(std::size_t i) {
-        if (!at[i].active) return;
+        if (!at[i].active || lights.empty()) return;
         const vec2 u = hashed_numbers{seed}(first + static_cast<std::uint32_t>(i), 5);
         const wfpg::light_choice choice = lights.choose(lights.find(at[i].position, at[i].normal), u.x);
         lights.deposit(i, choice.key, (1.0f + u.y) * static_cast<float>(1u + choice.group));
@@ -181,6 +209,7 @@ class tracing_rank {
     });
   }
 
+ private:
   static std::uint64_t hash_of(const wfpg::sampled_direction& d) {
     std::uint64_t key = static_cast<std::uint64_t>(d.technique);
     for (const float value : {d.direction.x, d.direction.y, d.direction.z, d.pdf})
@@ -188,24 +217,25 @@ class tracing_rank {
     return wfpg::hash(key, d.field);
   }
 
-  rank_run run_;
-  kept_guide_options options_;
+  rank_run<Options> run_;
+  Options options_;
   std::uint32_t first_;
   std::size_t count_;
   bool turns_ = false;
   Exec exec_;
 };
 
-finding nothing_of(const rank_run& run) {
+template <class Options>
+finding nothing_of(const rank_run<Options>& run) {
   return {"", std::vector<std::uint64_t>(std::size_t(run.samples) * 3 * run.paths), {}};
 }
 
 /// Runs n ranks; 0: one without a communicator.
-template <class Exec>
-finding found_by(std::uint32_t n, const rank_run& run) {
+template <class Exec, class Options>
+finding found_by(std::uint32_t n, const rank_run<Options>& run) {
   finding found = nothing_of(run);
   if (n == 0) {
-    tracing_rank<Exec>(run, nullptr, 0, run.paths).trace(found);
+    tracing_rank<Exec, Options>(run, nullptr, 0, run.paths).trace(found);
     return found;
   }
   // Threads write to other elements of the findings, and rank 0 alone to the rest.
@@ -214,21 +244,21 @@ finding found_by(std::uint32_t n, const rank_run& run) {
     const auto begin = [&](std::uint32_t k) {
       return run.ends.empty() || k == 0 || k == n ? run.paths * k / n : run.ends[k - 1];
     };
-    tracing_rank<Exec>(run, &ranks, begin(r), begin(r + 1)).trace(found);
+    tracing_rank<Exec, Options>(run, &ranks, begin(r), begin(r + 1)).trace(found);
   });
-  CHECK(errors == std::vector<std::string>(n));
+  REQUIRE(errors == std::vector<std::string>(n));
   return found;
 }
 
-template <class Exec>
-finding check_any_number(const rank_run& run) {
-  const finding alone = found_by<Exec>(0, run);
+template <class Exec, class Options>
+finding check_any_number(const rank_run<Options>& run, std::uint32_t alone_with = 0) {
+  const finding alone = found_by<Exec>(alone_with, run);
   REQUIRE(alone.file.size() > 1000);
   for (const std::uint32_t n : {1u, 2u, 3u, 4u, 8u}) {
     CAPTURE(n);
     const finding found = found_by<Exec>(n, run);
-    CHECK(found.file == alone.file);
-    CHECK(found.directions == alone.directions);
+    CHECK((found.file == alone.file));  // in brackets: they are long to print
+    CHECK((found.directions == alone.directions));
   }
   return alone;
 }
@@ -236,23 +266,23 @@ finding check_any_number(const rank_run& run) {
 }  // namespace
 
 TEST_CASE("any number of ranks learns the same guide", "[ranks]") {
-  rank_run run{ranks_options(), 40, 600};
+  rank_run<kept_guide_options> run{ranks_options(), 40, 600};
   const finding found = check_any_number<one_policy>(run);
   CHECK(found.statistics.kept.freed > 0);
   CHECK(found.statistics.kept.refreshed > 0);
   CHECK(found.statistics.deposits.total() == 0);
   // Compacted waves have their rays in another order; parts have any size.
   run.turns = true;
-  CHECK(found_by<one_policy>(4, run) == found);
+  CHECK((found_by<one_policy>(4, run) == found));
   run.ends = {1, 33, 599};
-  CHECK(found_by<one_policy>(4, run) == found);
+  CHECK((found_by<one_policy>(4, run) == found));
   // A state saved by n ranks goes on with as many, and with the same bits as one that was not saved.
   run.resumed_after = 11;
-  CHECK(found_by<one_policy>(4, run) == found);
+  CHECK((found_by<one_policy>(4, run) == found));
 }
 
 TEST_CASE("any number of ranks probes, compares and rests alike", "[ranks]") {
-  rank_run run{ranks_options(), 9, 20011};
+  rank_run<kept_guide_options> run{ranks_options(), 9, 20011};
   run.options.deposits_per_leaf = 8;  // a part of the paths is recorded
   run.options.least_gain = 2.0f;
   for (const float ambient : {0.0f, 0.3f}) {  // much light that unguided paths find, or little
@@ -264,17 +294,17 @@ TEST_CASE("any number of ranks probes, compares and rests alike", "[ranks]") {
     CHECK((alone.statistics.rested_samples > 0) == (ambient > 0.0f));
     for (const std::uint32_t n : {1u, 3u, 8u}) {
       CAPTURE(n);
-      CHECK(found_by<one_policy>(n, run) == alone);
+      CHECK((found_by<one_policy>(n, run) == alone));
     }
     run.ends = {7, 8, 9000};
-    CHECK(found_by<one_policy>(4, run) == alone);
+    CHECK((found_by<one_policy>(4, run) == alone));
   }
 }
 
 TEST_CASE("ranks build equal fields under every option", "[ranks]") {
   for (const std::uint32_t kind : {0u, 1u, 2u, 3u}) {
     CAPTURE(kind);
-    rank_run run{ranks_options(), 12, 500};
+    rank_run<kept_guide_options> run{ranks_options(), 12, 500};
     if (kind == 0) run.options.kept.max_wave_cones = 500;
     if (kind == 1) run.options.mode = wfpg::guiding_mode::plain;
     if (kind == 2) run.options.product_resolution = 4;
@@ -285,7 +315,40 @@ TEST_CASE("ranks build equal fields under every option", "[ranks]") {
     const finding alone = found_by<one_policy>(0, run);
     CHECK(alone.statistics.kept.live > 50);
     CHECK((alone.statistics.kept.refused > 0) == (kind == 3));
-    CHECK(found_by<one_policy>(3, run) == alone);
+    CHECK((found_by<one_policy>(3, run) == alone));
+  }
+}
+
+TEST_CASE("any number of ranks makes the same transient fields", "[ranks]") {
+  rank_run<transient_guide_options> run{{}, 6, 600};
+  static_cast<wfpg::octree_guide_options&>(run.options) = ranks_options();
+  run.options.field_resolution = 8;
+  run.options.min_field_resolution = 4;
+  // Without ranks a bin's field starts from another of its rays.
+  const finding found = check_any_number<one_policy>(run, 1);
+  CHECK(found.statistics.depths[0].bins > 100);
+  CHECK(found.statistics.depths[0].rays > 2 * found.statistics.depths[0].bins);
+  run.turns = true;
+  run.ends = {1, 33, 599};
+  run.resumed_after = 3;
+  CHECK((found_by<one_policy>(4, run) == found));
+}
+
+TEST_CASE("any number of ranks learns the same grid", "[ranks]") {
+  rank_run<wfpg::sarsa_grid_options> run{{}, 12, 600};
+  run.options.max_depth = 3;
+  run.options.resolution = 4;
+  run.options.direction_resolution = 8;
+  run.options.step = 2;
+  for (const auto update : {wfpg::sarsa_update::sarsa, wfpg::sarsa_update::monte_carlo}) {
+    run.options.update = update;
+    const finding found = check_any_number<one_policy>(run);
+    CHECK(found.file.find_first_not_of('\0') != std::string::npos);
+    // So many values that sums are exchanged, not values.
+    rank_run<wfpg::sarsa_grid_options> dense = run;
+    dense.options.resolution = 1;
+    dense.options.direction_resolution = 4;
+    CHECK((found_by<one_policy>(3, dense) == found_by<one_policy>(0, dense)));
   }
 }
 
@@ -316,7 +379,7 @@ TEST_CASE("ranks that do not fit together are refused by name", "[ranks]") {
   has("differ in kept.recast", [](auto& o, std::uint32_t r) { o.kept.recast = 8 + r; });
   has("differ in lights.weights",
       [](auto& o, std::uint32_t r) { o.lights.weights[0] += static_cast<float>(r); });
-  has("differ in octree_resolution", [](auto& o, std::uint32_t r) { o.octree_resolution = 16 << r; });
+  has("differ in octree_resolution", [](auto& o, std::uint32_t r) { o.octree_resolution = 16u << r; });
   has("overlap at path 100", [](auto& o, std::uint32_t r) { o.max_paths = 100 + (1 - r); });
   has("leave out paths at path 99", [](auto& o, std::uint32_t r) { o.max_paths = 99 + r; });
   has("leave out paths from 150",
