@@ -56,17 +56,23 @@ TEST_CASE("Threads as ranks give the picture of one", "[renderer][ranks]") {
 }
 
 TEST_CASE("Threads as ranks learn one guide", "[renderer][ranks]") {
-  const sampling_method method = GENERATE(sampling_method::wfpg, sampling_method::wfpg_product);
   const rank_split split = GENERATE(rank_split::tiles, rank_split::samples);
-  const scene world = make_builtin_scene(method == sampling_method::wfpg ? "many-lamps" : "glossy-room");
+  const auto [name, method, lifetime] = GENERATE(table<const char*, sampling_method, fields>(
+      {{"many-lamps", sampling_method::wfpg, fields::kept},
+       {"glossy-room", sampling_method::wfpg_product, fields::kept},
+       {"ajar", sampling_method::wfpg, fields::transient},
+       {"ajar", sampling_method::sarsa, fields::kept}}));
+  const scene world = make_builtin_scene(name);
   render_options options = options_of(method, split);
-  options.keep_guide = true;
+  options.lifetime = lifetime;
+  options.keep_guide = is_wfpg(method);
   options.kept.budget_bytes = std::size_t(1) << 18;
   options.spp = 20;
   const render_result one = by_threads(world, options, 1);
-  REQUIRE(one.guide.size() > 1000);
+  REQUIRE((one.guide.size() > 1000 || !options.keep_guide));
   for (const std::size_t ranks : {std::size_t(2), std::size_t(3)}) {
     const render_result shared = by_threads(world, options, ranks);
+    INFO(name << ", " << ranks << " ranks");
     CHECK((shared.guide == one.guide));
     CHECK(same_bits(shared.picture, one.picture));
   }
@@ -99,10 +105,6 @@ TEST_CASE("Ranks that differ, or cannot share, are refused", "[renderer][ranks]"
                     WFPG_TEST_CONTAINS("and another rank have different scenes, options or versions"));
   CHECK_THROWS_WITH(by_threads(world, options_of(sampling_method::bpt, rank_split::tiles), 2),
                     WFPG_TEST_CONTAINS("method is bpt, expected pt"));
-  render_options transient = options_of(sampling_method::wfpg, rank_split::tiles);
-  transient.lifetime = fields::transient;
-  CHECK_THROWS_WITH(by_threads(world, transient, 2),
-                    WFPG_TEST_CONTAINS("fields is transient, expected kept"));
   CHECK_THROWS_WITH(by_threads(world, options_of(sampling_method::pt, std::nullopt), 2),
                     WFPG_TEST_CONTAINS("split is unset, expected tiles or samples"));
   render_options large = options_of(sampling_method::pt, rank_split::samples);

@@ -46,7 +46,7 @@ inline constexpr method_properties all_methods[] = {
     {sampling_method::lt, "lt", guide_kind::none, false, true, true, true, false},
     {sampling_method::wfpg, "wfpg", guide_kind::octree, true, true, false, false, true},
     {sampling_method::wfpg_product, "wfpg-product", guide_kind::octree, true, true, false, false, true},
-    {sampling_method::sarsa, "sarsa", guide_kind::sarsa, true, false, false, false, false},
+    {sampling_method::sarsa, "sarsa", guide_kind::sarsa, true, false, false, false, true},
     {sampling_method::records, "records", guide_kind::records, false, false, true, false, false},
     {sampling_method::openpgl_vmm, "openpgl-vmm", guide_kind::openpgl, true, false, false, false, false},
     {sampling_method::openpgl_dqt, "openpgl-dqt", guide_kind::openpgl, true, false, false, false, false},

@@ -20,8 +20,6 @@ void require_shared(const render_options& options) {
   if (!options.split) return;
   require(properties_of(options.method).can_be_split, "method", method,
           (names_of_methods(&method_properties::can_be_split) + " where ranks share a picture").c_str());
-  require(!is_wfpg(options.method) || options.lifetime == fields::kept, "fields", std::string("transient"),
-          "kept where ranks share a picture");
   require(options.octree != octree_source::samples, "octree", std::string("samples"),
           "triangles or caster where ranks share a picture");
   require(options.samples_a_wave >= 1, "samples_a_wave", options.samples_a_wave, "at least 1");
