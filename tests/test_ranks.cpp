@@ -62,6 +62,7 @@ struct rank_run {
   std::size_t paths = 600;
   std::vector<std::size_t> ends = {};  // of the ranks' paths; empty: parts of about equal size
   bool turns = false;                  // odd ranks go through their paths from the last one down
+  bool batches = false;                // a caster that gets arrays of cones
   float ambient = 0.0f;                // radiance of all walls, beside the patch
   std::uint32_t resumed_after = 0;     // saved and loaded after this sample; 0: never
 };
@@ -159,9 +160,13 @@ class tracing_rank {
       const std::uint64_t seed = 100 * sample + depth;
       const numbers_of_paths numbers{seed, first_, turns_ ? static_cast<std::uint32_t>(count_) - 1 : 0};
       const wfpg::array_view<wfpg::sampled_direction> drawn = directions.view(), sorted = of_path.view();
-      guider.sample_directions(
-          wfpg::wave{depth, count_, surfaces_of_paths{const_view<test_surface>(surfaces), numbers}, numbers},
-          box_caster(), drawn);
+      const wfpg::wave wave{depth, count_, surfaces_of_paths{const_view<test_surface>(surfaces), numbers},
+                            numbers};
+      batch_box_caster::log log;
+      if (run_.batches)
+        guider.sample_directions(wave, batch_box_caster{{}, &log}, drawn);
+      else
+        guider.sample_directions(wave, box_caster(), drawn);
       exec_.for_each(count_, [=] WFPG_HD(std::size_t ray) {
         sorted[numbers.path(static_cast<std::uint32_t>(ray))] = drawn[ray];
       });
@@ -302,12 +307,14 @@ TEST_CASE("any number of ranks probes, compares and rests alike", "[ranks]") {
 }
 
 TEST_CASE("ranks build equal fields under every option", "[ranks]") {
-  for (const std::uint32_t kind : {0u, 1u, 2u, 3u}) {
+  for (const std::uint32_t kind : {0u, 1u, 2u, 3u, 4u}) {
     CAPTURE(kind);
     rank_run<kept_guide_options> run{ranks_options(), 12, 500};
     if (kind == 0) run.options.kept.max_wave_cones = 500;
     if (kind == 1) run.options.mode = wfpg::guiding_mode::plain;
     if (kind == 2) run.options.product_resolution = 4;
+    run.batches = kind == 4;
+    if (kind == 4) run.options.caster_buffer_bytes = 5000;
     if (kind == 3) {
       run.options.kept.learn = false;
       run.options.kept.budget_bytes /= 3;

@@ -20,6 +20,7 @@
 #include <wfpg/guides/octree/detail/bin_marks.hpp>
 #include <wfpg/guides/octree/detail/field_pool.hpp>
 #include <wfpg/guides/octree/detail/field_ranks.hpp>
+#include <wfpg/guides/octree/detail/rank_builds.hpp>
 #include <wfpg/guides/octree/detail/slot_table.hpp>
 #include <wfpg/guides/octree/guide_view.hpp>
 #include <wfpg/guides/octree/kept_field.hpp>
@@ -184,6 +185,12 @@ class field_store {
   void find(const Exec& exec, const kept_field_wave<Surfaces>& wave);
   template <class Builder, class Caster>
   void build(const Exec& exec, const Builder& builder, const Caster& caster, std::size_t buffer_bytes);
+  template <class Builder, class Caster>
+  void build_of_ranks(const Exec& exec, const Builder& builder, const Caster& caster,
+                      std::size_t buffer_bytes);
+  template <class Builder, class Caster>
+  void cast_part(const Exec& exec, const Builder& builder, const Caster& caster, std::size_t buffer_bytes,
+                 bool whole, cone_hit* found);
   template <class Builder, class Caster>
   void build_batches(const Exec& exec, const Builder& builder, const Caster& caster, bool whole,
                      std::size_t count, array_view<ray> cones, array_view<ray_hit> hits);

@@ -51,7 +51,7 @@ class kept_guide : public octree_scene<Exec> {
 
   /// Ranks that share a sample keep equal fields. A wave that builds exchanges up to 16 KiB, 8 bytes a slot
   /// and 28 a build. A sample's end exchanges 4 bytes a slot, and up to 60 more where paths are recorded.
-  /// Each rank casts the cones of all builds.
+  /// Each rank casts a part of the cones, and they exchange 4 bytes a cone.
   static constexpr bool joins_ranks = true;
   /// Adds the scene and the options that decide what is learnt, for ranks to compare. Every option that
   /// changes what a guide learns belongs here: ranks that differ in it would learn different guides, and

@@ -4,8 +4,8 @@
 // A build starts from the surface of a ray, which one rank knows. It sends position and normal.
 //
 // Cost: a wave that builds waits for the host once. Traffic of such a wave: up to 16 KiB of keys, 8 bytes a
-// slot, and 28 a build. Of a sample: 4 bytes a slot, and 56 a slot where paths are recorded. Memory: 88 bytes
-// a slot.
+// slot, 28 a build, and 4 a cone. Of a sample: 4 bytes a slot, and 56 a slot where paths are recorded.
+// Memory: 88 bytes a slot, and 4 for each cone of a wave.
 #pragma once
 
 #include <wfpg/exec/buffer.hpp>
@@ -123,7 +123,9 @@ class field_ranks {
 
   explicit operator bool() const { return ranks_ != nullptr; }
   communicator& ranks() const { return *ranks_; }
-  std::size_t bytes() const { return words_.bytes() + origins_.bytes() + sums_.bytes() + largest_.bytes(); }
+  std::size_t bytes() const {
+    return words_.bytes() + origins_.bytes() + sums_.bytes() + largest_.bytes() + hits_.bytes();
+  }
 
   /// Where the builds of a wave start; without ranks at a ray of this rank's wave.
   shared_origins origins() const {
@@ -148,11 +150,32 @@ class field_ranks {
   void send_origins(const Exec& exec, const Builder& builder, const Rays& rays, std::size_t n,
                     const std::uint32_t* field_of_ray, const std::uint32_t* list,
                     const field_wave_counts* counts) {
-    const field_wave_counts now = read_element(exec, counts);
-    if (now.builds == 0) return;
-    exec.for_each(now.builds, number_builds{list, words_.size(), now.all, origins()});
+    wave_ = read_element(exec, counts);
+    if (wave_.builds == 0) return;
+    exec.for_each(wave_.builds, number_builds{list, words_.size(), wave_.all, origins()});
     exec.for_each(n, write_origins<Builder, Rays>{builder, rays, field_of_ray});
-    ranks_->all_reduce_sum(origins_.view().subview(0, std::size_t(now.builds) * shared_origins::words));
+    ranks_->all_reduce_sum(origins_.view().subview(0, std::size_t(wave_.builds) * shared_origins::words));
+  }
+
+  /// Number of builds of the wave whose origins were sent: of whole fields, or of others.
+  std::size_t builds(bool whole) const { return whole ? wave_.all : wave_.part; }
+  /// The first build of a list whose cones this rank casts. The next rank's first one is the end.
+  std::size_t first_build(bool whole, std::uint32_t ranks_before) const {
+    return builds(whole) * ranks_before / ranks_->size();
+  }
+  /// Room for what all cones of the wave hit, which is 0 bytes.
+  array_view<cone_hit> begin_hits(const Exec& exec, std::size_t cones) {
+    if (hits_.size() < cones) {
+      hits_ = {};  // freed first
+      hits_ = buffer<cone_hit, Exec>(exec, cones + cones / 2);
+    }
+    exec.fill_bytes(hits_.data(), 0, cones * sizeof(cone_hit));
+    return hits_.view().subview(0, cones);
+  }
+  /// Tells all ranks what the cones hit. Each cone is one rank's.
+  void share_hits(array_view<cone_hit> hits) {
+    static_assert(sizeof(cone_hit) == sizeof(std::uint32_t), "hits are summed as words");
+    ranks_->all_reduce_sum({reinterpret_cast<std::uint32_t*>(hits.data()), hits.size()});
   }
 
   /// Notes the slots that rays of any rank used.
@@ -179,6 +202,8 @@ class field_ranks {
   buffer<std::uint32_t, Exec> origins_;  // a build: shared_origins::words
   buffer<std::uint64_t, Exec> sums_;     // a slot: exchange_fractions
   buffer<std::uint32_t, Exec> largest_;  // likewise
+  buffer<cone_hit, Exec> hits_;          // of a wave's cones, whole fields first
+  field_wave_counts wave_;               // of the wave whose origins were sent
 };
 
 }  // namespace wfpg::detail

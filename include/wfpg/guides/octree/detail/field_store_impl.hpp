@@ -95,7 +95,10 @@ guide_view field_store<Exec>::prepare(const Exec& exec, const kept_field_wave<Su
     if (ranks_)
       ranks_.send_origins(exec, builder, rays_of(wave), wave.ray_count, field_of_ray_.data(),
                           table_.listed(true), counts());
-    build(exec, builder, caster, caster_buffer_bytes);
+    if (ranks_)
+      build_of_ranks(exec, builder, caster, caster_buffer_bytes);
+    else
+      build(exec, builder, caster, caster_buffer_bytes);
   }
   end_wave();
   return {{field_of_ray_.data(), wave.ray_count}, fields(wave.points)};
@@ -174,6 +177,55 @@ void field_store<Exec>::build(const Exec& exec, const Builder& builder, const Ca
     for (const bool whole : {true, false})
       build_batches(exec, builder, caster, whole,
                     read_element(exec, whole ? &counts()->all : &counts()->part), cones.view(), hits.view());
+  }
+}
+
+/// Builds the listed slots' fields. Ranks share the cones, and exchange what these hit.
+template <class Exec>
+template <class Builder, class Caster>
+void field_store<Exec>::build_of_ranks(const Exec& exec, const Builder& builder, const Caster& caster,
+                                       std::size_t buffer_bytes) {
+  const std::size_t of_wholes = ranks_.builds(true) * builder.cone_count(true);
+  const array_view<cone_hit> found =
+      ranks_.begin_hits(exec, of_wholes + ranks_.builds(false) * builder.cone_count(false));
+  if (found.empty()) return;
+  for (const bool whole : {true, false})
+    cast_part(exec, builder, caster, buffer_bytes, whole, found.data() + (whole ? 0 : of_wholes));
+  ranks_.share_hits(found);
+  for (const bool whole : {true, false})
+    exec.for_each_block(ranks_.builds(whole), field_scratch_bytes(options_.resolution, Exec::warps_per_block),
+                        detail::finish_listed_fields<Builder>{builder, table_.listed(whole), whole,
+                                                              found.data() + (whole ? 0 : of_wholes)});
+}
+
+/// Casts the cones of this rank's part of one list.
+template <class Exec>
+template <class Builder, class Caster>
+void field_store<Exec>::cast_part(const Exec& exec, const Builder& builder, const Caster& caster,
+                                  std::size_t buffer_bytes, bool whole, cone_hit* found) {
+  const std::uint32_t rank = ranks_.ranks().rank(), cells = builder.cone_count(whole);
+  const std::size_t first = ranks_.first_build(whole, rank), n = ranks_.first_build(whole, rank + 1) - first;
+  const std::uint32_t* const list = table_.listed(whole) + first;
+  found += first * cells;
+  if (n == 0) return;
+  if constexpr (is_inline_caster_v<Caster>) {
+    exec.for_each_block(
+        n, 0, detail::cast_listed_cones<Builder, inline_hits<Caster>>{builder, {caster}, list, whole, found});
+  } else {
+    const std::size_t room = max<std::size_t>(cells, buffer_bytes / (sizeof(ray) + sizeof(ray_hit)));
+    const buffer<ray, Exec> cones(exec, min(room, n * cells));
+    const buffer<ray_hit, Exec> hits(exec, cones.size());
+    cast_in_batches(
+        exec, caster, n, cells, cones.view(), hits.view(),
+        [&](std::size_t begin, std::size_t count, array_view<ray> to) {
+          exec.for_each_block(count, 0, write_kept_cones<Builder>{builder, to, list + begin, whole});
+        },
+        [&](std::size_t begin, std::size_t count, array_view<ray_hit> from) {
+          const stored_hits stored{from, 0, cells};
+          exec.for_each_block(count, 0,
+                              detail::cast_listed_cones<Builder, stored_hits>{builder, stored, list + begin,
+                                                                              whole, found + begin * cells});
+        });
   }
 }
 
