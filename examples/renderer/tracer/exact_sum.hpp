@@ -30,11 +30,11 @@ struct exact_sum {
     to[2] = high & 0xffffffffu;
     to[3] = high >> 32;
   }
-  /// The number whose parts these are, sums of several ranks' or one's.
-  static double joined(const std::uint64_t* parts) {
-    const std::uint64_t second = parts[1] + (parts[0] >> 32), third = parts[2] + (second >> 32);
-    const std::uint64_t low = second << 32 | (parts[0] & 0xffffffffu);
-    const std::uint64_t high = (parts[3] + (third >> 32)) << 32 | (third & 0xffffffffu);
+  /// The number with these parts, one rank's or sums of several ranks'.
+  static double joined(const std::uint64_t* words) {
+    const std::uint64_t second = words[1] + (words[0] >> 32), third = words[2] + (second >> 32);
+    const std::uint64_t low = second << 32 | (words[0] & 0xffffffffu);
+    const std::uint64_t high = (words[3] + (third >> 32)) << 32 | (third & 0xffffffffu);
     return (static_cast<double>(high) * 0x1p64 + static_cast<double>(low)) * 0x1p-56;
   }
 };
