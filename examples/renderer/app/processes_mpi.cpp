@@ -9,7 +9,9 @@
 namespace render {
 
 processes::processes(double seconds) {
-  MPI_Init(nullptr, nullptr);
+  // Policies have threads, which leave MPI alone.
+  int provided = 0;
+  MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided);
   wfpg::mpi_options options;
   options.seconds = seconds;
   ranks_ =

@@ -77,7 +77,8 @@ inline void require_mpi() {
 /// Open MPI, MPICH and their kin differ in what a lost process does.
 /// Some end the whole job by themselves, before the time limit.
 /// One thread at a time may call.
-/// Where that is not always the thread that initialised MPI, MPI needs MPI_THREAD_SERIALIZED.
+/// MPI needs MPI_THREAD_FUNNELED where that is always the thread that initialised it.
+/// Else it needs MPI_THREAD_SERIALIZED.
 template <class Exec>
 class mpi_communicator final : public communicator {
  public:
