@@ -8,6 +8,7 @@
 #include "support/scenes.hpp"
 
 #include <wfpg/guide_file.hpp>
+#include <wfpg/guides/records/irradiance_records.hpp>
 #include <wfpg/guides/sarsa/sarsa_grid.hpp>
 #include <wfpg/ranks/single.hpp>
 
@@ -64,6 +65,7 @@ struct rank_run {
   bool turns = false;                  // odd ranks go through their paths from the last one down
   bool batches = false;                // a caster that gets arrays of cones
   float ambient = 0.0f;                // radiance of all walls, beside the patch
+  std::uint32_t moved_after = 0;       // geometry and lights move after this sample; 0: never
   std::uint32_t resumed_after = 0;     // saved and loaded after this sample; 0: never
 };
 
@@ -134,6 +136,10 @@ class tracing_rank {
           std::istringstream in(saved(exec_, guider));
           guider = wfpg::load_guide(exec_, in, options_);
         }
+      if (sample > 0 && sample == run_.moved_after) {
+        guider.invalidate({vec3(0.2f), vec3(0.4f)});
+        guider.forget_light();
+      }
       trace_sample(guider, sample, found.directions);
     }
     if (first_ > 0) return;
@@ -272,6 +278,7 @@ finding check_any_number(const rank_run<Options>& run, std::uint32_t alone_with 
 
 TEST_CASE("any number of ranks learns the same guide", "[ranks]") {
   rank_run<kept_guide_options> run{ranks_options(), 40, 600};
+  run.moved_after = 21;
   const finding found = check_any_number<one_policy>(run);
   CHECK(found.statistics.kept.freed > 0);
   CHECK(found.statistics.kept.refreshed > 0);
@@ -294,6 +301,7 @@ TEST_CASE("any number of ranks probes, compares and rests alike", "[ranks]") {
     CAPTURE(ambient);
     run.ambient = ambient;
     run.ends = {};
+    run.resumed_after = 0;
     const finding alone = found_by<one_policy>(0, run);
     CHECK(alone.statistics.gain.paths > wfpg::guiding_gain::least_paths);
     CHECK((alone.statistics.rested_samples > 0) == (ambient > 0.0f));
@@ -302,6 +310,7 @@ TEST_CASE("any number of ranks probes, compares and rests alike", "[ranks]") {
       CHECK((found_by<one_policy>(n, run) == alone));
     }
     run.ends = {7, 8, 9000};
+    run.resumed_after = 5;
     CHECK((found_by<one_policy>(4, run) == alone));
   }
 }
@@ -402,6 +411,29 @@ TEST_CASE("ranks that do not fit together are refused by name", "[ranks]") {
   alone.first_path = 1;
   CHECK_THROWS_AS(wfpg::path_guider<one_policy>(exec, box_mesh<one_policy>(exec).view(), alone),
                   std::invalid_argument);
+}
+
+TEST_CASE("ranks share samples of a scene without surfaces", "[ranks]") {
+  const std::vector<std::string> errors = run_ranks<one_policy>(2, limit, [&](wfpg::communicator& ranks) {
+    const one_policy exec;
+    kept_guide_options options = ranks_options();
+    options.ranks = &ranks;
+    options.max_paths = 100;
+    options.first_path = 100 * ranks.rank();
+    options.all_paths = 200;
+    wfpg::path_guider<one_policy> guider(exec, wfpg::triangle_mesh_view{}, options);
+    const wfpg::buffer<test_surface, one_policy> surfaces(exec, wall_surfaces(100, 1));
+    const wfpg::buffer<wfpg::sampled_direction, one_policy> directions(exec, 100);
+    for (int sample = 0; sample < 3; ++sample) {
+      guider.begin_sample();
+      guider.sample_directions(
+          wfpg::wave{0, 100, stored_surfaces{const_view<test_surface>(surfaces)}, hashed_numbers{}},
+          box_caster(), directions.view());
+      guider.end_sample();
+    }
+  });
+  CHECK(errors == std::vector<std::string>(2));
+  static_assert(!wfpg::irradiance_records<one_policy>::joins_ranks, "it is refused with ranks");
 }
 
 TEST_CASE("a rank that is lost is an error of the others, whose guiders are destroyed", "[ranks]") {

@@ -208,7 +208,7 @@ guider_statistics path_guider<Exec, Guide>::statistics() const {
 template <class Exec, class Guide>
 memory_report path_guider<Exec, Guide>::memory() const {
   memory_report report{guide_.memory()};
-  report.parts.push_back({"paths", recorder_.bytes(), false});
+  report.parts.push_back({"paths", recorder_.bytes() + shared_counters_.bytes(), false});
   report.parts.push_back({"scratch", working_memory_->bytes() - working_memory_->used_bytes(), false});
   return report;
 }

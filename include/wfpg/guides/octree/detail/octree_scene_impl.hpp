@@ -108,7 +108,8 @@ std::vector<memory_part> octree_scene<Exec>::scene_memory(const std::vector<memo
   parts.push_back({"lights", lights_.persistent_bytes(), true});
   parts.push_back({"compared paths", meter_.bytes(), true});
   parts.push_back({"deposits", cache_.transient_bytes() + values + lights_.transient_bytes(), false});
-  parts.push_back({"binning", binning + counts_.bytes() + product_points_.bytes(), false});
+  parts.push_back(
+      {"binning", binning + counts_.bytes() + shared_counts_.bytes() + product_points_.bytes(), false});
   parts.push_back({"fields", fields, false});
   return parts;
 }
