@@ -147,11 +147,11 @@ TEST_CASE("What cannot be shared is refused before any work", "[renderer][mpi]")
 
 TEST_CASE("A process that is killed ends the others within the time limit", "[renderer][mpi]") {
   const temporary_folder folder;
-  const std::string line =
-      program + " ajar --method pt --size 64x36 --seconds 30 --split tiles --rank-seconds 0.5 -o " +
-      folder.file("out.exr");
+  const std::string line = program +
+                           " ajar --method pt --size 64x36 --seconds 30 --split tiles --rank-seconds 2 -o " +
+                           folder.file("out.exr");
   const printed all = mpirun(1, line + " : -n 1 timeout -s KILL 1 " + line);
   INFO(all.text);
   CHECK_THAT(all.text,
-             WFPG_TEST_CONTAINS("wfpg-render: rank 0 waited 0.5 s in all_reduce_max for another rank"));
+             WFPG_TEST_CONTAINS("wfpg-render: rank 0 waited 2 s in all_reduce_max for another rank"));
 }

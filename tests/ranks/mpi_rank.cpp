@@ -45,7 +45,7 @@ struct leaks {
 using exec = wfpg::exec::seq;
 using ranks = wfpg::mpi_communicator<exec>;
 
-constexpr double short_limit = 0.5, long_limit = 30.0;  // seconds
+constexpr double short_limit = 1.0, long_limit = 30.0;  // seconds
 
 int world_rank() {
   int rank = 0;
@@ -148,7 +148,7 @@ void lose_rank(const std::string& how) {
   check_sums<std::uint32_t>(joined, 3);
   const bool is_last = joined.rank() + 1 == joined.size();
   if (is_last && how == "killed") std::raise(SIGKILL);
-  if (is_last && how == "late") std::this_thread::sleep_for(std::chrono::milliseconds(1200));
+  if (is_last && how == "late") std::this_thread::sleep_for(std::chrono::milliseconds(2500));
   if (is_last && how == "late") return;
   if (is_last && how == "other_function") {
     const wfpg::buffer<std::uint32_t, exec> values(exec(), std::vector<std::uint32_t>(5, 1));
@@ -170,7 +170,7 @@ void lose_rank_at_first() {
       std::printf("rank 0: %s\n", error.what());
     }
   else
-    std::this_thread::sleep_for(std::chrono::milliseconds(1200));
+    std::this_thread::sleep_for(std::chrono::milliseconds(2500));
 }
 
 // Seconds a call of one value, and of a MiB.
