@@ -24,8 +24,10 @@
 
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/policy.hpp>
+#include <wfpg/exec/support/rank_counters.hpp>
 #include <wfpg/guide/guide.hpp>
 #include <wfpg/guide/path_recorder.hpp>
+#include <wfpg/guide/rank_agreement.hpp>
 #include <wfpg/guide/recorded_surfaces.hpp>
 #include <wfpg/guide/rest_schedule.hpp>
 #include <wfpg/guide/sample_rays.hpp>
@@ -33,6 +35,7 @@
 #include <wfpg/guides/octree/kept_guide.hpp>
 #include <wfpg/host/ray_caster.hpp>
 #include <wfpg/host/wave.hpp>
+#include <wfpg/version.hpp>
 
 #include <memory>
 #include <utility>
@@ -63,7 +66,8 @@ class path_guider {
 
   /// Makes a guider over triangles, world space. `mesh` refers to the policy's memory, and only the
   /// constructor reads it. The policy's memory resource must outlive the guider. Throws std::invalid_argument
-  /// for options out of range, and out_of_memory.
+  /// for options out of range, and out_of_memory. With options.ranks all ranks make one, and it throws
+  /// rank_error where their scenes, options or parts of the paths do not fit together.
   path_guider(const Exec& exec, triangle_mesh_view mesh, const options_type& options = {})
       : path_guider(in_scene{}, exec, mesh, options) {}
 
@@ -209,12 +213,16 @@ class path_guider {
         needs_(guide_.recording()),
         recorder_(exec_, {Guide::records_paths ? options_.max_paths : 0, options_.max_depth,
                           options_.include_emission, needs_.fraction_shift, needs_.directions,
-                          Guide::records_paths && options_.records_waves, options_.silent_escapes}) {
+                          Guide::records_paths && options_.records_waves, options_.silent_escapes,
+                          static_cast<std::uint32_t>(options_.first_path)}),
+        shared_counters_(exec_, options_.ranks ? recorder_.counters().size() : 0) {
     require(needs_.sample_stride >= 1, "sample_stride", needs_.sample_stride, "at least 1");
+    if (options_.ranks) join_ranks();
     if constexpr (Guide::measures_gain) {
       if (!guide_.measures()) return;
       rests_ = rest_schedule(least_gain<std::decay_t<Scene>>(scene), options_.unguided_samples);
-      compared_ = {needs_.fraction_shift, static_cast<std::uint32_t>(seed_of(0)), guide_.rarer()};
+      compared_ = {needs_.fraction_shift, static_cast<std::uint32_t>(seed_of(0)), guide_.rarer(),
+                   static_cast<std::uint32_t>(options_.first_path)};
     }
   }
 
@@ -236,9 +244,12 @@ class path_guider {
   /// memory is allocated.
   static options_type completed(options_type options) {
     detail::require_valid(static_cast<const sampling_options&>(options));
+    require(!options.ranks || Guide::joins_ranks, "ranks", "set", "null: ranks cannot share this guide");
     if (!options.max_rays) options.max_rays = options.max_paths;
     return options;
   }
+  /// Checks that all ranks learn the same guide.
+  void join_ranks();
   /// Fails to compile where the renderer's types lack what they need; throws where the wave is too large.
   template <class Surfaces, class Random, class Caster>
   void check(const wave<Surfaces, Random>& w, const Caster& caster) const;
@@ -288,6 +299,7 @@ class path_guider {
   Guide guide_;                   // keeps its learnt state in the caller's policy
   recording_needs needs_;         // of the guide, asked once
   path_recorder<Exec> recorder_;  // of no paths where the guide reads none
+  detail::rank_counters<Exec, std::uint32_t> shared_counters_;  // of the recorder, with ranks
   // A guide file holds the first three. begin_sample() sets those of the current sample, and end_sample()
   // measured_ and gain_.
   rest_schedule rests_;

@@ -21,6 +21,7 @@
 #include <wfpg/exec/seq.hpp>
 #include <wfpg/guide/guide.hpp>
 #include <wfpg/guide/path_recorder.hpp>
+#include <wfpg/guide/rank_agreement.hpp>
 #include <wfpg/guide/recorded_fraction.hpp>
 #include <wfpg/guide/recorded_path.hpp>
 #include <wfpg/guide/recorded_surfaces.hpp>
@@ -74,6 +75,7 @@
 #include <wfpg/octree/exitance_cache.hpp>
 #include <wfpg/octree/fragments_from_caster.hpp>
 #include <wfpg/octree/fragments_from_hits.hpp>
+#include <wfpg/octree/leaf_codes.hpp>
 #include <wfpg/octree/sparse_voxel_octree.hpp>
 #include <wfpg/octree/statistics.hpp>
 #include <wfpg/octree/surface_collector.hpp>
@@ -84,6 +86,9 @@
 #include <wfpg/octree/voxel_normals.hpp>
 #include <wfpg/octree/voxelizer.hpp>
 #include <wfpg/path_guider.hpp>
+#include <wfpg/ranks/communicator.hpp>
+#include <wfpg/ranks/single.hpp>
+#include <wfpg/ranks/threads.hpp>
 #include <wfpg/sampling/field_sampler.hpp>
 #include <wfpg/sampling/mis.hpp>
 #include <wfpg/sampling/mixture.hpp>

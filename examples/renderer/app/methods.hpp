@@ -34,21 +34,22 @@ struct method_properties {
   bool can_be_saved;  ///< a rendering's state can be saved and resumed
   bool asks_inline;   ///< its kernels trace rays, so that casters of batches cannot be used
   bool has_media;     ///< it renders fog, and solids that scatter inside
+  bool can_be_split;  ///< several ranks can render one picture
 };
 
 inline constexpr method_properties all_methods[] = {
-    {sampling_method::pt, "pt", guide_kind::none, false, true, false, false},
-    {sampling_method::vpt, "vpt", guide_kind::none, false, true, true, true},
-    {sampling_method::bpt, "bpt", guide_kind::none, false, true, true, true},
-    {sampling_method::vcm, "vcm", guide_kind::none, false, true, true, true},
-    {sampling_method::upbp, "upbp", guide_kind::none, false, true, true, true},
-    {sampling_method::lt, "lt", guide_kind::none, false, true, true, true},
-    {sampling_method::wfpg, "wfpg", guide_kind::octree, true, true, false, false},
-    {sampling_method::wfpg_product, "wfpg-product", guide_kind::octree, true, true, false, false},
-    {sampling_method::sarsa, "sarsa", guide_kind::sarsa, true, false, false, false},
-    {sampling_method::records, "records", guide_kind::records, false, false, true, false},
-    {sampling_method::openpgl_vmm, "openpgl-vmm", guide_kind::openpgl, true, false, false, false},
-    {sampling_method::openpgl_dqt, "openpgl-dqt", guide_kind::openpgl, true, false, false, false},
+    {sampling_method::pt, "pt", guide_kind::none, false, true, false, false, true},
+    {sampling_method::vpt, "vpt", guide_kind::none, false, true, true, true, true},
+    {sampling_method::bpt, "bpt", guide_kind::none, false, true, true, true, false},
+    {sampling_method::vcm, "vcm", guide_kind::none, false, true, true, true, false},
+    {sampling_method::upbp, "upbp", guide_kind::none, false, true, true, true, false},
+    {sampling_method::lt, "lt", guide_kind::none, false, true, true, true, false},
+    {sampling_method::wfpg, "wfpg", guide_kind::octree, true, true, false, false, true},
+    {sampling_method::wfpg_product, "wfpg-product", guide_kind::octree, true, true, false, false, true},
+    {sampling_method::sarsa, "sarsa", guide_kind::sarsa, true, false, false, false, true},
+    {sampling_method::records, "records", guide_kind::records, false, false, true, false, false},
+    {sampling_method::openpgl_vmm, "openpgl-vmm", guide_kind::openpgl, true, false, false, false, false},
+    {sampling_method::openpgl_dqt, "openpgl-dqt", guide_kind::openpgl, true, false, false, false, false},
 };
 
 /// The row of a method. Precondition: `method` is one of the enumerators.

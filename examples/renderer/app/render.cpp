@@ -2,6 +2,8 @@
 #include "app/render.hpp"
 
 #include "app/option_names.hpp"
+#include "app/rank_threads.hpp"
+#include "app/ranks.hpp"
 #include "casters/embree_caster.hpp"
 
 #include <wfpg/base/error.hpp>
@@ -65,9 +67,10 @@ render_options completed(const scene& scene, render_options options) {
   require(options.samples_per_leaf >= 8 && options.samples_per_leaf <= 1u << 30, "samples_per_leaf",
           options.samples_per_leaf, "8 to 2^30");
   require(options.seconds >= 0.0, "seconds", options.seconds, "0 or more");
-  const int least = combination_of(options) == wfpg::sample_combination::discard_first ? 2 : 1;
+  const int least = least_samples(options);
   require(options.seconds > 0.0 || options.spp >= least, "spp", options.spp,
-          least == 2 ? "at least 2, as the first sample is discarded" : "at least 1");
+          least > 1 ? ("at least " + std::to_string(least) + ", as the first sample is discarded").c_str()
+                    : "at least 1");
   require(properties_of(options.method).has_media || !needs_volume_tracing(scene), "method",
           name_of(method_names(), options.method),
           (names_of_methods(&method_properties::has_media) + " for a scene with fog or scattering solids")
@@ -76,6 +79,8 @@ render_options completed(const scene& scene, render_options options) {
   require(!options.technique_pictures || options.resume.empty(), "technique_pictures", "on",
           "off where a rendering goes on, whose state has none");
   require_guided_files(options);
+  require_shared(options);
+  if (!options.policy_ranks) options.policy_ranks = options.ranks;
   return options;
 }
 
@@ -101,7 +106,10 @@ render_result render_completed(const scene& scene, const render_options& options
 }  // namespace
 
 render_result render(const scene& scene, const render_options& options, const progress_callback& progress) {
-  render_result result = render_completed(scene, completed(scene, options), progress);
+  if (options.devices.size() > 1) return render_on_devices(scene, options, progress);
+  const render_options complete = completed(scene, options);
+  require_same_rendering(scene, complete);
+  render_result result = render_completed(scene, complete, progress);
   result.report.scene = scene.name;
   result.report.method = name_of(method_names(), options.method);
   result.report.device = name_of(device_names(), options.where);

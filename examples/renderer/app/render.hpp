@@ -19,6 +19,10 @@
 #include <utility>
 #include <vector>
 
+namespace wfpg {
+class communicator;
+}
+
 namespace render {
 
 enum class guiding { oriented, plain };
@@ -35,6 +39,9 @@ enum class checkpoint_times {
 };                                                 ///< after samples 1, 2, 4, 8, ... and the last; all
 enum class device { cpu, omp, seq, cuda, optix };  ///< TBB, OpenMP, one thread, a GPU, and with OptiX
 
+/// How ranks share a picture: the pixels of each sample, or several samples that end together.
+enum class rank_split { tiles, samples };
+
 inline constexpr int largest_side = 32768;  ///< pixels
 inline constexpr std::int64_t most_pixels = std::int64_t(1) << 28;
 inline constexpr int largest_depth = 1024;  ///< segments of a path
@@ -46,7 +53,8 @@ struct render_options {
   cones through = cones::scene;
   octree_source octree = octree_source::triangles;
   device where = device::cpu;
-  int spp = 64;          ///< samples a pixel, positive; not used where `seconds` is
+  std::vector<int> devices;  ///< numbers of GPUs of cuda or optix; several share the picture; none: the first
+  int spp = 64;              ///< samples a pixel, positive; not used where `seconds` is
   double seconds = 0.0;  ///< time for samples, building not counted; the last may use more; 0: spp decides
   int width = 0;  ///< pixels, both positive, at most `largest_side`, and `most_pixels` together; 0 x 0: the
                   ///< scene's own
@@ -86,10 +94,16 @@ struct render_options {
   /// Unset: inverse_variance for guides that measure their gain, pt_linear for others that learn. All alike
   /// for path tracing, records, and with a guide that was loaded.
   std::optional<wfpg::sample_combination> combine;
-  std::string load_guide;            ///< guide file, of the same scene, to begin with; empty: none
-  std::string resume;                ///< state file of the rendering to go on with; empty: none
-  bool keep_guide = false;           ///< the result has the guide
-  bool keep_state = false;           ///< the result has what `resume` takes
+  std::string load_guide;               ///< guide file, of the same scene, to begin with; empty: none
+  std::string resume;                   ///< state file of the rendering to go on with; empty: none
+  bool keep_guide = false;              ///< the result has the guide
+  bool keep_state = false;              ///< the result has what `resume` takes
+  std::optional<rank_split> split;      ///< unset: one rank renders alone
+  int samples_a_wave = 24;              ///< of each pixel, where ranks share samples
+  double rank_seconds = 30.0;           ///< for which a rank waits for others
+  wfpg::communicator* ranks = nullptr;  ///< that share the picture, of the host's memory; null: one rank
+  wfpg::communicator* policy_ranks =
+      nullptr;                       ///< the same ranks, of the policy's memory; where `ranks` is not null
   std::function<bool()> is_stopped;  ///< asked after each sample: true ends the rendering; may be empty
 };
 
@@ -185,6 +199,12 @@ inline wfpg::sample_combination combination_of(const render_options& options) {
   const bool measures = is_wfpg(options.method) && options.octree != octree_source::samples &&
                         options.least_gain.value_or(1.0f) > 0.0f;
   return measures ? sample_combination::inverse_variance : sample_combination::pt_linear;
+}
+
+/// Samples of a picture that has weight: more than one wave where the first wave is discarded.
+inline int least_samples(const render_options& options) {
+  const int wave = options.split == rank_split::samples ? options.samples_a_wave : 1;
+  return combination_of(options) == wfpg::sample_combination::discard_first ? wave + 1 : 1;
 }
 
 /// A picture on the way.

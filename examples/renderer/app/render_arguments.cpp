@@ -18,6 +18,7 @@
 #include <stdexcept>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace render {
@@ -73,6 +74,33 @@ void parse_size(const std::string& text, render_options& options) {
     throw CLI::ValidationError("--size", "expected WIDTHxHEIGHT, such as 640x360, each from 1 to " +
                                              std::to_string(largest_side) + " and 2^28 pixels at most, not " +
                                              text);
+}
+
+/// A device's name, and after a colon the numbers of GPUs.
+void parse_device(const std::string& text, render_options& options) {
+  const std::size_t colon = text.find(':');
+  const auto named = device_names().find(text.substr(0, colon));
+  const bool is_known = named != device_names().end();
+  std::vector<int> numbers;
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::size_t at = colon == std::string::npos ? text.size() : colon + 1;
+  bool is_list = colon == std::string::npos || at < text.size();
+  while (is_list && at < text.size()) {
+    std::size_t end = at;
+    while (end < text.size() && is_digit(text[end])) ++end;
+    is_list =
+        end > at && end - at <= 3 && (end == text.size() || (text[end] == ',' && end + 1 < text.size()));
+    if (is_list) numbers.push_back(std::stoi(text.substr(at, end - at)));
+    at = end + 1;
+  }
+  const bool has_gpus = is_known && (named->second == device::cuda || named->second == device::optix);
+  if (!is_known || !is_list || (!numbers.empty() && !has_gpus))
+    throw CLI::ValidationError("--device",
+                               "expected cpu, omp, seq, cuda or optix, or GPUs by their numbers, such "
+                               "as cuda:0,1, not " +
+                                   text);
+  options.where = named->second;
+  options.devices = std::move(numbers);
 }
 
 void add_sarsa_options(CLI::App& app, wfpg::sarsa_grid_options& options) {
@@ -175,6 +203,20 @@ const std::vector<requirement>& requirements() {
       {{"--save-state", "--resume"},
        "--method " + names_of_methods(&method_properties::can_be_saved),
        [](options o) { return properties_of(o.method).can_be_saved; }},
+      {{"--samples-a-wave"}, "--split samples", [](options o) { return o.split == rank_split::samples; }},
+      {{"--device"},
+       "--split tiles or samples, for several GPUs",
+       [](options o) { return o.devices.size() < 2 || o.split.has_value(); }},
+      {{"--rank-seconds"}, "--split", [](options o) { return o.split.has_value(); }},
+      {{"--split"},
+       "--method " + names_of_methods(&method_properties::can_be_split),
+       [](options o) { return properties_of(o.method).can_be_split; }},
+      {{"--split"},
+       "--octree triangles or caster",
+       [](options o) { return o.octree != octree_source::samples; }},
+      {{"--save-state", "--resume"},
+       "--split tiles, or none",
+       [](options o) { return o.split != rank_split::samples; }},
       {{"--sarsa-update", "--sarsa-sampler", "--sarsa-resolution", "--sarsa-directions", "--sarsa-step",
         "--sarsa-learning-rate"},
        "--method sarsa",
@@ -263,8 +305,25 @@ void add_bidirectional_options(CLI::App& app, render_options& options) {
 }
 
 void add_device_option(CLI::App& app, render_options& options) {
-  add_choice<device>(app, "--device", options.where, device_names(),
-                     "TBB (default), OpenMP, one thread, or a GPU");
+  app.add_option_function<std::string>(
+         "--device", [&options](const std::string& text) { parse_device(text, options); },
+         "TBB (cpu, default), OpenMP (omp), one thread (seq), or a GPU (cuda, optix); cuda:0,1 has the "
+         "GPUs of these numbers share the picture, as --split says")
+      ->type_name("NAME");
+}
+
+void add_rank_options(CLI::App& app, render_options& options) {
+  add_choice<rank_split>(
+      app, "--split", options.split, {{"tiles", rank_split::tiles}, {"samples", rank_split::samples}},
+      "processes that mpirun starts share the pixels of each sample, or several samples; the "
+      "picture has the same bytes for any number of them");
+  app.add_option(
+         "--samples-a-wave", options.samples_a_wave,
+         with_default("samples that end together, which --split samples shares", options.samples_a_wave))
+      ->transform(whole_number(1, 1 << 16));
+  app.add_option("--rank-seconds", options.rank_seconds,
+                 with_default("for which a process waits for others", options.rank_seconds))
+      ->transform(positive_number(1.0e6));
 }
 
 void add_nee_option(CLI::App& app, render_options& options) {

@@ -26,8 +26,9 @@ void add_scene_options(CLI::App& app, scene_arguments& given);  ///< SCENE, --en
 void add_method_options(CLI::App& app,
                         render_options& options);  ///< --method, --guiding, --fields, --combine
 void add_bidirectional_options(CLI::App& app, render_options& options);
-void add_device_option(CLI::App& app, render_options& options);    ///< --device
-void add_nee_option(CLI::App& app, render_options& options);       ///< --nee
+void add_device_option(CLI::App& app, render_options& options);  ///< --device
+void add_rank_options(CLI::App& app, render_options& options);  ///< --split, --samples-a-wave, --rank-seconds
+void add_nee_option(CLI::App& app, render_options& options);    ///< --nee
 void add_budget_options(CLI::App& app, render_options& options);   ///< --spp, --seconds, --seed
 void add_picture_options(CLI::App& app, render_options& options);  ///< --size, --max-depth
 void add_guider_options(CLI::App& app, render_options& options);   ///< resolutions, budgets, bins

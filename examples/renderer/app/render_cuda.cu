@@ -10,7 +10,12 @@ namespace render {
 render_result render_on_cuda(const scene& scene, const render_options& options,
                              const progress_callback& progress) {
   wfpg::check_cuda(cudaFree(nullptr), "--device cuda finds no GPU that it can use; cudaFree");
-  return render_on<bvh_scene<wfpg::exec::cuda>>(wfpg::exec::cuda(), scene, options, progress);
+  if (!options.devices.empty())
+    wfpg::check_cuda(cudaSetDevice(options.devices.front()),
+                     "--device cuda finds no GPU of this number; cudaSetDevice");
+  const wfpg::exec::cuda exec;
+  const device_options<wfpg::exec::cuda> own(exec, options);
+  return render_on<bvh_scene<wfpg::exec::cuda>>(exec, scene, own.get(), progress);
 }
 
 }  // namespace render

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "app/guider_report.hpp"
+#include "app/ranks.hpp"
 #include "app/render.hpp"
 #include "app/render_state.hpp"
 #include "app/sample_budget.hpp"
@@ -35,18 +36,28 @@ inline bool is_kept(checkpoint_times times, int samples, bool is_last) {
          (times == checkpoint_times::powers_of_two && (is_power_of_two || is_last));
 }
 
+/// The sample before which a rendering ends by its number of samples.
+inline std::uint32_t end_of_samples(const render_options& options) {
+  return options.seconds > 0.0 ? 0xffffffffu : static_cast<std::uint32_t>(options.spp);
+}
+
 /// The samples of one rendering, from those that the report has on, whatever their directions come from.
+/// Those of a wave have one weight.
 template <class Tracer, class Guider>
 void take_samples(Tracer& tracer, Guider& guider, const pinhole& camera, const render_options& options,
                   const progress_callback& progress, render_result& result) {
   sample_budget budget(options, result.report.spp);
-  for (bool is_last = budget.is_spent(); !is_last;) {
+  const std::uint32_t wave_samples = samples_of_wave(options), end = end_of_samples(options);
+  for (bool is_last = agree(options.ranks, {budget.is_spent(), false}).is_spent; !is_last;) {
     const auto sample = static_cast<std::uint32_t>(budget.samples());
-    const float weight = wfpg::sample_weight(combination_of(options), sample + 1);
+    const float weight = wfpg::sample_weight(combination_of(options), sample / wave_samples + 1);
     tracer.render_sample(guider, camera, sample, weight);
-    budget.count();
-    result.is_stopped = !budget.is_spent() && options.is_stopped && options.is_stopped();
-    is_last = budget.is_spent() || result.is_stopped;
+    budget.count(static_cast<int>(std::min(wave_samples, end - sample)));
+    const bool is_spent = budget.is_spent();
+    const wave_end ends =
+        agree(options.ranks, {is_spent, !is_spent && options.is_stopped && options.is_stopped()});
+    result.is_stopped = ends.is_stopped && !ends.is_spent;
+    is_last = ends.is_spent || ends.is_stopped;
     if (is_kept(options.checkpoints, budget.samples(), is_last)) {
       const double seconds = budget.seconds();
       const stopwatch keeping;
@@ -76,7 +87,10 @@ inline tracer_settings tracer_settings_of(const render_options& options) {
           techniques_of(options),
           options.light,
           options.technique_pictures,
-          combination_of(options) == wfpg::sample_combination::inverse_variance};
+          combination_of(options) == wfpg::sample_combination::inverse_variance,
+          share_of(options),
+          end_of_samples(options),
+          options.ranks};
 }
 
 /// What every guide is told.
@@ -86,7 +100,11 @@ inline wfpg::sampling_options sampling_options_of(const render_options& options)
   guided.guided_depths = guided_depths(options);
   guided.unguided_samples = wfpg::unguided_samples(combination_of(options));
   guided.seed = options.seed;
-  guided.max_paths = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  const wave_share share = share_of(options);
+  guided.max_paths = share.count;
+  guided.ranks = options.policy_ranks;
+  guided.first_path = share.first;
+  guided.all_paths = share.all_paths();
   guided.max_depth = static_cast<std::uint32_t>(options.max_depth);
   return guided;
 }

@@ -34,7 +34,12 @@ class optix_accelerated {
 render_result render_on_optix(const scene& scene, const render_options& options,
                               const progress_callback& progress) {
   wfpg::check_cuda(cudaFree(nullptr), "--device optix finds no GPU that it can use; cudaFree");
-  return render_on<optix_accelerated>(wfpg::exec::cuda(), scene, options, progress);
+  if (!options.devices.empty())
+    wfpg::check_cuda(cudaSetDevice(options.devices.front()),
+                     "--device optix finds no GPU of this number; cudaSetDevice");
+  const wfpg::exec::cuda exec;
+  const device_options<wfpg::exec::cuda> own(exec, options);
+  return render_on<optix_accelerated>(exec, scene, own.get(), progress);
 }
 
 }  // namespace render

@@ -5,6 +5,7 @@
 #include "app/number_options.hpp"
 #include "app/option_names.hpp"
 #include "app/output_files.hpp"
+#include "app/processes.hpp"
 #include "app/progress_bar.hpp"
 #include "app/render.hpp"
 #include "app/render_arguments.hpp"
@@ -119,7 +120,8 @@ void print_error(const image_error& error, std::ostream& out) {
 }
 
 void say(std::ostream& log, const std::exception& error) {
-  log << "wfpg-render: " << reason_of(error) << '\n';
+  // One text, so that messages of several processes do not mix.
+  log << "wfpg-render: " + reason_of(error) + '\n';
 }
 
 /// Writes all requested files, even if some fail, and reports failures. Rendering takes long, so no result is
@@ -168,7 +170,9 @@ void warn_of_far_lights(const scene& scene, std::ostream& log) {
 }
 
 int render_scene(arguments& given, std::ostream& out, std::ostream& log) {
-  check_files(given);
+  // Of several ranks, the first writes all files.
+  const bool writes = !given.options.ranks || given.options.ranks->rank() == 0;
+  if (writes) check_files(given);
   scene scene = load_scene(given.scene, given.options, "wfpg-render", log);
   if (given.fog > 0.0f) scene.fog = {vec3(0.0f), vec3(given.fog), 0.0f};
   warn_of_far_lights(scene, log);
@@ -180,8 +184,9 @@ int render_scene(arguments& given, std::ostream& out, std::ostream& log) {
   given.options.is_stopped = is_interrupted;
   note_interruptions();
   progress_bar bar;
-  const render_result result =
-      render(scene, given.options, [&bar](const render_progress& p) { bar.show(p); });
+  const render_result result = render(scene, given.options, [&](const render_progress& p) {
+    if (writes) bar.show(p);
+  });
   bar.finish();
   if (result.report.dropped_light_vertices > 0)
     log << "wfpg-render: warning: " << result.report.dropped_light_vertices
@@ -191,7 +196,7 @@ int render_scene(arguments& given, std::ostream& out, std::ostream& log) {
     log << "wfpg-render: warning: " << result.report.surplus_beams
         << " photon beams are missing, since segments of light paths cross more than "
         << wfpg::bidirectional_options().segment_beams << " media; leave bb1d out of --techniques\n";
-  if (!write_all(given, result, reference, out, log)) return failure;
+  if (writes && !write_all(given, result, reference, out, log)) return failure;
   return result.is_stopped ? interrupted : 0;
 }
 
@@ -208,6 +213,7 @@ int run_program(int argc, const char* const* argv, std::ostream& out, std::ostre
   add_method_options(app, given.options);
   add_bidirectional_options(app, given.options);
   add_device_option(app, given.options);
+  add_rank_options(app, given.options);
   add_nee_option(app, given.options);
   add_budget_options(app, given.options);
   add_picture_options(app, given.options);
@@ -222,10 +228,17 @@ int run_program(int argc, const char* const* argv, std::ostream& out, std::ostre
   } catch (const CLI::ParseError& error) {
     return app.exit(error, out, log) == 0 ? 0 : failure;
   }
+  std::optional<processes> joined;
   try {
-    return render_scene(given, out, log);
+    // Several GPUs are threads of this process, which mpirun has not started.
+    if (!given.options.split || given.options.devices.size() > 1) return render_scene(given, out, log);
+    given.options.ranks = &joined.emplace(given.options.rank_seconds).ranks();
+    std::ostream none(nullptr);
+    const bool is_first = given.options.ranks->rank() == 0;
+    return render_scene(given, is_first ? out : none, is_first ? log : none);
   } catch (const std::exception& error) {
     say(log, error);
+    if (joined) joined->abort(failure);
     return failure;
   }
 }

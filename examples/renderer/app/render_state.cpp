@@ -5,7 +5,9 @@
 #include "scene/scene_checksum.hpp"
 
 #include <wfpg/base/math.hpp>
+#include <wfpg/ranks/communicator.hpp>
 #include <wfpg/state/section_file.hpp>
+#include <wfpg/version.hpp>
 
 #include <cstdio>
 #include <sstream>
@@ -137,6 +139,21 @@ void restore_film(section_reader bytes, std::size_t pixels, render_state& state)
 }
 
 }  // namespace
+
+std::uint64_t checksum_of(const scene& scene, const render_options& o) {
+  section_writer bytes = options_to_bytes(scene, o);
+  for (const int version : {WFPG_VERSION_MAJOR, WFPG_VERSION_MINOR, WFPG_VERSION_PATCH})
+    bytes.put(static_cast<std::uint32_t>(version));
+  bytes.put(static_cast<std::uint32_t>(o.spp));
+  bytes.put(o.seconds);
+  bytes.put(static_cast<std::uint32_t>(o.split.value_or(rank_split::tiles)));
+  bytes.put(static_cast<std::uint32_t>(o.samples_a_wave));
+  bytes.put(static_cast<std::uint32_t>(o.checkpoints));
+  // All ranks take part where a guide or a state is saved.
+  bytes.put(static_cast<std::uint32_t>(o.keep_guide) << 1 | static_cast<std::uint32_t>(o.keep_state));
+  bytes.put(o.ranks->size());
+  return wfpg::checksum(bytes.bytes());
+}
 
 std::string state_bytes(const scene& scene, const render_options& options, const render_state& state) {
   std::ostringstream out;

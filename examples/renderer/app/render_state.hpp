@@ -32,6 +32,10 @@ struct render_state {
   std::string guide;  ///< bytes of a guide file; empty for path tracing
 };
 
+/// Hash of all that ranks that render one picture must have in common. Precondition: options.ranks is not
+/// null.
+std::uint64_t checksum_of(const scene& scene, const render_options& options);
+
 /// A state file's bytes. `options` are complete: width, height and max_depth are the picture's own.
 std::string state_bytes(const scene& scene, const render_options& options, const render_state& state);
 

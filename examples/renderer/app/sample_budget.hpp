@@ -26,14 +26,14 @@ class sample_budget {
   sample_budget(const render_options& options, int samples)
       : spp_(options.spp),
         seconds_(options.seconds),
-        least_(combination_of(options) == wfpg::sample_combination::discard_first ? 2 : 1),
+        least_(least_samples(options)),
         samples_(samples),
         begun_(options.seconds > 0.0 ? 0.0 : fraction()) {}
 
   int samples() const { return samples_; }
   double seconds() const { return clock_.seconds() - left_out_; }
   bool is_spent() const { return samples_ >= least_ && fraction() >= 1.0; }
-  void count() { ++samples_; }
+  void count(int samples = 1) { samples_ += samples; }
   void leave_out(double seconds) { left_out_ += seconds; }
   render_progress progress() const { return {samples_, std::min(1.0, fraction()), seconds(), begun_}; }
 

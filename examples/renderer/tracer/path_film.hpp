@@ -1,11 +1,16 @@
-// What tracers add their samples to: the picture's sums, and counts of each path.
+// What tracers add their samples to: the picture's sums, and counts of each path. Ranks have a part each.
 #pragma once
 
 #include "app/render_state.hpp"
+#include "tracer/exact_sum.hpp"
+#include "tracer/wave_share.hpp"
 
 #include <wfpg/exec/buffer.hpp>
+#include <wfpg/ranks/communicator.hpp>
 
+#include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <numeric>
 #include <vector>
 
@@ -20,21 +25,50 @@ struct add_to_film {
   WFPG_HD void operator()(std::size_t i) const { film[i] += weight * glm::dvec3(radiance[i]); }
 };
 
-/// The samples of a picture so far, in a policy's memory.
+/// Adds a rank's part of a wave of several samples to its sums of all pixels.
+struct add_exactly {
+  wfpg::array_view<const vec3> radiance;
+  wfpg::array_view<exact_sum> film;  ///< three a pixel
+  wave_share share;
+  double weight;
+
+  WFPG_HD void operator()(std::size_t pixel) const {
+    for (std::uint32_t sample = 0; sample < share.samples; ++sample) {
+      // Paths before this rank's first one wrap around, so that they are not below its count.
+      const auto path = static_cast<std::uint32_t>(sample * share.pixels + pixel - share.first);
+      if (path >= share.count) continue;
+      for (int c = 0; c < 3; ++c)
+        film[3 * pixel + static_cast<std::size_t>(c)].add(weight * static_cast<double>(radiance[path][c]));
+    }
+  }
+};
+
+/// The samples of a picture so far, in a policy's memory. A rank has the sums of its own pixels. Where waves
+/// have several samples, it has exact sums of its samples of all pixels. Pictures and states are those of all
+/// ranks, so all ranks must ask for them. They have the same bits for any number of ranks.
 template <class Exec>
 class path_film {
  public:
-  /// `pixels`: the number of them, which is that of paths.
-  path_film(const Exec& exec, std::size_t pixels)
+  /// `ranks`: of the host's memory; null for one rank. It outlives the film.
+  path_film(const Exec& exec, const wave_share& share, wfpg::communicator* ranks)
       : exec_(exec),
-        sums_(exec, std::vector<glm::dvec3>(pixels, glm::dvec3(0.0))),
-        segments_(exec, std::vector<std::uint32_t>(pixels, 0)),
-        light_hits_(exec, std::vector<std::uint32_t>(pixels, 0)) {}
+        share_(share),
+        ranks_(ranks),
+        sums_(exec, std::vector<glm::dvec3>(is_exact() ? 0 : share.count, glm::dvec3(0.0))),
+        exact_(exec, std::vector<exact_sum>(is_exact() ? 3 * std::size_t(share.pixels) : 0)),
+        segments_(exec, std::vector<std::uint32_t>(share.count, 0)),
+        light_hits_(exec, std::vector<std::uint32_t>(share.count, 0)) {}
+  /// `pixels`: the number of them, which is that of paths.
+  path_film(const Exec& exec, std::size_t pixels) : path_film(exec, wave_share::all_of(pixels), nullptr) {}
 
-  /// Adds a sample with `weight` >= 0.
-  void add(wfpg::array_view<const vec3> radiance, float weight) {
-    exec_.for_each(sums_.size(), add_to_film{radiance, sums_.view(), static_cast<double>(weight)});
-    weight_ += static_cast<double>(weight);
+  /// Adds a wave whose `samples` first samples were traced, each with `weight` >= 0.
+  void add(wfpg::array_view<const vec3> radiance, float weight, std::uint32_t samples = 1) {
+    const auto factor = static_cast<double>(weight);
+    if (is_exact())
+      exec_.for_each(share_.pixels, add_exactly{radiance, exact_.view(), share_, factor});
+    else
+      exec_.for_each(sums_.size(), add_to_film{radiance, sums_.view(), factor});
+    weight_ += factor * samples;
   }
 
   /// Counts that kernels raise: rays that extended a path, and those of them that ended at a light.
@@ -44,34 +78,72 @@ class path_film {
   /// Weighted mean of the samples, row by row. Black if their weights sum to 0.
   std::vector<vec3> picture() const {
     std::vector<vec3> pixels;
-    pixels.reserve(sums_.size());
-    for (const glm::dvec3& sum : sums_.to_host(exec_))
+    pixels.reserve(share_.pixels);
+    for (const glm::dvec3& sum : sums_of_all())
       pixels.push_back(weight_ > 0.0 ? vec3(sum / weight_) : vec3(0.0f));
     return pixels;
   }
 
   /// Number of rays that extended paths, without shadow rays.
-  std::uint64_t segments() const { return sum_of(segments_, segments_before_); }
+  std::uint64_t segments() const { return sum_of(segments_) + segments_before_; }
   /// Number of segments that ended at a surface or environment that emits toward them.
-  std::uint64_t light_hits() const { return sum_of(light_hits_, light_hits_before_); }
+  std::uint64_t light_hits() const { return sum_of(light_hits_) + light_hits_before_; }
 
-  /// The samples so far, and a way to continue from them. Precondition: the picture has this size.
-  film_state state() const { return {weight_, segments(), light_hits(), sums_.to_host(exec_)}; }
+  /// The samples so far, and a way to continue from them. Precondition: the picture has this size, and waves
+  /// have one sample.
+  film_state state() const { return {weight_, segments(), light_hits(), sums_of_all()}; }
   void restore(const film_state& film) {
     weight_ = film.weight;
     segments_before_ = film.segments;
     light_hits_before_ = film.light_hits;
-    sums_ = wfpg::buffer<glm::dvec3, Exec>(exec_, film.sums);
+    exec_.copy_from_host(sums_.data(), film.sums.data() + share_.first, sums_.bytes());
   }
 
  private:
-  std::uint64_t sum_of(const wfpg::buffer<std::uint32_t, Exec>& counts, std::uint64_t before) const {
+  bool is_exact() const { return share_.samples > 1; }
+
+  std::uint64_t sum_of(const wfpg::buffer<std::uint32_t, Exec>& counts) const {
     const std::vector<std::uint32_t> all = counts.to_host(exec_);
-    return std::accumulate(all.begin(), all.end(), before);
+    std::uint64_t sum = std::accumulate(all.begin(), all.end(), std::uint64_t(0));
+    if (ranks_) ranks_->all_reduce_sum(wfpg::array_view<std::uint64_t>(&sum, 1));
+    return sum;
+  }
+
+  /// The picture's sums, of all ranks.
+  std::vector<glm::dvec3> sums_of_all() const {
+    if (is_exact()) return exact_sums_of_all();
+    std::vector<glm::dvec3> own = sums_.to_host(exec_);
+    if (!ranks_) return own;
+    // Bits of zeros add nothing to the bits of the rank that has the pixel.
+    std::vector<std::uint64_t> bits(3 * std::size_t(share_.pixels), 0);
+    std::memcpy(bits.data() + 3 * std::size_t(share_.first), own.data(), own.size() * sizeof(glm::dvec3));
+    ranks_->all_reduce_sum(wfpg::array_view<std::uint64_t>(bits.data(), bits.size()));
+    std::vector<glm::dvec3> all(share_.pixels);
+    std::memcpy(all.data(), bits.data(), bits.size() * sizeof(std::uint64_t));
+    return all;
+  }
+
+  std::vector<glm::dvec3> exact_sums_of_all() const {
+    const std::vector<exact_sum> own = exact_.to_host(exec_);
+    std::vector<glm::dvec3> all(share_.pixels);
+    constexpr std::size_t parts = exact_sum::parts, at_once = std::size_t(1) << 18;
+    std::vector<std::uint64_t> words;
+    for (std::size_t first = 0; first < own.size(); first += at_once) {
+      const std::size_t count = std::min(at_once, own.size() - first);
+      words.resize(count * parts);
+      for (std::size_t i = 0; i < count; ++i) own[first + i].split(&words[i * parts]);
+      if (ranks_) ranks_->all_reduce_sum(wfpg::array_view<std::uint64_t>(words.data(), words.size()));
+      for (std::size_t i = 0; i < count; ++i)
+        all[(first + i) / 3][static_cast<int>((first + i) % 3)] = exact_sum::joined(&words[i * parts]);
+    }
+    return all;
   }
 
   Exec exec_;
+  wave_share share_;
+  wfpg::communicator* ranks_;
   wfpg::buffer<glm::dvec3, Exec> sums_;
+  wfpg::buffer<exact_sum, Exec> exact_;
   wfpg::buffer<std::uint32_t, Exec> segments_, light_hits_;
   double weight_ = 0.0;
   std::uint64_t segments_before_ = 0, light_hits_before_ = 0;  // of earlier samples in a film

@@ -45,17 +45,20 @@ struct path_lights {
   }
 };
 
-/// Starts a path through each pixel. A Camera is a pinhole, or another type with through().
+/// Starts paths through pixels. Those of samples from `end` on do not begin. A Camera is a pinhole, or
+/// another type with through().
 template <class Camera>
 struct start_paths {
   Camera camera;
   random_stream random;
   tiled_view<path_state> paths;
   wfpg::array_view<vec3> radiance;
+  std::uint32_t end;
 
   WFPG_HD void operator()(std::size_t i) const {
-    const auto pixel = static_cast<std::uint32_t>(i);
-    paths.emplace(i, camera.through(pixel, random(pixel, dimension::pixel)));
+    const auto path = static_cast<std::uint32_t>(i);
+    paths.emplace(i, camera.through(random.pixel_of(path), random(path, dimension::pixel)));
+    if (random.sample_of(path) >= end) paths.update(i, [](path_state& ended) { ended.active = 0; });
     radiance[i] = vec3(0.0f);
   }
 };

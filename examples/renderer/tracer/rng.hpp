@@ -11,13 +11,25 @@ namespace render {
 /// The source of random numbers of one path in one sample.
 struct random_stream {
   std::uint64_t seed = 0;
-  std::uint32_t sample = 0;
+  std::uint32_t sample = 0;            ///< of the wave's first paths
+  std::uint32_t first = 0;             ///< the wave's path that is path 0 here
+  std::uint32_t pixels = 0xffffffffu;  ///< paths of a sample; the next sample follows them
 
   /// Two independent numbers in [0, 1) for a path and a use (`dimension`).
   WFPG_HD wfpg::vec2 operator()(std::uint32_t path, std::uint32_t dimension) const {
-    const std::uint64_t counter = (static_cast<std::uint64_t>(path) << 32) | dimension;
-    const std::uint64_t bits = mix(mix(mix(seed + 0x632be59bd9b4e019ull) ^ sample) + counter);
+    const std::uint64_t counter = (static_cast<std::uint64_t>(pixel_of(path)) << 32) | dimension;
+    const std::uint64_t bits = mix(mix(mix(seed + 0x632be59bd9b4e019ull) ^ sample_of(path)) + counter);
     return {unit(static_cast<std::uint32_t>(bits >> 40)), unit(static_cast<std::uint32_t>(bits & 0xffffffu))};
+  }
+
+  /// The pixel and the sample of a path. Few waves have more than one sample.
+  WFPG_HD std::uint32_t pixel_of(std::uint32_t path) const {
+    const std::uint32_t in_wave = first + path;
+    return in_wave < pixels ? in_wave : in_wave % pixels;
+  }
+  WFPG_HD std::uint32_t sample_of(std::uint32_t path) const {
+    const std::uint32_t in_wave = first + path;
+    return in_wave < pixels ? sample : sample + in_wave / pixels;
   }
 
  private:

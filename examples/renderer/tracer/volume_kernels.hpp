@@ -8,7 +8,7 @@
 
 namespace render {
 
-/// Starts a path through each pixel.
+/// Starts paths through pixels. Those of samples from `end` on do not begin.
 template <class Camera>
 struct start_volume_paths {
   Camera camera;
@@ -16,10 +16,12 @@ struct start_volume_paths {
   wfpg::array_view<const solid_stack> around_camera;
   tiled_view<volume_path> paths;
   wfpg::array_view<vec3> radiance;
+  std::uint32_t end;
 
   WFPG_HD void operator()(std::size_t i) const {
-    const auto pixel = static_cast<std::uint32_t>(i);
-    paths.emplace(i, camera.through(pixel, random(pixel, dimension::pixel)), around_camera[0]);
+    const auto path = static_cast<std::uint32_t>(i);
+    paths.emplace(i, camera.through(random.pixel_of(path), random(path, dimension::pixel)), around_camera[0]);
+    if (random.sample_of(path) >= end) paths.update(i, [](volume_path& ended) { ended.active = 0; });
     radiance[i] = vec3(0.0f);
   }
 };

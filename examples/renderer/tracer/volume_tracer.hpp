@@ -26,22 +26,23 @@ class volume_tracer {
         settings_(settings),
         world_(world),
         caster_(caster),
-        count_(settings.pixels()),
+        share_(settings.part()),
+        count_(share_.count),
         around_camera_(exec, std::vector<solid_stack>(1)),
         paths_(exec, count_),
         vertices_(exec, count_),
         keys_(exec, count_),
         radiance_(exec, count_),
-        film_(exec, count_),
+        film_(exec, share_, settings.ranks),
         partitioner_(exec, count_),
         clock_(exec) {}
 
-  /// Renders sample number `sample` (from 0) of each pixel with `weight` >= 0 in the picture, and waits. A
-  /// Camera is one of path_tracer.
+  /// Renders a wave as path_tracer does. A Camera is one of path_tracer.
   template <class Camera>
   void render_sample(no_guide, const Camera& camera, std::uint32_t sample, float weight) {
-    volume_position at{{{settings_.seed, sample}, 0, settings_.max_depth}};
-    start(at, camera);
+    const std::uint32_t samples = settings_.samples_from(sample);
+    volume_position at{{share_.random(settings_.seed, sample), 0, settings_.max_depth}};
+    start(at, camera, sample + samples);
     for (path_queue queue{{}, true}; at.depth < at.max_depth; ++at.depth) {
       find_vertices(at, queue);
       if (at.is_last()) break;
@@ -52,7 +53,7 @@ class volume_tracer {
       if (world_.next_event) add_light(at, queue);
       scatter(at, queue);
     }
-    clock_.measure("film", [&] { film_.add(radiance_.view(), weight); });
+    clock_.measure("film", [&] { film_.add(radiance_.view(), weight, samples); });
     wfpg::read_element(exec_, radiance_.data());  // waits, so that a look at the time sees the whole sample
     clock_.resolve();
   }
@@ -68,13 +69,13 @@ class volume_tracer {
   static constexpr std::uint32_t depths_between_looks = 16;
 
   template <class Camera>
-  void start(const volume_position& at, const Camera& camera) {
+  void start(const volume_position& at, const Camera& camera, std::uint32_t end) {
     clock_.measure("camera", [&] {
       if (world_.scene.has_solids)
         exec_.for_each(
             1, find_camera_solids<Caster, Camera>{world_.scene, caster_, camera, around_camera_.view()});
       exec_.for_each(count_, start_volume_paths<Camera>{camera, at.random, around_camera_.view(),
-                                                        paths_.view(), radiance_.view()});
+                                                        paths_.view(), radiance_.view(), end});
     });
   }
 
@@ -109,6 +110,7 @@ class volume_tracer {
   tracer_settings settings_;
   path_lights world_;
   Caster caster_;
+  wave_share share_;
   std::size_t count_;
   wfpg::buffer<solid_stack, Exec> around_camera_;
   tiled_array<volume_path, Exec> paths_;

@@ -5,12 +5,14 @@
 #include "tracer/path_kernels.hpp"
 #include "tracer/stage_clock.hpp"
 #include "tracer/technique_set.hpp"
+#include "tracer/wave_share.hpp"
 
 #include <wfpg/bins/partitioner.hpp>
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/host/ray_caster.hpp>
 #include <wfpg/host/wave.hpp>
 
+#include <algorithm>
 #include <cstdint>
 
 namespace render {
@@ -25,7 +27,14 @@ struct tracer_settings {
   wfpg::bidirectional_options light = {};  ///< of light paths: budget, radii, beam paths
   bool technique_pictures = false;         ///< whether they keep a picture a technique
   bool weighs_by_gain = false;             ///< samples have the weights that the guider measures
+  wave_share share = {};                   ///< this rank's part of a wave; of no paths: all of one sample
+  std::uint32_t end = 0xffffffffu;         ///< waves have no samples from this one on
+  wfpg::communicator* ranks = nullptr;     ///< that render the picture together, of the host's memory
 
+  /// The samples of a wave that begins with this one.
+  std::uint32_t samples_from(std::uint32_t sample) const { return std::min(part().samples, end - sample); }
+  /// What the tracer traces.
+  wave_share part() const { return share.count > 0 ? share : wave_share::all_of(pixels()); }
   std::size_t pixels() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
 };
 
@@ -49,7 +58,8 @@ class path_tracer {
         settings_(settings),
         world_(world),
         caster_(caster),
-        count_(settings.pixels()),
+        share_(settings.part()),
+        count_(share_.count),
         paths_(exec, count_),
         vertices_(exec, count_),
         queries_(exec, world.next_event ? count_ : 0),
@@ -57,22 +67,24 @@ class path_tracer {
         directions_(exec, count_),
         keys_(exec, count_),
         radiance_(exec, count_),
-        film_(exec, count_),
+        film_(exec, share_, settings.ranks),
         partitioner_(exec, count_),
         rays_(exec, is_inline ? 0 : count_),
         hits_(exec, is_inline ? 0 : count_),
         hidden_(exec, is_inline || !world.next_event ? 0 : count_),
         clock_(exec) {}
 
-  /// Renders sample number `sample` (from 0) of each pixel with `weight` >= 0 in the picture, and waits. With
-  /// weighs_by_gain the guider's weight multiplies it.
-  /// A Camera is a pinhole, or another type that makes rays:
+  /// Renders a wave that begins with sample number `sample` (from 0) of each pixel, and waits. Its samples
+  /// have `weight` >= 0 in the picture. With weighs_by_gain the guider's weight multiplies it. A Camera is a
+  /// pinhole, or another type that makes rays:
   ///   wfpg::ray through(std::uint32_t pixel, vec2 offset) const;  offset in [0, 1)² of the pixel
   template <class Guider, class Camera>
   void render_sample(Guider& guider, const Camera& camera, std::uint32_t sample, float weight) {
-    wave_position at{{settings_.seed, sample}, 0, settings_.max_depth};
+    const std::uint32_t samples = settings_.samples_from(sample);
+    wave_position at{share_.random(settings_.seed, sample), 0, settings_.max_depth};
     clock_.measure("camera", [&] {
-      exec_.for_each(count_, start_paths<Camera>{camera, at.random, paths_.view(), radiance_.view()});
+      exec_.for_each(
+          count_, start_paths<Camera>{camera, at.random, paths_.view(), radiance_.view(), sample + samples});
     });
     clock_.measure("update", [&] { guider.begin_sample(); });
     if (settings_.weighs_by_gain) weight *= guider.sample_weight();
@@ -86,7 +98,7 @@ class path_tracer {
       shade(guider, at, queue);
     }
     clock_.measure("update", [&] { guider.end_sample(); });
-    clock_.measure("film", [&] { film_.add(radiance_.view(), weight); });
+    clock_.measure("film", [&] { film_.add(radiance_.view(), weight, samples); });
     wfpg::read_element(exec_, radiance_.data());  // waits, so that a look at the time sees the whole sample
     clock_.resolve();
   }
@@ -179,6 +191,7 @@ class path_tracer {
   tracer_settings settings_;
   path_lights world_;
   Caster caster_;
+  wave_share share_;
   std::size_t count_;
   tiled_array<path_state, Exec> paths_;
   tiled_array<path_vertex, Exec> vertices_;

@@ -15,6 +15,7 @@
 #include <wfpg/exec/support/atomic.hpp>
 #include <wfpg/octree/bottom_up.hpp>
 #include <wfpg/octree/sparse_voxel_octree.hpp>
+#include <wfpg/ranks/communicator.hpp>
 
 namespace wfpg {
 
@@ -45,7 +46,13 @@ struct ray_to_bin {
 struct bins_view : partition_view {
   /// Key of each ray's bin: node times 8 plus orientation, or 0xffffffff where the ray has no bin.
   array_view<const std::uint32_t> ray_keys;
+  /// Rays of each bin on all ranks that share the wave. Null: those of this rank are all.
+  const std::uint32_t* sizes_of_ranks = nullptr;
 
+  /// Number of rays of a bin, on all ranks.
+  WFPG_HD std::uint32_t rays(std::size_t bin) const {
+    return sizes_of_ranks ? sizes_of_ranks[bin] : size(bin);
+  }
   /// The octree node that contains a bin's rays.
   WFPG_HD node_id node(std::size_t bin) const { return key(bin) / orientations; }
   /// Orientation of a bin, 0 to 7: dominant_axis() or bin_orientation.
@@ -137,14 +144,17 @@ class spatial_binner {
   /// Bins rays [0, n), which the functor `rays` describes: (std::size_t) -> ray_to_bin. Rays outside every
   /// voxel get no bin and are counted. The view is valid until the next call. Throws std::invalid_argument
   /// where n is above the capacity. O(n · depth + nodes) and a sort of n keys.
+  ///
+  /// `ranks`: bins are chosen by the rays of all ranks. They exchange 4 bytes a leaf.
   template <class Rays>
-  bins_view bin(const Exec& exec, std::size_t n, const Rays& rays) {
+  bins_view bin(const Exec& exec, std::size_t n, const Rays& rays, communicator* ranks = nullptr) {
     require(n <= keys_.size(), "number of rays", n, "at most the binner's capacity");
     // Keys are those of leaves first, and of bins after the ascent.
     const array_view<std::uint32_t> keys(keys_.data(), n);
     ::thrust::fill_n(exec.thrust(), node_counts_.data(), node_counts_.size(), 0u);
     ::thrust::fill_n(exec.thrust(), unbinned_.data(), 1, 0u);
     exec.for_each(n, detail::count_at_leaves<Rays>{rays, tree_, keys, node_counts_.data(), unbinned_.data()});
+    if (ranks) ranks->all_reduce_sum(node_counts_.view().subview(tree_.first_leaf(), tree_.leaf_count()));
     // Levels above l_min are not summed: no bin lies there.
     detail::for_each_bottom_up(exec, tree_, options_.min_level,
                                detail::sum_wave_counts{tree_, node_counts_.data()});

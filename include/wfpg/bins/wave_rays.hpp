@@ -19,6 +19,17 @@ struct wave_rays {
   Surfaces surfaces;                ///< the host's: (std::uint32_t) -> surface
   guiding_mode mode;                ///< whether bins are split by orientation
   recorded_runs guided_paths = {};  ///< rays of other paths are inactive
+  /// Index of path 0 among the paths of all ranks; no_path without ranks.
+  std::uint32_t first_path = no_path;
+
+  /// Number of ray i: its index, or with ranks that of its path among all paths. Then it does not depend on
+  /// the number of ranks, where the wave's rays are those of all.
+  WFPG_HD std::uint32_t number(std::size_t i) const {
+    const auto ray = static_cast<std::uint32_t>(i);
+    if (first_path == no_path) return ray;
+    const std::uint32_t path = surfaces(ray).path;
+    return first_path + (path == no_path ? ray : path);
+  }
   /// Describes ray i. In oriented mode, surfaces that reflect are split by the shading normal on the outgoing
   /// side, and surfaces that transmit share one orientation.
   WFPG_HD ray_to_bin operator()(std::size_t i) const {

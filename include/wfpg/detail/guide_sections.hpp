@@ -13,6 +13,7 @@
 #include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/guides/octree/kept_guide.hpp>
 #include <wfpg/guides/octree/transient_guide.hpp>
+#include <wfpg/octree/leaf_codes.hpp>
 #include <wfpg/state/section_file.hpp>
 
 #include <thrust/fill.h>
@@ -89,26 +90,15 @@ void check_options(file_reader& file, const Options& options) {
   bytes.end();
 }
 
-/// Kernel: writes the Morton code of each leaf's voxel.
-struct write_leaf_codes {
-  sparse_voxel_octree_view tree;  ///< of the guide
-  array_view<morton_code> codes;  ///< a leaf, in the octree's order
-  WFPG_HD void operator()(std::size_t leaf) const {
-    codes[leaf] = morton_encode(tree.coordinates(tree.first_leaf() + static_cast<node_id>(leaf)));
-  }
-};
-
 /// Section "octree": origin and side of the cube, then the leaves' Morton codes in ascending order. All else
 /// is built from these on loading.
 template <class Exec>
 section_writer octree_to_bytes(const Exec& exec, const sparse_voxel_octree<Exec>& octree) {
   const sparse_voxel_octree_view tree = octree.view();
-  const buffer<morton_code, Exec> codes(exec, tree.leaf_count());
-  exec.for_each(codes.size(), write_leaf_codes{tree, codes.view()});
   section_writer bytes;
   bytes.put(tree.grid().origin);
   bytes.put(tree.grid().side);
-  bytes.put_all(codes.to_host(exec));
+  bytes.put_all(leaf_codes(exec, tree));
   return bytes;
 }
 
@@ -210,6 +200,7 @@ struct guide_sections {
     exec.copy_from_host(cache.swapped_sides_.data(), swapped.data(), cache.swapped_sides_.bytes());
     exec.copy_from_host(cache.leaves_.data(), leaves.data(), cache.leaves_.bytes());
     exec.copy_from_host(cache.counters_.data(), dropped.data(), cache.counters_.bytes());
+    cache.shared_counters_.restart(exec, counters_in_a_row<std::uint32_t>{cache.counters_.data()});
     for_each_bottom_up(exec, cache.view_.tree_, 0,
                        average_children{cache.view_, cache.inner_radiance_.data()});
   }
@@ -249,6 +240,7 @@ struct guide_sections {
     for (std::size_t i = 0; i < depths.size() && 4 * i < counts.size(); ++i)
       depths[i] = {counts[4 * i], counts[4 * i + 1], counts[4 * i + 2], counts[4 * i + 3]};
     exec.copy_from_host(scene.counts_.data(), depths.data(), scene.counts_.bytes());
+    scene.shared_counts_.restart(exec, rays_of_depth{scene.counts_.data()});
   }
 
   /// Writes the first sections of a scene: "octree" and "cache".

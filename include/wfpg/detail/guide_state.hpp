@@ -26,7 +26,7 @@ struct state_access {
   template <class Exec, class Guide>
   static std::uint32_t comparison_key(const path_guider<Exec, Guide>& guider) {
     const auto& o = guider.options_;
-    std::uint64_t key = hash(0, o.max_paths);
+    std::uint64_t key = hash(0, all_paths_of(o));
     key = hash(key, o.max_depth);
     key = hash(key, o.deposits_per_leaf.value_or(0));
     key = hash(key, o.seed);
@@ -94,6 +94,8 @@ struct state_access {
     const auto dropped = bytes.get<std::uint32_t>();
     guide_sections::take_depths(guider.exec_, bytes, guider.guide_);
     guider.exec_.copy_from_host(guider.recorder_.counters_.data(), &dropped, sizeof dropped);
+    guider.shared_counters_.restart(guider.exec_,
+                                    counters_in_a_row<std::uint32_t>{guider.recorder_.counters().data()});
   }
 
   template <class Exec, class Guide>

@@ -96,6 +96,7 @@ struct kept_state {
     const buffer<std::uint8_t, Exec> levels_there(exec, levels);
     exec.for_each(leaf_count,
                   place_marks{store.tree_, rays.data(), levels_there.data(), store.marks_.leaves_.data()});
+    store.marks_.restart_ranks(exec);
   }
 
   // Section "fields": counters, then the slots in use in ascending order, each with its cells.

@@ -18,6 +18,7 @@ path_guider<Exec, Guide>& path_guider<Exec, Guide>::operator=(path_guider&& othe
   guide_ = std::move(other.guide_);
   needs_ = other.needs_;
   recorder_ = std::move(other.recorder_);
+  shared_counters_ = std::move(other.shared_counters_);
   rests_ = other.rests_;
   samples_ = other.samples_;
   warm_up_end_ = other.warm_up_end_;
@@ -29,6 +30,21 @@ path_guider<Exec, Guide>& path_guider<Exec, Guide>::operator=(path_guider&& othe
   gain_ = other.gain_;
   compared_ = other.compared_;
   return *this;
+}
+
+// The version first: others may have other items.
+template <class Exec, class Guide>
+void path_guider<Exec, Guide>::join_ranks() {
+  agreed_items version;
+  version.add("the version of wfpg",
+              std::uint64_t(1000000 * WFPG_VERSION_MAJOR + 1000 * WFPG_VERSION_MINOR + WFPG_VERSION_PATCH));
+  version.check(exec_, *options_.ranks);
+  agreed_items items;
+  items.add("the kind of policy", std::uint64_t(Exec::warps_per_block > 1));
+  detail::add_options(items, options_);
+  if constexpr (Guide::joins_ranks) guide_.agree(exec_, items);
+  items.check(exec_, *options_.ranks);
+  detail::require_all_paths(exec_, options_);
 }
 
 // Three numbers decide which paths are recorded: the sample's number, the seed, and the end of the warm-up. A
@@ -71,6 +87,9 @@ void path_guider<Exec, Guide>::end_sample() {
     guide_.update(now());
   else if (!lights_rest())
     guide_.end_rest(now());
+  if (options_.ranks)
+    shared_counters_.sum(exec_, *options_.ranks,
+                         detail::counters_in_a_row<std::uint32_t>{recorder_.counters().data()});
 }
 
 // Runs before the guide learns, so that the cache does not have the paths that are measured. Once a sample:
@@ -189,7 +208,7 @@ guider_statistics path_guider<Exec, Guide>::statistics() const {
 template <class Exec, class Guide>
 memory_report path_guider<Exec, Guide>::memory() const {
   memory_report report{guide_.memory()};
-  report.parts.push_back({"paths", recorder_.bytes(), false});
+  report.parts.push_back({"paths", recorder_.bytes() + shared_counters_.bytes(), false});
   report.parts.push_back({"scratch", working_memory_->bytes() - working_memory_->used_bytes(), false});
   return report;
 }

@@ -141,6 +141,11 @@ struct guide_base {
   template <class Exec>
   void end_rest(const sample_context<Exec>&) {}
 
+  /// Whether ranks can share a sample: sampling_options::ranks. The guide then exchanges all that its state
+  /// depends on, in the calls that all ranks make. It has
+  ///   void agree(const Exec&, agreed_items&) const;   adds what has to be equal on all ranks
+  static constexpr bool joins_ranks = false;
+
   /// Whether the guide samples a whole wave in one call:
   ///   void sample_wave(const sample_context<Exec>&, const wave<Surfaces, Random>&, const Caster&, const
   ///   Sampler&);

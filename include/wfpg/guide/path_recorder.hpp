@@ -312,6 +312,7 @@ struct path_recorder_settings {
   bool directions = false;           ///< scatter() and escape() are recorded, for guides that learn from them
   bool waves = false;                ///< the last vertex of every path is recorded too, recorded or not
   bool silent_escapes = false;       ///< close_paths() lets paths escape of which nothing more was heard
+  std::uint32_t first_path = 0;      ///< index of path 0 among the paths of all ranks
 };
 
 namespace detail {
@@ -333,7 +334,7 @@ class path_recorder {
   /// A recorder without paths yet. Until the first begin_sample() it records all of `settings`' paths. Throws
   /// out_of_memory.
   path_recorder(const Exec& exec, const path_recorder_settings& settings)
-      : lengths_(exec, recorded_runs{settings.fraction_shift}.size(settings.paths)),
+      : lengths_(exec, runs_of(settings).capacity(settings.paths)),
         places_(exec, lengths_.size() * settings.max_depth),
         light_(exec, lengths_.size() * settings.max_depth),
         directions_(exec, settings.directions ? lengths_.size() * settings.max_depth : 0),
@@ -341,8 +342,8 @@ class path_recorder {
         counters_(exec, path_recorder_view::counters),
         wave_(exec, settings.waves ? settings.paths : 0) {
     view_.paths_ = settings.paths;
-    view_.recorded_ = lengths_.size();
-    view_.runs_.shift = settings.fraction_shift;
+    view_.runs_ = runs_of(settings);
+    view_.recorded_ = view_.runs_.size(settings.paths);
     view_.max_depth_ = settings.max_depth;
     view_.include_emission_ = settings.include_emission;
     view_.silent_escapes_ = settings.silent_escapes;
@@ -406,11 +407,19 @@ class path_recorder {
     return read_element(exec, counters_.data() + path_recorder_view::counter_gaps);
   }
 
+  /// The counters of dropped() and gaps(), in the policy's memory, for ranks to add up.
+  array_view<std::uint32_t> counters() const { return counters_.view(); }
+
   /// The last vertices of all paths; of no paths where the settings leave waves out.
   wave_recorder<Exec>& wave() { return wave_; }
 
  private:
   friend struct detail::state_access;
+
+  // All paths that may be recorded.
+  static recorded_runs runs_of(const path_recorder_settings& settings) {
+    return {settings.fraction_shift, 0, 0, settings.first_path};
+  }
 
   // What the view's pointers of these names point to, and the view itself.
   buffer<std::uint32_t, Exec> lengths_;

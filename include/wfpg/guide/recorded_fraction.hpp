@@ -1,7 +1,7 @@
 // Chooses how many paths of a sample are recorded, and in how many samples, from the number of values that a
 // guide wants.
 //
-// Source: wfpg's own. Cost: O(log(vertices / wanted)) on the host, once a guider. Memory: 24 bytes.
+// Source: wfpg's own. Cost: O(log(vertices / wanted)) on the host, once a guider. Memory: 40 bytes.
 #pragma once
 
 #include <wfpg/exec/support/value_queue.hpp>
@@ -21,7 +21,11 @@ class recorded_fraction {
  public:
   /// `wanted` is in vertices a sample; 0 records all paths of all samples.
   recorded_fraction(const sampling_options& o, std::uint64_t wanted)
-      : paths_(o.max_paths), depth_(o.max_depth), wanted_(wanted) {}
+      : paths_(o.max_paths),
+        first_(static_cast<std::uint32_t>(o.first_path)),
+        all_(all_paths_of(o)),
+        depth_(o.max_depth),
+        wanted_(wanted) {}
 
   /// What a guide's recording() returns. After warm-up a quarter of the vertices is enough, on average over
   /// samples. Then a recorded sample has as many as before, and the stride is 4. The stride is 2 or 1 where
@@ -32,34 +36,36 @@ class recorded_fraction {
     return {share, directions, 1u << (settled - share)};
   }
 
-  /// Most vertices that a recorded sample can have: the capacity of a value queue. Throws
+  /// Most vertices that this rank can have in a recorded sample: the capacity of a value queue. Throws
   /// std::invalid_argument above 2^31, the most that a queue holds; the message advises to set `options`.
   std::size_t vertices(const char* options) const {
     // Whole groups of runs are stored, so that this may exceed the fraction by a run.
-    const std::size_t count = recorded_runs{shift(wanted_)}.size(paths_) * depth_;
+    const std::size_t count = recorded_runs{shift(wanted_), 0, 0, first_}.size(paths_) * depth_;
     const std::string remedy = std::string("at most 2^31: set ") + options;
     require(count <= most_queued, "max_paths times max_depth, the vertices that are recorded,", count,
             remedy.c_str());
     return count;
   }
 
-  /// Most paths that a recorded sample can have.
+  /// Most paths that a recorded sample can have, on all ranks together.
   std::size_t paths() const { return part(0); }
-  /// Most paths of a sample that records one in 2^rarer of them.
-  std::size_t part(std::uint32_t rarer) const { return recorded_runs{shift(wanted_), 0, rarer}.size(paths_); }
+  /// Most paths of a sample that records one in 2^rarer of them, on all ranks together.
+  std::size_t part(std::uint32_t rarer) const { return recorded_runs{shift(wanted_), 0, rarer}.size(all_); }
 
  private:
   // A shift is log2 of a divisor: recorded_runs records so many paths fewer.
 
   /// Largest shift by which at least `wanted` of all vertices remain; 0 where `wanted` is 0.
   std::uint32_t shift(std::uint64_t wanted) const {
-    const std::uint64_t all = std::uint64_t(paths_) * depth_;
+    const std::uint64_t all = std::uint64_t(all_) * depth_;
     std::uint32_t result = 0;
     while (wanted > 0 && all >> (result + 1) >= wanted) ++result;
     return result;
   }
 
   std::size_t paths_;     ///< max_paths
+  std::uint32_t first_;   ///< first_path
+  std::size_t all_;       ///< paths of all ranks
   std::uint32_t depth_;   ///< max_depth
   std::uint64_t wanted_;  ///< vertices a sample
 };

@@ -13,6 +13,9 @@
 
 namespace wfpg {
 
+// In ranks/communicator.hpp, which adapters and guides include.
+class communicator;
+
 /// Options of guiding. path_guider's constructor checks the ranges and throws std::invalid_argument.
 struct sampling_options {
   /// Probability that the guide, not the BSDF, samples a direction; in (0, 1]. Unset: the guide's default, or
@@ -58,9 +61,24 @@ struct sampling_options {
   bool silent_escapes = false;
   /// Most rays of a wave, less than 2^32 - 1. Larger waves throw std::invalid_argument. Unset: max_paths.
   std::optional<std::size_t> max_rays;
+  /// Joins the ranks that learn one guide, each with a part of the paths of every sample. Null: this rank has
+  /// all paths. It must outlive the guider. Every rank makes the same samples and waves, waves without rays
+  /// too. A path has at most one ray in a wave. Surfaces tell their paths, or ray i is that of path i.
+  communicator* ranks = nullptr;
+  /// Index of this rank's path 0 among the paths of all ranks. The ranks' parts do not overlap. All paths
+  /// that the host tells of are numbered from 0 in its part. 0 without ranks.
+  std::size_t first_path = 0;
+  /// Paths of all ranks in a sample: first_path + max_paths or more, less than 2^31 / max_depth. 0:
+  /// max_paths.
+  std::size_t all_paths = 0;
 };
 
 namespace detail {
+
+/// Paths of a sample: those of all ranks.
+inline std::size_t all_paths_of(const sampling_options& o) {
+  return o.all_paths > 0 ? o.all_paths : o.max_paths;
+}
 
 /// Throws std::invalid_argument, which names the option and its range, where one is out of range.
 inline void require_valid(const sampling_options& o) {
@@ -76,6 +94,17 @@ inline void require_valid(const sampling_options& o) {
   require(rays < 0xffffffffull, "max_rays", rays, "less than 2^32 - 1");
   require(o.max_paths * o.max_depth < 0xffffffffull, "max_paths times max_depth, the vertices of a sample,",
           o.max_paths * o.max_depth, "less than 2^32 - 1");
+  if (!o.ranks) {
+    require(o.first_path == 0, "first_path", o.first_path, "0 without ranks");
+    return require(o.all_paths == 0 || o.all_paths == o.max_paths, "all_paths", o.all_paths,
+                   "max_paths without ranks");
+  }
+  require(o.max_paths >= 1, "max_paths", o.max_paths, "at least 1 with ranks");
+  const std::size_t all = all_paths_of(o);
+  require(o.first_path + o.max_paths <= all, "first_path plus max_paths", o.first_path + o.max_paths,
+          "at most all_paths");
+  require(all * o.max_depth < 0x80000000ull, "all_paths times max_depth", all * o.max_depth,
+          "less than 2^31");
 }
 
 }  // namespace detail

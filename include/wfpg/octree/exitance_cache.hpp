@@ -13,6 +13,7 @@
 #include <wfpg/base/types.hpp>
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/support/atomic.hpp>
+#include <wfpg/exec/support/rank_counters.hpp>
 #include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/exec/support/value_queue.hpp>
 #include <wfpg/octree/bottom_up.hpp>
@@ -179,16 +180,19 @@ class exitance_cache {
 
   /// Makes an empty cache over an octree that was just built from `fragments`, which the octree sorted.
   /// `queue_capacity` is the largest number of deposits between two updates. With 0 the cache takes no
-  /// deposits, only reads. Throws std::invalid_argument where the capacity is above 2³¹, or the octree has
-  /// 2³⁰ leaves or more. Throws out_of_memory. Precondition: the octree still has its leaf_fragment_begin().
+  /// deposits, only reads. `ranks`: update() folds the deposits of all ranks, which have equal caches. Throws
+  /// std::invalid_argument where the capacity is above 2³¹, or the octree has 2³⁰ leaves or more. Throws
+  /// out_of_memory. Precondition: the octree still has its leaf_fragment_begin().
   exitance_cache(const Exec& exec, const sparse_voxel_octree<Exec>& tree,
-                 const voxel_fragments<Exec>& fragments, std::size_t queue_capacity)
+                 const voxel_fragments<Exec>& fragments, std::size_t queue_capacity,
+                 communicator* ranks = nullptr)
       : normals_(exec, tree.node_count()),
         swapped_sides_(exec, tree.node_count() - checked_leaves(tree.leaf_count())),
         leaves_(exec, tree.leaf_count()),
         inner_radiance_(exec, 2 * std::size_t(tree.node_count() - tree.leaf_count())),
-        queue_(exec, checked(queue_capacity), 2 * std::size_t(tree.leaf_count())),
-        counters_(exec, exitance_cache_view::counters) {
+        queue_(exec, checked(queue_capacity), 2 * std::size_t(tree.leaf_count()), ranks),
+        counters_(exec, exitance_cache_view::counters),
+        shared_counters_(exec, ranks ? counters_.size() : 0) {
     view_.tree_ = tree.view();
     view_.normals_ = normals_.data();
     view_.leaves_ = leaves_.data();
@@ -210,7 +214,9 @@ class exitance_cache {
     return normals_.bytes() + swapped_sides_.bytes() + leaves_.bytes() + inner_radiance_.bytes();
   }
   /// Bytes of the queue and its counters, which are needed while a sample is in flight.
-  std::size_t transient_bytes() const { return queue_.bytes() + counters_.bytes(); }
+  std::size_t transient_bytes() const {
+    return queue_.bytes() + counters_.bytes() + shared_counters_.bytes();
+  }
 
   /// Forgets all radiance, and the deposits in the queue. Normals stay, and so do the counts of dropped
   /// deposits. O(nodes).
@@ -232,6 +238,14 @@ class exitance_cache {
     detail::for_each_bottom_up(exec, view_.tree_, 0, detail::average_children{view_, inner_radiance_.data()});
   }
 
+  /// Packed normal of each node, as the cache stores it, for ranks to compare. Equal scenes have equal ones.
+  /// Waits for the work before it.
+  std::vector<std::uint16_t> normals(const Exec& exec) const { return normals_.to_host(exec); }
+  /// Adds up the deposits that all ranks dropped, so that dropped() has the sum on each of them. 12 bytes of
+  /// traffic. Throws rank_error.
+  void sum_dropped(const Exec& exec, communicator& ranks) {
+    shared_counters_.sum(exec, ranks, detail::counters_in_a_row<std::uint32_t>{counters_.data()});
+  }
   /// Number of deposits dropped since the cache was built, by reason. It waits for the work before it.
   dropped_deposits dropped(const Exec& exec) const {
     // Three counters, read back in the order of the enumeration.
@@ -260,7 +274,8 @@ class exitance_cache {
   buffer<float, Exec> inner_radiance_;          ///< an inner node and side
   detail::value_queue<Exec> queue_;             ///< a leaf and side
   buffer<std::uint32_t, Exec> counters_;        ///< by reason
-  exitance_cache_view view_;                    ///< of the buffers above
+  detail::rank_counters<Exec, std::uint32_t> shared_counters_;  ///< of all ranks
+  exitance_cache_view view_;                                    ///< of the buffers above
 };
 
 }  // namespace wfpg

@@ -6,17 +6,24 @@
 // A thread that queues a value therefore touches no memory of its key.
 // Of 2²⁰ values, those down to 2⁻¹⁹ of their group's largest keep all 24 bits.
 // Below 2⁻⁴³ they count as 0.
+// Where several ranks share a sample, each queues the values of its paths.
+// sum() then gathers the values of all ranks, or adds up their sums, whichever is less.
+// Traffic: 8 bytes a value or 16 a key, 4 a group, and 4 a rank.
 // Source: sums of floats in fixed point, as in reproducible summation (Demmel and Nguyen 2013).
 // Cost: two atomics a value, one a reservation, and one where a value is its group's largest so far.
 // Memory: 8 bytes for each value of the capacity, 16 for each key, 8 for each group, and 4.
+// With ranks, 8 bytes for each value of a sample more.
 #pragma once
 
 #include <wfpg/base/math.hpp>
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/support/atomic.hpp>
 #include <wfpg/exec/support/thrust.hpp>
+#include <wfpg/ranks/communicator.hpp>
 
 #include <thrust/fill.h>
+
+#include <vector>
 
 namespace wfpg::detail {
 
@@ -112,26 +119,30 @@ class value_queue_view {
   WFPG_HD void drop(std::uint32_t entry) const { queue_[entry] = dropped; }
 
   /// Adds an entry to its key's sum.
-  /// Entries ahead are fetched, as they are scattered over the keys.
   /// Precondition: set_unit() was called for all groups.
-  WFPG_HD void add(std::uint32_t entry) const {
+  WFPG_HD void add(std::uint32_t entry) const { add(queue_, min(*queued_, capacity_), entry); }
+  /// Adds one of n entries that lie elsewhere, such as those of all ranks.
+  /// Entries ahead are fetched, as they are scattered over the keys.
+  WFPG_HD void add(const std::uint64_t* entries, std::uint32_t n, std::uint32_t entry) const {
     constexpr std::uint32_t ahead = 16;  // as many lines as a processor may wait for
-    if (entry + ahead < min(*queued_, capacity_) && queue_[entry + ahead] != dropped)
-      prefetch(pending_ + key_of(queue_[entry + ahead]));
-    if (queue_[entry] == dropped) return;
-    const std::uint32_t key = key_of(queue_[entry]);
+    if (entry + ahead < n && entries[entry + ahead] != dropped)
+      prefetch(pending_ + key_of(entries[entry + ahead]));
+    if (entries[entry] == dropped) return;
+    const std::uint32_t key = key_of(entries[entry]);
     pending_values& to = pending_[key];
-    atomic_add(&to.sum, unit_of(group_of(key)).term(bits_of_value(queue_[entry])));
+    atomic_add(&to.sum, unit_of(group_of(key)).term(bits_of_value(entries[entry])));
     atomic_add(&to.count, 1);
   }
   /// Chooses the unit of a group's sums, from the values in the queue.
   /// Sums that it has already are of a sum() that failed, or were never taken: they are forgotten.
   /// A group without values keeps its unit and its sums.
   /// One thread a group.
-  WFPG_HD void set_unit(std::size_t group) const {
+  WFPG_HD void set_unit(std::size_t group) const { set_unit(group, min(*queued_, capacity_)); }
+  /// Chooses a group's unit for n values, which may be those of all ranks.
+  WFPG_HD void set_unit(std::size_t group, std::uint32_t n) const {
     if (largest_[group] == 0) return;
     if (units_[group] != 0) forget(group);
-    units_[group] = exact_sum(largest_[group] - 1, min(*queued_, capacity_)).code();
+    units_[group] = exact_sum(largest_[group] - 1, n).code();
   }
   /// Whether one of n > 0 keys may have a sum that is not taken. O(n / 512).
   /// Groups are asked: values of neighbouring keys count, too.
@@ -214,13 +225,16 @@ class value_queue {
   /// Room for `capacity` values between two sums, at most 2³¹, and for keys below `keys`.
   /// Precondition: keys < 2³² - 1.
   /// Without capacity it takes 4 bytes.
+  /// `ranks`: sums are of the values of all ranks, which have as many keys; null: of this queue's.
   /// Throws out_of_memory.
-  value_queue(const Exec& exec, std::size_t capacity, std::size_t keys)
-      : queue_(exec, capacity),
+  value_queue(const Exec& exec, std::size_t capacity, std::size_t keys, communicator* ranks = nullptr)
+      : ranks_(ranks),
+        queue_(exec, capacity),
         pending_(exec, capacity > 0 ? keys : 0),
         largest_(exec, value_queue_view::groups(pending_.size())),
         units_(exec, largest_.size()),
-        queued_(exec, 1) {
+        queued_(exec, 1),
+        counts_(exec, ranks ? ranks->size() : 0) {
     view_.queue_ = queue_.data();
     view_.pending_ = pending_.data();
     view_.largest_ = largest_.data();
@@ -238,7 +252,8 @@ class value_queue {
   std::size_t capacity() const { return queue_.size(); }
   /// Returns the memory in use, bytes.
   std::size_t bytes() const {
-    return queue_.bytes() + pending_.bytes() + largest_.bytes() + units_.bytes() + queued_.bytes();
+    return queue_.bytes() + pending_.bytes() + largest_.bytes() + units_.bytes() + queued_.bytes() +
+           counts_.bytes() + entries_.bytes();
   }
 
   /// Forgets all values, those that are summed and not yet taken included. O(keys).
@@ -251,8 +266,11 @@ class value_queue {
   /// Adds the queued values to their keys' sums, for take(), and empties the queue.
   /// O(values + keys / 512).
   /// May be called again where it failed.
+  /// With ranks, all of them call it. It waits for the work before, and throws rank_error, and
+  /// std::invalid_argument above 2³¹ values.
   /// Call end_takes() before the next one: sums that are left are forgotten with their group.
   void sum(const Exec& exec) {
+    if (ranks_) return sum_of_ranks(exec);
     exec.for_each(units_.size(), set_group_unit{view_});
     exec.for_each(exec::device_count{queued_.data(), queue_.size()}, add_queued_values{view_});
     empty(exec);
@@ -261,17 +279,28 @@ class value_queue {
   void end_takes(const Exec& exec) { exec.fill_bytes(units_.data(), 0, units_.bytes()); }
 
  private:
+  /// Adds the entries of all ranks to their keys' sums.
+  void sum_of_ranks(const Exec& exec);
+  /// Adds up the ranks' own sums. Less is sent so where there are more than two values a key.
+  void add_sums(const Exec& exec);
+  /// Adds `all` values of all ranks. This rank's n values begin at `first`.
+  void gather(const Exec& exec, std::uint32_t first, std::uint32_t n, std::uint32_t all);
   void empty(const Exec& exec) {
     exec.fill_bytes(largest_.data(), 0, largest_.bytes());
     // Should this fail, a repeated sum adds and counts all values twice, which leaves their means.
     ::thrust::fill_n(exec.thrust(), queued_.data(), queued_.size(), 0u);
   }
 
+  communicator* ranks_ = nullptr;
   buffer<std::uint64_t, Exec> queue_;
   buffer<pending_values, Exec> pending_;         // a key
   buffer<std::uint32_t, Exec> largest_, units_;  // a group
   buffer<std::uint32_t, Exec> queued_;
+  buffer<std::uint32_t, Exec> counts_;   // a rank: its values
+  buffer<std::uint64_t, Exec> entries_;  // values of all ranks; as many as a sample had
   value_queue_view view_;
 };
 
 }  // namespace wfpg::detail
+
+#include <wfpg/exec/detail/value_queue_impl.hpp>

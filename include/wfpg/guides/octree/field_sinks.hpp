@@ -56,7 +56,7 @@ struct transient_sink {
   /// local memory. All threads of the block call it.
   template <class Block>
   WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field) const {
-    const float share = fraction(bins.size(bin));
+    const float share = fraction(bins.rays(bin));
     const std::uint32_t* const rays = bins.permutation.data() + bins.begin(bin);
     const std::uint32_t* const sums = sum_blocks(block, field.grid());
     block.for_each(static_cast<int>(bins.size(bin)), [&](int i) {
@@ -114,7 +114,7 @@ struct resident_sink {
   WFPG_HD void finish(Block& block, std::size_t bin, const directional_field& field) const {
     const std::uint32_t begin = bins.begin(bin);
     block.for_each(static_cast<int>(bins.size(bin)), [&](int i) {
-      if (i == 0) fields[bin] = {field.hemisphere() ? field.normal() : vec3(0.0f), fraction(bins.size(bin))};
+      if (i == 0) fields[bin] = {field.hemisphere() ? field.normal() : vec3(0.0f), fraction(bins.rays(bin))};
       field_of_ray[bins.permutation[begin + static_cast<std::uint32_t>(i)]] = static_cast<std::uint32_t>(bin);
     });
   }

@@ -19,11 +19,14 @@
 #include <wfpg/guides/octree/build_schedule.hpp>
 #include <wfpg/guides/octree/detail/bin_marks.hpp>
 #include <wfpg/guides/octree/detail/field_pool.hpp>
+#include <wfpg/guides/octree/detail/field_ranks.hpp>
+#include <wfpg/guides/octree/detail/rank_builds.hpp>
 #include <wfpg/guides/octree/detail/slot_table.hpp>
 #include <wfpg/guides/octree/guide_view.hpp>
 #include <wfpg/guides/octree/kept_field.hpp>
 #include <wfpg/guides/octree/options.hpp>
 
+#include <optional>
 #include <vector>
 
 namespace wfpg {
@@ -44,6 +47,8 @@ struct kept_field_wave {
   depth_statistics* statistics = nullptr;
   bool learns_fraction = true;      ///< fields keep what they learnt of it; false: they have `fraction`
   recorded_runs guided_paths = {};  ///< rays of other paths get no field
+  /// Index of path 0 among the paths of all ranks; no_path without ranks.
+  std::uint32_t first_path = no_path;
 };
 
 /// Owns the slots, in the memory of `Exec`. The octree must outlive it. Results do not depend on the number
@@ -54,12 +59,14 @@ class field_store {
   /// An empty store, which can only be assigned to.
   field_store() = default;
   /// Makes a store for waves of up to `max_rays` rays over one octree. Fields learn up to `max_values` values
-  /// in a sample, at most 2^31; 0: they do not learn.
+  /// in a sample, at most 2^31; 0: they do not learn. `ranks`: joins ranks with equal stores over the rays of
+  /// all of them, `max_rays` in a wave; null: this is the only one. `own_rays`: this rank's part of max_rays.
   ///
   /// Throws out_of_memory. Throws std::invalid_argument where an option is out of its range, or the octree
   /// has 2^28 nodes or more.
   field_store(const Exec& exec, const sparse_voxel_octree_view& tree, const binning_options& binning,
-              const kept_field_options& options, std::size_t max_rays, std::size_t max_values = 0);
+              const kept_field_options& options, std::size_t max_rays, std::size_t max_values = 0,
+              communicator* ranks = nullptr, std::optional<std::size_t> own_rays = {});
 
   /// Begins a sample, counted from 1. Frees the slots that no ray used for idle_samples samples. O(slots).
   void begin_sample(const Exec& exec, std::uint32_t sample);
@@ -137,7 +144,9 @@ class field_store {
   /// Bytes of running ray counts and of each leaf's bin.
   std::size_t level_bytes() const { return marks_.bytes(); }
   /// Bytes needed while a wave is in flight: 4 a ray, and counters.
-  std::size_t wave_bytes() const { return field_of_ray_.bytes() + counts_.bytes() + table_.state_bytes(); }
+  std::size_t wave_bytes() const {
+    return field_of_ray_.bytes() + counts_.bytes() + table_.state_bytes() + ranks_.bytes();
+  }
   /// Bytes of the queue of values that one sample learns; 0 where fields do not learn.
   std::size_t value_bytes() const { return pool_.value_bytes(); }
 
@@ -153,7 +162,8 @@ class field_store {
 
   static const kept_field_options& checked(const kept_field_options& options, std::uint32_t nodes);
   static kept_field_options completed(kept_field_options options, std::size_t max_values);
-  bool limits_builds() const { return options_.max_wave_cones != detail::build_limits::none; }
+  // Whether builds are chosen among slots that rays mark. Ranks do so, to list equal builds in equal order.
+  bool chooses_builds() const { return ranks_ || options_.max_wave_cones != detail::build_limits::none; }
   // Of the wave that is made, and of the one before or after it.
   field_wave_counts* counts() { return counts_.data() + schedule_.wave() % 2; }
   field_wave_counts* other_counts() const { return counts_.data() + (schedule_.wave() + 1) % 2; }
@@ -168,9 +178,19 @@ class field_store {
   detail::find_field<wave_rays<Surfaces>> finder(const kept_field_wave<Surfaces>& wave,
                                                  detail::wanted_builds wanted_now);
   template <class Surfaces>
+  wave_rays<Surfaces> rays_of(const kept_field_wave<Surfaces>& wave) const {
+    return {wave.surfaces, wave.mode, wave.guided_paths, wave.first_path};
+  }
+  template <class Surfaces>
   void find(const Exec& exec, const kept_field_wave<Surfaces>& wave);
   template <class Builder, class Caster>
   void build(const Exec& exec, const Builder& builder, const Caster& caster, std::size_t buffer_bytes);
+  template <class Builder, class Caster>
+  void build_of_ranks(const Exec& exec, const Builder& builder, const Caster& caster,
+                      std::size_t buffer_bytes);
+  template <class Builder, class Caster>
+  void cast_part(const Exec& exec, const Builder& builder, const Caster& caster, std::size_t buffer_bytes,
+                 bool whole, cone_hit* found);
   template <class Builder, class Caster>
   void build_batches(const Exec& exec, const Builder& builder, const Caster& caster, bool whole,
                      std::size_t count, array_view<ray> cones, array_view<ray_hit> hits);
@@ -181,6 +201,7 @@ class field_store {
   detail::bin_marks<Exec> marks_;
   detail::slot_table<Exec> table_;
   detail::field_pool<Exec> pool_;
+  detail::field_ranks<Exec> ranks_;
   buffer<std::uint32_t, Exec> field_of_ray_;
   buffer<field_wave_counts, Exec> counts_;
   bool in_wave_ = false;            // also after one whose caster threw

@@ -10,7 +10,10 @@
 // kinds of paths show where unguided ones miss light: a path counts 8 at most.
 //
 // Source: wfpg's own. Cost: a look-up and O(vertices) a path, over at most 65,536 paths, and a reduction.
-// Memory: 28 bytes a path, at most 1.75 MiB.
+// Memory: 28 bytes a path, at most 1.75 MiB. With ranks 12 a path more.
+//
+// With ranks, each has a part of the compared paths, and all keep all of them. Traffic: 12 bytes a path of
+// the first unguided sample, and 4 of others that are compared.
 #pragma once
 
 #include <wfpg/exec/buffer.hpp>
@@ -18,6 +21,7 @@
 #include <wfpg/guide/statistics.hpp>
 #include <wfpg/guides/octree/detail/gain_kernels.hpp>
 #include <wfpg/octree/exitance_cache.hpp>
+#include <wfpg/ranks/communicator.hpp>
 
 namespace wfpg {
 
@@ -41,8 +45,9 @@ class gain_meter {
 
   /// A meter of no paths, whose gain is never known.
   gain_meter() = default;
-  /// A meter for up to `paths` paths to compare. With 0, gains are never known. Throws out_of_memory.
-  gain_meter(const Exec& exec, std::size_t paths);
+  /// A meter for up to `paths` paths to compare. With 0, gains are never known. `ranks`: each has a part of
+  /// these paths. Throws out_of_memory.
+  gain_meter(const Exec& exec, std::size_t paths, communicator* ranks = nullptr);
 
   /// Keeps what the recorded paths of an unguided sample brought. `number`: that sample's among unguided
   /// ones, less than rest_constants::most_unguided. 0: all that was kept is forgotten. Call it before the
@@ -59,8 +64,8 @@ class gain_meter {
   void forget(const Exec& exec);
   /// Most paths to compare.
   std::size_t size() const { return kept_.size(); }
-  /// Bytes in the policy's memory: 28 a path.
-  std::size_t bytes() const { return kept_.bytes(); }
+  /// Bytes in the policy's memory: 28 a path, and 12 more with ranks.
+  std::size_t bytes() const { return kept_.bytes() + words_.bytes() + sums_.bytes(); }
 
  private:
   friend struct detail::guide_sections;
@@ -70,10 +75,20 @@ class gain_meter {
   // Sum of what measure(i) adds, for i in [0, n).
   template <class Measure>
   static detail::path_sums sum(const Exec& exec, std::size_t n, const Measure& measure);
+  // Keeps what paths brought in earlier_paths::radiance(number).
+  void keep(const Exec& exec, const detail::measured_paths& paths, std::uint32_t number);
+  // Keeps what the paths of all ranks brought.
+  void keep_of_ranks(const Exec& exec, const detail::measured_paths& paths, std::uint32_t number);
   // Number of paths, for which there is room.
-  std::size_t count(const detail::measured_paths& paths) const { return min(paths.size(), kept_.size()); }
+  std::size_t count(const detail::measured_paths& paths) const {
+    const std::size_t first = paths.compared.first_place();
+    return first < kept_.size() ? min(paths.size(), kept_.size() - first) : 0;
+  }
 
-  buffer<detail::earlier_paths, Exec> kept_;  // a measured path
+  communicator* ranks_ = nullptr;
+  buffer<detail::earlier_paths, Exec> kept_;  // a measured path, of all ranks
+  buffer<std::uint32_t, Exec> words_;         // 3 a measured path, with ranks
+  buffer<std::uint64_t, Exec> sums_;          // path_sums, with ranks
 };
 
 }  // namespace wfpg

@@ -10,6 +10,7 @@
 #include <wfpg/exec/support/atomic.hpp>
 #include <wfpg/exec/support/running_mean.hpp>
 #include <wfpg/guide/statistics.hpp>
+#include <wfpg/guides/octree/detail/shared_origins.hpp>
 #include <wfpg/guides/octree/field_cells.hpp>
 #include <wfpg/guides/octree/field_slots.hpp>
 #include <wfpg/guides/octree/guide_view.hpp>
@@ -41,17 +42,18 @@ WFPG_HD constexpr std::uint32_t refreshed_cell(std::uint32_t cone, std::uint32_t
 
 /// Memory of all kept fields, as the kernels that build them see it. Trivially copyable.
 struct kept_fields_view {
-  field_slots_view slots;      ///< state of each slot
-  resident_field* fields;      ///< a slot: normal and fractions
-  std::uint32_t* words;        ///< a slot: its distribution
-  cone_hit* hits;              ///< a slot: F² hits in row-major order
-  stochastic_mean16* learnt;   ///< a slot: F² means of what paths found; null: fields do not learn
-  field_fractions* fractions;  ///< a slot: what its fractions learn; null: fields do not learn
-  float cone_samples;          ///< samples that a cone counts as, beside learnt values; positive
-  std::uint32_t resolution;    ///< F: cells along a side
-  std::uint32_t recast;        ///< R: a refresh casts one of R cells
-  std::uint32_t sample;        ///< current sample, from 1
-  std::uint64_t* refreshed;    ///< counter of refreshes: builds that cast a part of the cells
+  field_slots_view slots;               ///< state of each slot
+  resident_field* fields;               ///< a slot: normal and fractions
+  std::uint32_t* words;                 ///< a slot: its distribution
+  cone_hit* hits;                       ///< a slot: F² hits in row-major order
+  stochastic_mean16* learnt;            ///< a slot: F² means of what paths found; null: fields do not learn
+  field_fractions* fractions;           ///< a slot: what its fractions learn; null: fields do not learn
+  float cone_samples;                   ///< samples that a cone counts as, beside learnt values; positive
+  std::uint32_t resolution;             ///< F: cells along a side
+  std::uint32_t recast;                 ///< R: a refresh casts one of R cells
+  std::uint32_t sample;                 ///< current sample, from 1
+  std::uint64_t* refreshed;             ///< counter of refreshes: builds that cast a part of the cells
+  detail::shared_origins origins = {};  ///< where builds start, with ranks
 };
 
 /// Builds the fields of slots for a wave's rays. `Wave`: kept_field_wave.
@@ -74,14 +76,21 @@ struct kept_field_builder {
 
   /// Returns where the cones of a build start. They start at the surface of the ray that the wave picked for
   /// the slot. A refresh keeps the normal of the first build, since the stored cells lie in its frame.
-  /// Precondition: the slot's origin is a ray of the wave.
+  /// Precondition: the slot's origin is a ray of the wave, or kept.origins has it.
   WFPG_HD field_cells cells(std::uint32_t slot, bool whole) const {
     const field_slot& state = kept.slots.slots[slot];
-    const auto s = wave.surfaces(static_cast<std::uint32_t>(state.origin));
-    field_origin origin = origin_at(s, wave.cache.octree(), wave.mode, state.key % orientations,
-                                    static_cast<std::uint32_t>(hash(wave.seed, state.key)));
+    field_origin origin = kept.origins.empty()
+                              ? origin_of(static_cast<std::uint32_t>(state.origin), state.key)
+                              : kept.origins.get(slot, seed_of(state.key));
     if (!whole) origin.normal = kept.fields[slot].normal;
     return {origin, kept.resolution};
+  }
+
+  /// Returns where a field of a key starts, if it starts at the surface of a ray of the wave. With ranks, the
+  /// one that has the ray tells it to the others. Another rank has no such ray, or another one of that
+  /// number. O(1).
+  WFPG_HD field_origin origin_of(std::uint32_t ray, std::uint32_t key) const {
+    return origin_at(wave.surfaces(ray), wave.cache.octree(), wave.mode, key % orientations, seed_of(key));
   }
 
   /// Makes the distribution from all F² cells. A cell's value mixes two sources: the radiance that the cache
@@ -118,6 +127,11 @@ struct kept_field_builder {
   }
 
  private:
+  // Seed of the jitter of a field's cones: it differs between samples, depths and fields, and not between
+  // ranks.
+  WFPG_HD std::uint32_t seed_of(std::uint32_t key) const {
+    return static_cast<std::uint32_t>(hash(wave.seed, key));
+  }
   /// Radiance of one cell of the pool, `cell` = slot * F² + row-major index. The cone counts as
   /// `cone_samples` values beside the learnt ones.
   WFPG_HD float radiance_of(std::size_t cell, bool whole) const {

@@ -46,8 +46,26 @@ class kept_guide : public octree_scene<Exec> {
              const kept_guide_options& options)
       : scene(exec, working, std::move(fragments), checked(options)),
         options_(options),
-        store_(working, scene::octree().view(), options.binning, options.kept,
-               options.max_rays.value_or(options.max_paths), scene::deposits_of_sample()) {}
+        store_(working, scene::octree().view(), options.binning, options.kept, scene::rays_of_ranks(),
+               scene::deposits_of_sample(), options.ranks, options.max_rays.value_or(options.max_paths)) {}
+
+  /// Ranks that share a sample keep equal fields. A wave that builds exchanges up to 16 KiB, 8 bytes a slot
+  /// and 28 a build. A sample's end exchanges 4 bytes a slot, and up to 60 more where paths are recorded.
+  /// Each rank casts a part of the cones, and they exchange 4 bytes a cone.
+  static constexpr bool joins_ranks = true;
+  /// Adds the scene and the options that decide what is learnt, for ranks to compare. Every option that
+  /// changes what a guide learns belongs here: ranks that differ in it would learn different guides, and
+  /// nothing else would notice. Waits for the work before it.
+  void agree(const Exec& exec, agreed_items& items) const {
+    scene::agree_scene(exec, items);
+    items.add("kept.resolution", std::uint64_t(options_.kept.resolution));
+    items.add("kept.budget_bytes", std::uint64_t(options_.kept.budget_bytes));
+    items.add("kept.recast", std::uint64_t(options_.kept.recast));
+    items.add("kept.idle_samples", std::uint64_t(options_.kept.idle_samples));
+    items.add("kept.max_wave_cones", options_.kept.max_wave_cones);
+    items.add("kept.learn", std::uint64_t(options_.kept.learn));
+    items.add("kept.cone_samples", options_.kept.cone_samples);
+  }
 
   /// Which fraction of paths is recorded, by deposits_per_leaf. Directions are recorded where fields learn,
   /// at 9 bytes a vertex.
@@ -152,7 +170,8 @@ class kept_guide : public octree_scene<Exec> {
             scene::draw_points(at, w.depth),
             scene::depth_counts(w.depth),
             learns_fractions(),
-            at.guided_paths};
+            at.guided_paths,
+            scene::first_path()};
   }
   // `FieldSampler`: sample_field or sample_product, over `Sampler`.
   template <class FieldSampler, class Surfaces, class Random, class Caster, class Sampler>
@@ -161,7 +180,8 @@ class kept_guide : public octree_scene<Exec> {
 
   // As given to the constructor; the base has the part that both guides share.
   kept_guide_options options_;
-  // Refers to the octree in the base class.
+  // Refers to the octree in the base class. With ranks it is equal on all of them after each sample.
+  // Between two samples' ends it may differ in the slots' last use.
   field_store<Exec> store_;
 };
 

@@ -120,10 +120,14 @@ class light_guide {
   /// Makes a guide over an octree, which must outlive it. A sample has `paths` paths with up to `depth`
   /// choices each. It records at most about 64 of them for each of the deepest rows.
   ///
+  /// `ranks`: each has `own_paths` of these paths, the first of which is `first_path`, and all learn from
+  /// all.
+  ///
   /// Without weights or octree the guide is empty. Throws std::invalid_argument for options out of range, or
   /// too many rows times groups. Throws out_of_memory.
   light_guide(const Exec& exec, const sparse_voxel_octree_view& tree, const light_guide_options& options,
-              std::size_t paths, std::uint32_t depth);
+              std::size_t paths, std::uint32_t depth, communicator* ranks = nullptr,
+              std::size_t own_paths = 0, std::uint32_t first_path = 0);
 
   /// What the kernels of the current sample use.
   light_guide_view view() const { return view_; }

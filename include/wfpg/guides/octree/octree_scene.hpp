@@ -11,13 +11,16 @@
 #include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/guide/guide.hpp>
 #include <wfpg/guide/path_recorder.hpp>
+#include <wfpg/guide/rank_agreement.hpp>
 #include <wfpg/guide/recorded_fraction.hpp>
 #include <wfpg/guides/octree/deposit_paths.hpp>
+#include <wfpg/guides/octree/detail/rays_of_depth.hpp>
 #include <wfpg/guides/octree/field_sinks.hpp>
 #include <wfpg/guides/octree/gain_meter.hpp>
 #include <wfpg/guides/octree/light_guide.hpp>
 #include <wfpg/guides/octree/options.hpp>
 #include <wfpg/octree/exitance_cache.hpp>
+#include <wfpg/octree/leaf_codes.hpp>
 #include <wfpg/octree/sparse_voxel_octree.hpp>
 #include <wfpg/octree/voxelizer.hpp>
 #include <wfpg/sampling/product_sampler.hpp>
@@ -50,7 +53,9 @@ class octree_scene : public guide_base {
   /// Whether samples are compared. Not where a host deposits by itself: a guide that rests reads no deposits.
   bool measures() const { return meter_.size() >= guiding_gain::least_paths && !empty(); }
   /// log2 of the number of recorded paths of which one is compared.
-  std::uint32_t rarer() const { return gain_meter<Exec>::rarer(recorded().paths(), options_.max_paths); }
+  std::uint32_t rarer() const {
+    return gain_meter<Exec>::rarer(recorded().paths(), detail::all_paths_of(options_));
+  }
   /// Keeps what the paths of an unguided sample brought. `number`: among unguided ones, from 0. O(compared
   /// paths).
   void keep_unguided(const Exec& exec, const path_recorder<Exec>& paths, const recorded_runs& compared,
@@ -88,6 +93,18 @@ class octree_scene : public guide_base {
                                             const octree_guide_options& options) {
     require_valid(options);
     return voxelize(exec, mesh, options.octree_resolution);
+  }
+  /// Adds the octree, normals and the options that decide what is learnt, for ranks to compare.
+  /// O(nodes) on the host. Waits for the work before it.
+  void agree_scene(const Exec& exec, agreed_items& items) const;
+  /// Index of this rank's path 0 among all paths; no_path without ranks.
+  std::uint32_t first_path() const {
+    return options_.ranks ? static_cast<std::uint32_t>(options_.first_path) : no_path;
+  }
+  /// Most rays of a wave: with ranks the sum over all of them. What depends on the size of waves depends on
+  /// this one, so that it is equal for any number of ranks.
+  std::size_t rays_of_ranks() const {
+    return options_.ranks ? detail::all_paths_of(options_) : options_.max_rays.value_or(options_.max_paths);
   }
   /// P of the options' products; 0: none.
   static std::uint32_t product_resolution(const octree_guide_options& options) {
@@ -142,6 +159,7 @@ class octree_scene : public guide_base {
   void end_scene_sample(const sample_context<Exec>& at) {
     lights_.end_sample(at.exec);
     has_deposits_ = false;
+    if (options_.ranks) sum_counts(at.exec);
   }
   /// Forgets all cached light and all that light choices learnt. Deposits that are queued are lost too. The
   /// octree stays. For scenes whose lights moved.
@@ -165,6 +183,12 @@ class octree_scene : public guide_base {
  private:
   friend struct detail::guide_sections;
 
+  // Adds up what the ranks counted, for statistics and files. Without it a file would have one rank's counts
+  // of rays and dropped deposits. All else in it is exchanged where it is learnt.
+  void sum_counts(const Exec& exec) {
+    cache_.sum_dropped(exec, *options_.ranks);
+    shared_counts_.sum(exec, *options_.ranks, detail::rays_of_depth{counts_.data()});
+  }
   // `deposits_per_leaf` times the leaves: vertices that a sample is to record, 0 for all.
   detail::recorded_fraction recorded() const {
     return {options_, std::uint64_t(options_.deposits_per_leaf.value_or(0)) * octree_.leaf_count()};
@@ -184,6 +208,9 @@ class octree_scene : public guide_base {
   buffer<product_point, Exec> product_points_;  // P² over the hemisphere, then P² over the sphere
   // One element a depth, since the guide was made.
   buffer<depth_statistics, Exec> counts_;  // a depth, at most max_depth
+  // With ranks: rays and unbinned rays of each depth. Bins and cones are equal on all ranks, since each makes
+  // all fields.
+  detail::rank_counters<Exec, std::uint64_t> shared_counts_;
   // Whether paths were deposited since the last update that was completed.
   bool has_deposits_ = false;
 };

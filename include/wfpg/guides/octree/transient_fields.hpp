@@ -9,6 +9,7 @@
 
 #include <wfpg/bins/spatial_binner.hpp>
 #include <wfpg/exec/buffer.hpp>
+#include <wfpg/guides/octree/detail/bin_ranks.hpp>
 #include <wfpg/guides/octree/field_cells.hpp>
 
 namespace wfpg {
@@ -22,21 +23,30 @@ namespace wfpg {
 ///             scratch_bytes(): bytes that both take
 template <class Surfaces>
 struct bin_fields {
-  bins_view bins;             ///< the wave's bins; a field each
-  Surfaces surfaces;          ///< where the wave's rays are
-  exitance_cache_view cache;  ///< read by cones
-  field_options options;      ///< filter and floor
-  guiding_mode mode;          ///< decides between hemispheres and spheres
-  std::uint32_t resolution;   ///< F: cells along a field's side
-  std::uint64_t seed;         ///< of the sample and depth
+  bins_view bins;                  ///< the wave's bins; a field each
+  Surfaces surfaces;               ///< where the wave's rays are
+  exitance_cache_view cache;       ///< read by cones
+  field_options options;           ///< filter and floor
+  guiding_mode mode;               ///< decides between hemispheres and spheres
+  std::uint32_t resolution;        ///< F: cells along a field's side
+  std::uint64_t seed;              ///< of the sample and depth
+  detail::shared_bins ranks = {};  ///< where fields start, with ranks
 
   /// Origin of a bin's field: the surface of one of its rays, drawn uniformly anew for each sample and depth.
-  /// Over samples the cones so start from all over the bin. Precondition: the bin has a ray. O(1).
+  /// Over samples the cones so start from all over the bin. With ranks, the ray is one of all ranks'.
+  /// Precondition: the bin has a ray. O(1).
   WFPG_HD field_origin origin(std::size_t bin) const {
     const std::uint64_t bits = hash(seed, bins.key(bin));
+    if (!ranks.empty()) return ranks.origin(bin, static_cast<std::uint32_t>(hash(bits, 1)));
     const std::uint64_t rank = (bits >> 32) * bins.size(bin) >> 32;
-    return origin_at(surfaces(bins.permutation[bins.begin(bin) + rank]), cache.octree(), mode,
-                     bins.orientation(bin), static_cast<std::uint32_t>(hash(bits, 1)));
+    return origin_of(bin, bins.permutation[bins.begin(bin) + rank]);
+  }
+  /// Origin of a bin's field, if it starts at the surface of one of its rays. With ranks, the one that has
+  /// the ray tells it to the others. `ray`: index in the wave. O(1).
+  WFPG_HD field_origin origin_of(std::size_t bin, std::uint32_t ray) const {
+    const std::uint64_t bits = hash(seed, bins.key(bin));
+    return origin_at(surfaces(ray), cache.octree(), mode, bins.orientation(bin),
+                     static_cast<std::uint32_t>(hash(bits, 1)));
   }
 
   /// Casts the F² cones of one bin, makes the distribution, and calls sink.finish(). Each thread casts a cone

@@ -23,12 +23,13 @@ namespace detail {
 struct add_counts {
   bins_view bins;                 ///< the wave's bins
   const std::uint32_t* unbinned;  ///< rays outside every voxel
+  const std::uint32_t* of_ranks;  ///< bins of all ranks; null without ranks
   std::uint32_t cells;            ///< cones a bin
   depth_statistics* sums;         ///< of the wave's depth
   WFPG_HD void operator()(std::size_t) const {
-    const std::uint32_t n = *bins.count;
+    const std::uint32_t n = of_ranks ? *of_ranks : *bins.count;
     sums->bins += n;
-    sums->rays += bins.offsets[n];
+    sums->rays += bins.offsets[*bins.count];
     sums->unbinned += *unbinned;
     sums->cones += std::uint64_t(n) * cells;
   }
@@ -64,7 +65,18 @@ class transient_guide : public octree_scene<Exec> {
       : scene(exec, working, std::move(fragments), checked(options)),
         options_(options),
         max_rays_(options.max_rays.value_or(options.max_paths)),
-        binner_(working, scene::octree().view(), options.binning, max_rays_) {}
+        binner_(working, scene::octree().view(), options.binning, max_rays_),
+        ranks_(working, max_rays_, options.ranks) {}
+
+  /// Ranks that share a sample make equal fields, each for the bins of its rays. A guided wave exchanges 4
+  /// bytes a leaf, and 48 for each bin of each rank.
+  static constexpr bool joins_ranks = true;
+  /// Adds the scene and the options that decide what is learnt, for ranks to compare.
+  void agree(const Exec& exec, agreed_items& items) const {
+    scene::agree_scene(exec, items);
+    items.add("field_resolution", std::uint64_t(options_.field_resolution));
+    items.add("min_field_resolution", std::uint64_t(options_.min_field_resolution));
+  }
 
   /// Which fraction of paths is recorded, by deposits_per_leaf. Directions are not recorded, since fields do
   /// not learn.
@@ -110,7 +122,7 @@ class transient_guide : public octree_scene<Exec> {
   }
   /// Bytes of octree, cache and lights, and of what a sample needs.
   std::vector<memory_part> memory() const {
-    return scene::scene_memory({}, 0, binner_.bytes(),
+    return scene::scene_memory({}, 0, binner_.bytes() + ranks_.bytes(),
                                resident_words_.bytes() + resident_fields_.bytes() + field_of_ray_.bytes());
   }
 
@@ -139,6 +151,7 @@ class transient_guide : public octree_scene<Exec> {
   // Rays of a wave, at most.
   std::size_t max_rays_;
   spatial_binner<Exec> binner_;
+  detail::bin_ranks<Exec> ranks_;
   // Fields that prepare() makes: empty until it is called. They only grow.
   buffer<std::uint32_t, Exec> resident_words_;
   buffer<resident_field, Exec> resident_fields_;

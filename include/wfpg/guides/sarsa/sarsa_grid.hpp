@@ -20,6 +20,7 @@
 #include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/guide/guide.hpp>
 #include <wfpg/guide/path_recorder.hpp>
+#include <wfpg/guide/rank_agreement.hpp>
 #include <wfpg/guide/recorded_fraction.hpp>
 #include <wfpg/guide/sample_rays.hpp>
 #include <wfpg/guides/sarsa/detail/sarsa_learning.hpp>
@@ -115,6 +116,12 @@ class sarsa_grid : public guide_base {
   /// A grid over `bounds`, world space. Positions beyond belong to the cells at the bounds' faces. If the
   /// bounds are empty, all positions belong to the first cell.
   sarsa_grid(const Exec& exec, const Exec& working, const bounds3& bounds, const sarsa_grid_options& options);
+
+  /// Ranks that share a sample learn equal means. They exchange 8 bytes a value of a recorded sample, or 16 a
+  /// direction of the grid where that is less. Expected SARSA is refused: its numbers depend on waves.
+  static constexpr bool joins_ranks = true;
+  /// Adds the bounds and the options that decide what is learnt, for ranks to compare.
+  void agree(const Exec&, agreed_items& items) const;
 
   /// Vertices and directions, of a fraction of the paths that values_per_direction sets.
   recording_needs recording() const { return recorded().needs(true); }

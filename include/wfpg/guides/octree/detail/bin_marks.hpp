@@ -10,6 +10,7 @@
 #include <wfpg/bins/marking.hpp>
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/support/atomic.hpp>
+#include <wfpg/exec/support/rank_counters.hpp>
 #include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/guides/octree/build_schedule.hpp>
 #include <wfpg/octree/bottom_up.hpp>
@@ -47,6 +48,12 @@ struct bin_marks_view {
     std::uint32_t* const rays = &leaves[leaf - first_leaf].rays;
     if (atomic_load(rays) < most) atomic_add(rays, n);
   }
+};
+
+/// The ray count of leaf i, for rank_counters.
+struct leaf_ray_count {
+  leaf_mark* leaves;
+  WFPG_HD std::uint32_t& operator()(std::size_t i) const { return leaves[i].rays; }
 };
 
 /// Kernel: sets an inner node's count to the sum of its children's.
@@ -101,8 +108,14 @@ template <class Exec>
 class bin_marks {
  public:
   bin_marks() = default;
-  bin_marks(const Exec& exec, const sparse_voxel_octree_view& tree, const binning_options& options)
-      : tree_(tree), options_(options), leaves_(exec, tree.leaf_count()), inner_(exec, tree.first_leaf()) {
+  /// `has_ranks`: sum_ranks() will be called.
+  bin_marks(const Exec& exec, const sparse_voxel_octree_view& tree, const binning_options& options,
+            bool has_ranks = false)
+      : tree_(tree),
+        options_(options),
+        leaves_(exec, tree.leaf_count()),
+        inner_(exec, tree.first_leaf()),
+        shared_(exec, has_ranks ? tree.leaf_count() : 0) {
     options_.min_level = min(options_.min_level, tree.depth());
     ::thrust::fill_n(exec.thrust(), leaves_.data(), leaves_.size(), leaf_mark{});
     ::thrust::fill_n(exec.thrust(), inner_.data(), inner_.size(), 0u);
@@ -110,7 +123,14 @@ class bin_marks {
   }
 
   bin_marks_view view() const { return {tree_.first_leaf(), leaves_.data(), inner_.data()}; }
-  std::size_t bytes() const { return leaves_.bytes() + inner_.bytes(); }
+  std::size_t bytes() const { return leaves_.bytes() + inner_.bytes() + shared_.bytes(); }
+
+  /// Adds up the rays that all ranks counted: 4 bytes a leaf. Throws rank_error.
+  void sum_ranks(const Exec& exec, communicator& ranks) {
+    shared_.sum(exec, ranks, leaf_ray_count{leaves_.data()}, bin_marks_view::most);
+  }
+  /// Takes counts of a file as those of all ranks.
+  void restart_ranks(const Exec& exec) { shared_.restart(exec, leaf_ray_count{leaves_.data()}); }
 
   /// Chooses bins anew from the counts of `samples` samples. `room`: slots for bins' fields. `pressure`: on
   /// the device. `log2_divisor`: of the rays that are counted, one in 2^log2_divisor is guided. O(nodes).
@@ -134,6 +154,7 @@ class bin_marks {
   binning_options options_;
   buffer<leaf_mark, Exec> leaves_;
   buffer<std::uint32_t, Exec> inner_;
+  rank_counters<Exec, std::uint32_t> shared_;  // a leaf, with ranks
 };
 
 }  // namespace wfpg::detail

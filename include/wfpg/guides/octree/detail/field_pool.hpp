@@ -56,15 +56,16 @@ class field_pool {
  public:
   field_pool() = default;
   /// Makes `slots` fields of `resolution`² cells. They learn up to `max_values` values in a sample; 0: they
-  /// do not learn.
-  field_pool(const Exec& exec, std::size_t slots, std::uint32_t resolution, std::size_t max_values)
+  /// do not learn. `ranks`: they learn the values of all ranks.
+  field_pool(const Exec& exec, std::size_t slots, std::uint32_t resolution, std::size_t max_values,
+             communicator* ranks = nullptr)
       : resolution_(resolution),
         fields_(exec, std::vector<resident_field>(slots)),
         words_(exec, slots * words_a_field()),
         hits_(exec, slots * cells_a_field()),
         learnt_(exec, max_values > 0 ? hits_.size() : 0),
         fractions_(exec, std::vector<field_fractions>(max_values > 0 ? slots : 0)),
-        queue_(exec, learnt_.size() > 0 ? max_values : 0, learnt_.size()) {
+        queue_(exec, learnt_.size() > 0 ? max_values : 0, learnt_.size(), ranks) {
     exec.fill_bytes(words_.data(), 0, words_.bytes());  // files are written from copies of whole buffers
     exec.fill_bytes(hits_.data(), 0, hits_.bytes());
     forget_means(exec);

@@ -30,15 +30,17 @@ kept_field_options field_store<Exec>::completed(kept_field_options o, std::size_
 template <class Exec>
 field_store<Exec>::field_store(const Exec& exec, const sparse_voxel_octree_view& tree,
                                const binning_options& binning, const kept_field_options& options,
-                               std::size_t max_rays, std::size_t max_values)
+                               std::size_t max_rays, std::size_t max_values, communicator* ranks,
+                               std::optional<std::size_t> own_rays)
     : tree_(tree),
       options_(completed(checked(options, tree.node_count()), max_values)),
       schedule_(max_rays, tree.leaf_count()),
-      marks_(exec, tree, binning),
+      marks_(exec, tree, binning, ranks != nullptr),
       table_(exec,
              tree.empty() ? 0 : options.budget_bytes / bytes_a_slot(options.resolution, options_.learn)),
-      pool_(exec, table_.size(), options_.resolution, options_.learn ? max_values : 0),
-      field_of_ray_(exec, max_rays),
+      pool_(exec, table_.size(), options_.resolution, options_.learn ? max_values : 0, ranks),
+      ranks_(exec, table_.size(), options_.learn, ranks),
+      field_of_ray_(exec, own_rays.value_or(max_rays)),
       counts_(exec, std::vector<field_wave_counts>(2)) {}
 
 template <class Exec>
@@ -51,6 +53,11 @@ void field_store<Exec>::begin_sample(const Exec& exec, std::uint32_t sample) {
 
 template <class Exec>
 void field_store<Exec>::end_sample(const Exec& exec, bool recorded, std::uint32_t log2_divisor) {
+  if (ranks_) {
+    ranks_.share_use(exec, table_.view().slots);
+    if (recorded) ranks_.share_fractions(exec, table_.view().slots, schedule_.sample(), pool_.fractions());
+    if (schedule_.counts_rays()) marks_.sum_ranks(exec, ranks_.ranks());
+  }
   if (recorded) pool_.learn(exec, table_.view().slots, schedule_.sample());
   const bool changes = log2_divisor != log2_divisor_;
   if (!schedule_.chooses_bins() && !changes) return;
@@ -81,9 +88,18 @@ guide_view field_store<Exec>::prepare(const Exec& exec, const kept_field_wave<Su
                               options_.resolution,
                               options_.recast,
                               schedule_.sample(),
-                              &table_.state()->refreshed};
-  if (builds_in_wave())
-    build(exec, kept_field_builder<kept_field_wave<Surfaces>>{wave, kept}, caster, caster_buffer_bytes);
+                              &table_.state()->refreshed,
+                              ranks_.origins()};
+  if (builds_in_wave()) {
+    const kept_field_builder<kept_field_wave<Surfaces>> builder{wave, kept};
+    if (ranks_)
+      ranks_.send_origins(exec, builder, rays_of(wave), wave.ray_count, field_of_ray_.data(),
+                          table_.listed(true), counts());
+    if (ranks_)
+      build_of_ranks(exec, builder, caster, caster_buffer_bytes);
+    else
+      build(exec, builder, caster, caster_buffer_bytes);
+  }
   end_wave();
   return {{field_of_ray_.data(), wave.ray_count}, fields(wave.points)};
 }
@@ -114,12 +130,9 @@ detail::find_field<wave_rays<Surfaces>> field_store<Exec>::finder(const kept_fie
                                                                   detail::wanted_builds wanted_now) {
   const detail::use_slot use{table_.view(), schedule_.sample(), wave.seed, wanted_now,
                              table_.builds(counts())};
-  return {{wave.surfaces, wave.mode, wave.guided_paths},
-          {counts(), wave.statistics},
-          marks_.view(),
-          {tree_, use},
-          table_.wanted(),
-          schedule_.counted(wave.guided_paths.log2_divisor())};
+  return {rays_of(wave),   {counts(), wave.statistics},
+          marks_.view(),   {tree_, use},
+          table_.wanted(), schedule_.counted(wave.guided_paths.log2_divisor())};
 }
 
 /// Gives rays their slots, new ones where there is room.
@@ -127,17 +140,20 @@ template <class Exec>
 template <class Surfaces>
 void field_store<Exec>::find(const Exec& exec, const kept_field_wave<Surfaces>& wave) {
   using detail::wanted_builds;
-  const auto find = finder(wave, !builds_in_wave() ? wanted_builds::none
-                                 : limits_builds() ? wanted_builds::marked
-                                                   : wanted_builds::listed);
+  const auto find = finder(wave, !builds_in_wave()  ? wanted_builds::none
+                                 : chooses_builds() ? wanted_builds::marked
+                                                    : wanted_builds::listed);
   const detail::ray_blocks blocks{wave.ray_count, field_of_ray_.data(), find.counts};
   exec.for_each_block(blocks.size(), 0,
                       detail::find_fields<wave_rays<Surfaces>>{find, blocks, other_counts()});
   if (!builds_in_wave()) return;
   const std::uint32_t cells = pool_.cells_a_field();
+  if (ranks_) ranks_.share_wanted(exec, table_.wanted_buckets(), counts());
   table_.allocate(exec, counts(), options_.max_wave_cones / cells);
-  exec.for_each_block(blocks.size(), 0, detail::find_missing_fields{blocks, find.ancestor});
-  if (limits_builds())
+  exec.for_each_block(blocks.size(), 0,
+                      detail::find_missing_fields<wave_rays<Surfaces>>{blocks, find.ancestor, find.rays});
+  if (ranks_) ranks_.share_origins(exec, table_.view().slots, table_.scratch());
+  if (chooses_builds())
     table_.list_builds_within(exec, {options_.max_wave_cones, cells, refresh_cones()}, counts(), wave.seed);
 }
 
@@ -161,6 +177,55 @@ void field_store<Exec>::build(const Exec& exec, const Builder& builder, const Ca
     for (const bool whole : {true, false})
       build_batches(exec, builder, caster, whole,
                     read_element(exec, whole ? &counts()->all : &counts()->part), cones.view(), hits.view());
+  }
+}
+
+/// Builds the listed slots' fields. Ranks share the cones, and exchange what these hit.
+template <class Exec>
+template <class Builder, class Caster>
+void field_store<Exec>::build_of_ranks(const Exec& exec, const Builder& builder, const Caster& caster,
+                                       std::size_t buffer_bytes) {
+  const std::size_t of_wholes = ranks_.builds(true) * builder.cone_count(true);
+  const array_view<cone_hit> found =
+      ranks_.begin_hits(exec, of_wholes + ranks_.builds(false) * builder.cone_count(false));
+  if (found.empty()) return;
+  for (const bool whole : {true, false})
+    cast_part(exec, builder, caster, buffer_bytes, whole, found.data() + (whole ? 0 : of_wholes));
+  ranks_.share_hits(found);
+  for (const bool whole : {true, false})
+    exec.for_each_block(ranks_.builds(whole), field_scratch_bytes(options_.resolution, Exec::warps_per_block),
+                        detail::finish_listed_fields<Builder>{builder, table_.listed(whole), whole,
+                                                              found.data() + (whole ? 0 : of_wholes)});
+}
+
+/// Casts the cones of this rank's part of one list.
+template <class Exec>
+template <class Builder, class Caster>
+void field_store<Exec>::cast_part(const Exec& exec, const Builder& builder, const Caster& caster,
+                                  std::size_t buffer_bytes, bool whole, cone_hit* found) {
+  const std::uint32_t rank = ranks_.ranks().rank(), cells = builder.cone_count(whole);
+  const std::size_t first = ranks_.first_build(whole, rank), n = ranks_.first_build(whole, rank + 1) - first;
+  const std::uint32_t* const list = table_.listed(whole) + first;
+  found += first * cells;
+  if (n == 0) return;
+  if constexpr (is_inline_caster_v<Caster>) {
+    exec.for_each_block(
+        n, 0, detail::cast_listed_cones<Builder, inline_hits<Caster>>{builder, {caster}, list, whole, found});
+  } else {
+    const std::size_t room = max<std::size_t>(cells, buffer_bytes / (sizeof(ray) + sizeof(ray_hit)));
+    const buffer<ray, Exec> cones(exec, min(room, n * cells));
+    const buffer<ray_hit, Exec> hits(exec, cones.size());
+    cast_in_batches(
+        exec, caster, n, cells, cones.view(), hits.view(),
+        [&](std::size_t begin, std::size_t count, array_view<ray> to) {
+          exec.for_each_block(count, 0, write_kept_cones<Builder>{builder, to, list + begin, whole});
+        },
+        [&](std::size_t begin, std::size_t count, array_view<ray_hit> from) {
+          const stored_hits stored{from, 0, cells};
+          exec.for_each_block(count, 0,
+                              detail::cast_listed_cones<Builder, stored_hits>{builder, stored, list + begin,
+                                                                              whole, found + begin * cells});
+        });
   }
 }
 

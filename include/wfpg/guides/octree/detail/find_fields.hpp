@@ -42,7 +42,8 @@ struct use_slot {
   wanted_builds wanted;
   build_list builds;
 
-  WFPG_HD void operator()(std::uint32_t slot, std::size_t ray) const {
+  // `ray`: its number, wave_rays::number().
+  WFPG_HD void operator()(std::uint32_t slot, std::uint32_t ray) const {
     if (atomic_load_cached(slots.noted + slot) != 0) return;
     field_slot& s = slots.slots[slot];
     const bool is_due = s.is_due(sample);
@@ -55,7 +56,7 @@ struct use_slot {
 
  private:
   // The least random number picks the origin, so the choice does not depend on which ray comes first.
-  WFPG_HD void want_build(field_slot& s, std::uint32_t slot, std::size_t ray) const {
+  WFPG_HD void want_build(field_slot& s, std::uint32_t slot, std::uint32_t ray) const {
     const std::uint64_t candidate = (hash(seed, ray) & ~0xffffffffull) | ray;
     if (candidate >= atomic_load(&s.origin)) return;
     const bool is_first = atomic_min(&s.origin, candidate) == field_slot::unpicked;
@@ -115,7 +116,7 @@ struct use_ancestor {
   sparse_voxel_octree_view tree;
   use_slot use;
 
-  WFPG_HD std::uint32_t operator()(std::uint32_t key, std::size_t ray, std::uint32_t& field) const {
+  WFPG_HD std::uint32_t operator()(std::uint32_t key, std::uint32_t ray, std::uint32_t& field) const {
     std::uint32_t slot = no_slot;
     for (node_id node = key / orientations; slot == no_slot && node != invalid_node; node = tree.parent(node))
       slot = use.slots.find(node * orientations + key % orientations);
@@ -126,7 +127,7 @@ struct use_ancestor {
   }
 };
 
-/// Finds a ray's slot, and counts the ray where `counted` includes it. `Rays`: (std::size_t) -> ray_to_bin.
+/// Finds a ray's slot, and counts the ray where `counted` includes it. `Rays`: wave_rays.
 /// Returns what ray_counts adds for the ray.
 template <class Rays>
 struct find_field {
@@ -146,15 +147,16 @@ struct find_field {
       if (ray.active) counts.unbinned();
       return 0;
     }
-    if (counted.includes(i)) marks.count(leaf, counted.stride * ray.paths);
+    const std::uint32_t number = rays.number(i);
+    if (counted.includes(number)) marks.count(leaf, counted.stride * ray.paths);
     const std::uint32_t key = marks.bin(leaf) * orientations + ray.orientation;
     const std::uint32_t slot = use.slots.find(key);
     if (slot != no_slot) {
       field = slot;
-      use(slot, i);
+      use(slot, number);
       return ray_counts::with_field;
     }
-    if (use.wanted == wanted_builds::none) return ancestor(key, i, field);
+    if (use.wanted == wanted_builds::none) return ancestor(key, number, field);
     field = missing_key::marked(key);
     wanted.ask(key);
     atomic_store(&counts.counts->missing, 1u);
@@ -205,15 +207,18 @@ struct find_fields {
 
 /// Kernel: finds slots for the rays that find_fields left marked. Their fields have been allocated since, or
 /// they use an ancestor's, or none.
+template <class Rays>
 struct find_missing_fields {
   ray_blocks blocks;
   use_ancestor own_or_ancestor;
+  Rays rays;
 
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t i) const {
     if (blocks.counts.counts->missing == 0) return;
     blocks.find(block, i, [&](std::size_t ray, std::uint32_t& field) {
-      return missing_key::is_marked(field) ? own_or_ancestor(missing_key::key(field), ray, field) : 0u;
+      if (!missing_key::is_marked(field)) return 0u;
+      return own_or_ancestor(missing_key::key(field), rays.number(ray), field);
     });
   }
 };
@@ -246,7 +251,7 @@ struct count_rays {
   bin_marks_view marks;
   counted_rays counted;
   WFPG_HD void operator()(std::size_t i) const {
-    if (!counted.includes(i)) return;
+    if (!counted.includes(rays.number(i))) return;
     const ray_to_bin ray = rays(i);
     if (!ray.active) return;
     const node_id leaf = leaf_of(tree, ray);

@@ -24,6 +24,17 @@ struct earlier_paths {
   std::uint32_t vertices = 0;     ///< surfaces of the first unguided path
   float unguided[rest_constants::most_unguided] = {-1.0f, -1.0f, -1.0f, -1.0f};  ///< in unguided samples
   float guided = -1.0f;  ///< in the last guided sample that was measured
+
+  /// Number of `guided` for radiance().
+  static constexpr std::uint32_t of_guided = rest_constants::most_unguided;
+  /// Radiance in the unguided sample of a number, or in the guided one.
+  WFPG_HD float& radiance(std::uint32_t number) { return number < of_guided ? unguided[number] : guided; }
+  /// Forgets all radiance. The first unguided path began at `at` and has `surfaces`.
+  WFPG_HD void begin(std::uint32_t at, std::uint32_t surfaces) {
+    *this = {};
+    place = at;
+    vertices = surfaces;
+  }
 };
 
 /// Losses of differences of paths, as guiding_gain has them.
@@ -109,32 +120,48 @@ struct measured_paths {
   }
 };
 
-/// Kernel: keeps what the paths of a guided sample brought.
-struct keep_guided_paths {
+/// Kernel: keeps what the paths of a sample brought.
+struct keep_paths {
   measured_paths paths;
   array_view<earlier_paths> kept;
+  std::uint32_t number;  // earlier_paths::radiance() that it is kept in
 
   WFPG_HD void operator()(std::size_t i) const {
     const measured_path now = paths(i);
-    kept[i].guided = now.place == kept[i].place ? now.radiance : -1.0f;
+    if (number == 0) kept[i].begin(now.place, now.vertices);
+    kept[i].radiance(number) = now.place == kept[i].place ? now.radiance : -1.0f;
   }
 };
 
-/// Kernel: keeps what the paths of unguided sample `number` brought. The first one forgets all others.
-struct keep_unguided_paths {
+/// Kernel: what a rank's paths brought, as differences from what is kept of unknown paths. Sums over ranks
+/// are then the differences of all paths, since a path is one rank's. Words are 0 before.
+struct write_path_words {
   measured_paths paths;
-  array_view<earlier_paths> kept;
-  std::uint32_t number;
-
+  array_view<const earlier_paths> kept;
+  std::uint32_t number;  // as keep_paths has it
+  std::uint32_t* words;  // 3 a path for number 0, else 1
   WFPG_HD void operator()(std::size_t i) const {
     const measured_path now = paths(i);
-    earlier_paths& to = kept[i];
+    const std::size_t place = i + paths.compared.first_place();
+    const std::uint32_t radiance = float_bits(now.radiance) - float_bits(-1.0f);
     if (number == 0) {
-      to = {};
-      to.place = now.place;
-      to.vertices = now.vertices;
+      words[3 * place] = now.place - earlier_paths::nowhere;
+      words[3 * place + 1] = radiance;
+      words[3 * place + 2] = now.vertices;
+    } else if (now.place == kept[place].place) {
+      words[place] = radiance;
     }
-    to.unguided[number] = now.place == to.place ? now.radiance : -1.0f;
+  }
+};
+
+/// Kernel: keeps what the words of all ranks say.
+struct keep_path_words {
+  const std::uint32_t* words;
+  std::uint32_t number;
+  array_view<earlier_paths> kept;
+  WFPG_HD void operator()(std::size_t i) const {
+    if (number == 0) kept[i].begin(words[3 * i] + earlier_paths::nowhere, words[3 * i + 2]);
+    kept[i].radiance(number) = bits_float(words[number == 0 ? 3 * i + 1 : i] + float_bits(-1.0f));
   }
 };
 
@@ -145,7 +172,7 @@ struct measure_path {
   array_view<const earlier_paths> kept;
 
   WFPG_HD path_sums operator()(std::size_t i) const {
-    const earlier_paths before = kept[i];
+    const earlier_paths before = kept[i + paths.compared.first_place()];
     if (before.place == earlier_paths::nowhere || before.guided < 0.0f) return {};
     const measured_path now = paths(i);
     if (now.radiance < 0.0f || now.place != before.place) return {};

@@ -13,7 +13,11 @@
 namespace wfpg {
 
 template <class Exec>
-gain_meter<Exec>::gain_meter(const Exec& exec, std::size_t paths) : kept_(exec, paths) {
+gain_meter<Exec>::gain_meter(const Exec& exec, std::size_t paths, communicator* ranks)
+    : ranks_(ranks),
+      kept_(exec, paths),
+      words_(exec, ranks ? 3 * paths : 0),
+      sums_(exec, ranks ? sizeof(detail::path_sums) / sizeof(std::uint64_t) : 0) {
   forget(exec);
   // Samples allocate nothing: the reduction's memory is allocated now, and retained.
   if (kept_.size() > 0) sum(exec, kept_.size(), detail::measure_nothing{});
@@ -31,17 +35,21 @@ template <class Exec>
 void gain_meter<Exec>::keep_unguided(const Exec& exec, const path_recorder<Exec>& recorder,
                                      const recorded_runs& compared, const exitance_cache_view& cache,
                                      std::uint32_t number) {
-  const detail::measured_paths paths{recorder.view(), cache, compared};
   if (number == 0) forget(exec);
-  exec.for_each(count(paths), detail::keep_unguided_paths{paths, kept_.view(), number});
+  keep(exec, {recorder.view(), cache, compared}, number);
 }
 
 template <class Exec>
 guiding_gain gain_meter<Exec>::gain(const Exec& exec, const path_recorder<Exec>& recorder,
                                     const recorded_runs& compared, const exitance_cache_view& cache) {
   const detail::measured_paths paths{recorder.view(), cache, compared};
-  const detail::path_sums sums = sum(exec, count(paths), detail::measure_path{paths, kept_.view()});
-  exec.for_each(count(paths), detail::keep_guided_paths{paths, kept_.view()});
+  detail::path_sums sums = sum(exec, count(paths), detail::measure_path{paths, kept_.view()});
+  if (ranks_) {
+    exec.copy_from_host(sums_.data(), &sums, sizeof sums);
+    ranks_->all_reduce_sum(sums_.view());
+    exec.copy_to_host(&sums, sums_.data(), sizeof sums);
+  }
+  keep(exec, paths, detail::earlier_paths::of_guided);
   return gain_of(sums);
 }
 
@@ -68,6 +76,22 @@ guiding_gain gain_meter<Exec>::gain_of(const detail::path_sums& sums) {
 template <class Exec>
 void gain_meter<Exec>::forget(const Exec& exec) {
   ::thrust::fill_n(exec.thrust(), kept_.data(), kept_.size(), detail::earlier_paths{});
+}
+
+template <class Exec>
+void gain_meter<Exec>::keep(const Exec& exec, const detail::measured_paths& paths, std::uint32_t number) {
+  if (ranks_) return keep_of_ranks(exec, paths, number);
+  exec.for_each(count(paths), detail::keep_paths{paths, kept_.view(), number});
+}
+
+template <class Exec>
+void gain_meter<Exec>::keep_of_ranks(const Exec& exec, const detail::measured_paths& paths,
+                                     std::uint32_t number) {
+  const array_view<std::uint32_t> words = words_.view().subview(0, (number == 0 ? 3 : 1) * kept_.size());
+  exec.fill_bytes(words.data(), 0, words.size() * sizeof(std::uint32_t));
+  exec.for_each(count(paths), detail::write_path_words{paths, kept_.view(), number, words.data()});
+  ranks_->all_reduce_sum(words);
+  exec.for_each(kept_.size(), detail::keep_path_words{words.data(), number, kept_.view()});
 }
 
 }  // namespace wfpg

@@ -13,7 +13,8 @@ guide_view kept_guide<Exec>::prepare(const sample_context<Exec>& at, const wave<
   // An unguided sample counts rays, so that bins are known when guiding starts.
   if (at.guided) return store_.prepare(at.exec, kept_wave(at, w), caster, options_.caster_buffer_bytes);
   if (w.depth < options_.guided_depths)  // bins are for rays that are to have fields
-    store_.count(at.exec, w.ray_count, wave_rays<Surfaces>{w.surfaces, options_.mode, at.guided_next},
+    store_.count(at.exec, w.ray_count,
+                 wave_rays<Surfaces>{w.surfaces, options_.mode, at.guided_next, scene::first_path()},
                  at.guided_next.log2_divisor());
   return {};
 }

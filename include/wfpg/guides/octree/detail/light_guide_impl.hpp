@@ -26,7 +26,8 @@ inline void require_valid(const light_guide_options& options) {
 
 template <class Exec>
 light_guide<Exec>::light_guide(const Exec& exec, const sparse_voxel_octree_view& tree,
-                               const light_guide_options& options, std::size_t paths, std::uint32_t depth)
+                               const light_guide_options& options, std::size_t paths, std::uint32_t depth,
+                               communicator* ranks, std::size_t own_paths, std::uint32_t first_path)
     : floor_(options.floor) {
   detail::require_valid(options);
   if (options.weights.empty() || tree.empty()) return;
@@ -44,8 +45,10 @@ light_guide<Exec>::light_guide(const Exec& exec, const sparse_voxel_octree_view&
   while (paths * depth >> view_.runs_.shift > wanted) ++view_.runs_.shift;
   sums_ = buffer<float, Exec>(exec, rows * groups);
   means_ = buffer<learnt_mean, Exec>(exec, rows * groups);
-  const std::size_t capacity = min(view_.runs_.size(paths) * depth, detail::most_queued);
-  queue_ = detail::value_queue<Exec>(exec, capacity, rows_of(view_.level_) * groups);
+  view_.runs_.first = first_path;
+  const std::size_t recorded = view_.runs_.size(ranks ? own_paths : paths);
+  queue_ = detail::value_queue<Exec>(exec, min(recorded * depth, detail::most_queued),
+                                     rows_of(view_.level_) * groups, ranks);
   view_.sums_ = sums_.data();
   view_.queue_ = queue_.view();
   forget(exec);

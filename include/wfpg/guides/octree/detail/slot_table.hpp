@@ -47,6 +47,10 @@ class slot_table {
   field_slots_view view() const {
     return {slots_.view(), table_.data(), static_cast<std::uint32_t>(table_.size() - 1), noted_.data()};
   }
+  /// The buckets of wanted keys, which ranks exchange.
+  array_view<std::uint32_t> wanted_buckets() const { return wanted_.view(); }
+  /// An element a slot, unused until a wave lists its builds.
+  array_view<std::uint64_t> scratch() const { return prefix_.view(); }
   wanted_keys wanted() const { return {wanted_.data(), static_cast<std::uint32_t>(wanted_.size() - 1)}; }
   field_store_state* state() const { return state_.data(); }
   /// The slots to build in a wave: those to build whole, or those to refresh.

@@ -23,12 +23,15 @@ bin_fields<Surfaces> transient_guide<Exec>::bin_wave(const sample_context<Exec>&
                                                      const wave<Surfaces, Random>& w) {
   // Counting is a part of binning, and is timed with it.
   const auto timed = at.clock.time(stage::bin);
-  const bins_view bins =
-      binner_.bin(at.exec, w.ray_count, wave_rays<Surfaces>{w.surfaces, options_.mode, at.guided_paths});
+  const wave_rays<Surfaces> rays{w.surfaces, options_.mode, at.guided_paths, scene::first_path()};
+  const bins_view bins = binner_.bin(at.exec, w.ray_count, rays, ranks_.ranks());
   const std::uint32_t size = field_resolution(w.depth);
-  at.exec.for_each(1,
-                   detail::add_counts{bins, binner_.unbinned(), size * size, scene::depth_counts(w.depth)});
-  return {bins, w.surfaces, scene::cache(), options_.field, options_.mode, size, hash(at.seed, w.depth)};
+  bin_fields<Surfaces> fields{bins,          w.surfaces, scene::cache(),        options_.field,
+                              options_.mode, size,       hash(at.seed, w.depth)};
+  if (ranks_) ranks_.share(at.exec, fields, rays);
+  at.exec.for_each(1, detail::add_counts{bins, binner_.unbinned(), ranks_.count(), size * size,
+                                         scene::depth_counts(w.depth)});
+  return fields;
 }
 
 template <class Exec>

@@ -35,6 +35,8 @@ const sarsa_grid_options& sarsa_grid<Exec>::checked(const sarsa_grid_options& o)
           "at least 1, or unset to record all paths");
   require(o.learning_rate >= 0.0f && o.learning_rate <= 1.0f, "learning_rate", o.learning_rate, "in [0, 1]");
   require(o.floor >= 0.0f, "floor", o.floor, "finite, at least 0");
+  require(!o.ranks || o.update != sarsa_update::expected_sarsa, "update", "expected_sarsa",
+          "sarsa or monte_carlo with ranks");
   return o;
 }
 
@@ -56,7 +58,8 @@ sarsa_grid<Exec>::sarsa_grid(const Exec& exec, const Exec& working, const bounds
   opposites_ = buffer<std::uint32_t, Exec>(exec, n);
   if (options_.sampler != sarsa_sampler::sphere_inversion)
     normalisers_ = buffer<detail::sarsa_normaliser, Exec>(exec, std::size_t(view_.cells_.size()) * normals);
-  queue_ = detail::value_queue<Exec>(working, recorded().vertices("values_per_direction"), directions());
+  queue_ = detail::value_queue<Exec>(working, recorded().vertices("values_per_direction"), directions(),
+                                     options_.ranks);
   if (expects()) expected_ = buffer<float, Exec>(working, options_.max_paths * options_.max_depth);
   view_.radiance_ = radiance_.data();
   view_.weights_ = weights_.data();
@@ -67,6 +70,23 @@ sarsa_grid<Exec>::sarsa_grid(const Exec& exec, const Exec& working, const bounds
   exec.for_each(cosines_.size(),
                 detail::tabulate_cosines{view_.normals_, view_.resolution_, cosines_.data()});
   forget_light(working);
+}
+
+template <class Exec>
+void sarsa_grid<Exec>::agree(const Exec&, agreed_items& items) const {
+  const sarsa_grid_options& o = options_;
+  const detail::sarsa_cells& c = view_.cells_;
+  items.add("the scene's bounds",
+            std::vector<float>{c.lower.x, c.lower.y, c.lower.z, c.per_unit.x, c.per_unit.y, c.per_unit.z});
+  items.add("resolution", std::uint64_t(o.resolution));
+  items.add("direction_resolution", std::uint64_t(o.direction_resolution));
+  items.add("normal_resolution", std::uint64_t(o.normal_resolution));
+  items.add("update", std::uint64_t(o.update));
+  items.add("sampler", std::uint64_t(o.sampler));
+  items.add("step", std::uint64_t(o.step));
+  items.add("learning_rate", o.learning_rate);
+  items.add("floor", o.floor);
+  items.add("values_per_direction", std::uint64_t(o.values_per_direction.value_or(0)));
 }
 
 template <class Exec>

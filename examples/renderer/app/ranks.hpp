@@ -1,0 +1,104 @@
+// Several ranks that render one picture: how they share its waves, and how they agree.
+#pragma once
+
+#include "app/render.hpp"
+#include "scene/scene.hpp"
+#include "tracer/wave_share.hpp"
+
+#include <wfpg/ranks/communicator.hpp>
+
+#include <optional>
+#include <vector>
+
+namespace render {
+
+/// Samples of a pixel in one wave: what the ranks share.
+inline std::uint32_t samples_of_wave(const render_options& options) {
+  return options.split == rank_split::samples ? static_cast<std::uint32_t>(options.samples_a_wave) : 1u;
+}
+
+/// This rank's part of each wave. Precondition: options are complete.
+inline wave_share share_of(const render_options& options) {
+  const std::size_t pixels =
+      static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  if (!options.ranks) return wave_share::all_of(pixels);
+  return wave_share::part_of(pixels, samples_of_wave(options), options.ranks->rank(), options.ranks->size());
+}
+
+/// Whether and why a rank ends the rendering after a wave.
+struct wave_end {
+  bool is_spent, is_stopped;
+};
+
+/// All ranks end where one of them does.
+inline wave_end agree(wfpg::communicator* ranks, wave_end own) {
+  if (!ranks) return own;
+  std::uint32_t flags[2] = {own.is_spent, own.is_stopped};
+  ranks->all_reduce_max(wfpg::array_view<std::uint32_t>(flags, 2));
+  return {flags[0] != 0, flags[1] != 0};
+}
+
+/// Throws std::invalid_argument for options that ranks cannot share; the message names what. `options` are
+/// complete, but for that.
+void require_shared(const render_options& options);
+
+/// Throws wfpg::rank_error where another rank has another scene or other options.
+void require_same_rendering(const scene& scene, const render_options& options);
+
+/// Ranks of the host's memory for a policy of a device's. It copies there and back.
+template <class Exec>
+class staged_communicator final : public wfpg::communicator {
+ public:
+  /// `ranks` outlives this.
+  staged_communicator(const Exec& exec, wfpg::communicator& ranks) : exec_(exec), ranks_(ranks) {}
+
+  std::uint32_t rank() const override { return ranks_.rank(); }
+  std::uint32_t size() const override { return ranks_.size(); }
+  void all_reduce_sum(wfpg::array_view<std::uint32_t> values) override {
+    on_host(values, [&](auto host) { ranks_.all_reduce_sum(host); });
+  }
+  void all_reduce_sum(wfpg::array_view<std::uint64_t> values) override {
+    on_host(values, [&](auto host) { ranks_.all_reduce_sum(host); });
+  }
+  void all_reduce_max(wfpg::array_view<std::uint32_t> values) override {
+    on_host(values, [&](auto host) { ranks_.all_reduce_max(host); });
+  }
+  void all_reduce_max(wfpg::array_view<std::uint64_t> values) override {
+    on_host(values, [&](auto host) { ranks_.all_reduce_max(host); });
+  }
+  void broadcast(wfpg::array_view<unsigned char> bytes, std::uint32_t root) override {
+    on_host(bytes, [&](auto host) { ranks_.broadcast(host, root); });
+  }
+
+ private:
+  template <class T, class Call>
+  void on_host(wfpg::array_view<T> values, const Call& call) {
+    std::vector<T> host(values.size());
+    exec_.copy_to_host(host.data(), values.data(), host.size() * sizeof(T));
+    call(wfpg::array_view<T>(host.data(), host.size()));
+    exec_.copy_from_host(values.data(), host.data(), host.size() * sizeof(T));
+  }
+
+  Exec exec_;
+  wfpg::communicator& ranks_;
+};
+
+/// Options whose ranks take arrays of a device's memory.
+template <class Exec>
+class device_options {
+ public:
+  device_options(const Exec& exec, const render_options& options) : options_(options) {
+    if (options.ranks) options_.policy_ranks = &ranks_.emplace(exec, *options.ranks);
+  }
+  // Options refer to its ranks.
+  device_options(const device_options&) = delete;
+  device_options& operator=(const device_options&) = delete;
+
+  const render_options& get() const { return options_; }
+
+ private:
+  render_options options_;
+  std::optional<staged_communicator<Exec>> ranks_;
+};
+
+}  // namespace render

@@ -1,0 +1,75 @@
+// Counters that every rank adds to, and of which all ranks need the sum.
+//
+// Between two sums a rank knows what all ranks had counted, plus what it counted itself since then. A sum
+// takes only the latter of each rank, but all of rank 0.
+//
+// Source: wfpg's own. Cost: O(counters) and one reduction. Memory: a copy of the counters.
+#pragma once
+
+#include <wfpg/base/math.hpp>
+#include <wfpg/exec/buffer.hpp>
+#include <wfpg/ranks/communicator.hpp>
+
+#include <cstddef>
+
+namespace wfpg::detail {
+
+/// Counters that lie in a row, for rank_counters.
+template <class T>
+struct counters_in_a_row {
+  T* values;  ///< a counter each
+  /// Returns counter `i`.
+  WFPG_HD T& operator()(std::size_t i) const { return values[i]; }
+};
+
+/// Kernel: replaces what all ranks had counted by what a rank gives to the sum.
+template <class T, class At>
+struct take_counts {
+  T* shared;  ///< a counter: what all ranks had counted
+  At at;      ///< a counter's place
+  bool all;   ///< gives all of it, as one of the ranks does; false: what was added since
+  /// Takes counter `i`.
+  WFPG_HD void operator()(std::size_t i) const { shared[i] = all ? at(i) : at(i) - shared[i]; }
+};
+
+/// Kernel: writes the sums to the counters.
+template <class T, class At>
+struct put_counts {
+  T* shared;  ///< a counter: the sum
+  At at;      ///< a counter's place
+  T most;     ///< at which a counter stops
+  /// Writes counter `i`.
+  WFPG_HD void operator()(std::size_t i) const { at(i) = shared[i] = min(shared[i], most); }
+};
+
+/// Remembers what all ranks had counted at the last sum. `At`: (std::size_t) -> T&, the place of a counter.
+template <class Exec, class T>
+class rank_counters {
+ public:
+  /// Of no counters.
+  rank_counters() = default;
+  /// Of `n` counters that are 0. Throws out_of_memory.
+  rank_counters(const Exec& exec, std::size_t n) : shared_(exec, n) {
+    exec.fill_bytes(shared_.data(), 0, shared_.bytes());
+  }
+
+  /// Takes counters that are equal on all ranks, such as those of a file. Does nothing without counters.
+  template <class At>
+  void restart(const Exec& exec, const At& at) {
+    exec.for_each(shared_.size(), take_counts<T, At>{shared_.data(), at, true});
+  }
+  /// Gives all ranks the sums, but no more than `most`. Throws rank_error.
+  template <class At>
+  void sum(const Exec& exec, communicator& ranks, const At& at, T most = static_cast<T>(~T(0))) {
+    exec.for_each(shared_.size(), take_counts<T, At>{shared_.data(), at, ranks.rank() == 0});
+    ranks.all_reduce_sum(shared_.view());
+    exec.for_each(shared_.size(), put_counts<T, At>{shared_.data(), at, most});
+  }
+  /// Bytes in the policy's memory.
+  std::size_t bytes() const { return shared_.bytes(); }
+
+ private:
+  buffer<T, Exec> shared_;  // a counter
+};
+
+}  // namespace wfpg::detail

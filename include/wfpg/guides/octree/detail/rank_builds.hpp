@@ -1,0 +1,56 @@
+// Builds of kept fields whose cones ranks share. Each rank casts the cones of a part of the listed builds.
+// The ranks exchange what the cones hit, and then all make all distributions.
+//
+// Cost: cones of a rank's part, and O(F^2) a build. Traffic: 4 bytes a cone. Memory: as much.
+#pragma once
+
+#include <wfpg/guides/octree/kept_field.hpp>
+
+namespace wfpg::detail {
+
+/// Kernel: casts the cones of listed builds, or looks up what a batch caster found. One block a build.
+template <class Builder, class Hits>
+struct cast_listed_cones {
+  Builder builder;            // kept_field_builder
+  Hits hits;                  // inline_hits or stored_hits
+  const std::uint32_t* list;  // slots
+  bool whole;                 // all cells, or those of a refresh
+  cone_hit* found;            // of the first listed build, cone by cone
+
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t i) const {
+    const std::uint32_t slot = list[i], n = builder.cone_count(whole);
+    const field_cells cells = builder.cells(slot, whole);
+    const float solid_angle = cells.domain.cell_solid_angle();
+    block.for_each(static_cast<int>(n), [&](int c) {
+      const auto cone = static_cast<std::uint32_t>(c);
+      const ray r = cells.cone(builder.cell(slot, whole, cone));
+      found[i * n + cone] = cells.find(builder.wave.cache, r, hits(i, cone, r, solid_angle));
+    });
+  }
+};
+
+/// Kernel: stores what cones hit, and finishes the fields of listed slots. One block a build.
+template <class Builder>
+struct finish_listed_fields {
+  Builder builder;
+  const std::uint32_t* list;
+  bool whole;
+  const cone_hit* found;
+
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t i) const {
+    const std::uint32_t slot = list[i], n = builder.cone_count(whole);
+    const std::uint32_t size = builder.kept.resolution;
+    const field_cells cells = builder.cells(slot, whole);
+    cone_hit* const kept = builder.kept.hits + std::size_t(slot) * size * size;
+    block.for_each(static_cast<int>(n), [&](int c) {
+      const auto cone = static_cast<std::uint32_t>(c);
+      kept[builder.cell(slot, whole, cone).index(size)] = found[i * n + cone];
+    });
+    block.sync();
+    builder.finish(block, slot, cells, whole);
+  }
+};
+
+}  // namespace wfpg::detail

@@ -1,0 +1,59 @@
+// Joins the ranks that render one picture: processes, GPUs or threads, which learn one guide. Each rank has a
+// part of the paths of every sample. At a sample's end the ranks add up what their paths found, in integers.
+// The guide then has the same bytes for any number of ranks.
+//
+// An abstract class, so that kernels and guiders do not depend on what carries the messages: its functions
+// are called a few times a sample. Adapters: ranks/threads.hpp, ranks/mpi.hpp, ranks/nccl.hpp. A host derives
+// its own in 20 lines.
+//
+// Cost and memory: the adapter's.
+#pragma once
+
+#include <wfpg/base/types.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+
+namespace wfpg {
+
+/// Thrown where a rank is lost, is late, or renders something else than the others do. The communicator is of
+/// no more use; the guider's guide is what it was after the last sample that all ranks ended.
+class rank_error : public std::runtime_error {
+ public:
+  /// The message becomes "wfpg: REASON".
+  explicit rank_error(const std::string& reason) : std::runtime_error("wfpg: " + reason) {}
+};
+
+/// Joins ranks 0 to size() - 1. All ranks call the same functions in the same order with as many values.
+/// Arrays lie in the memory of the policy for which the communicator was made. A call is ordered after the
+/// policy's calls before it, and calls after it see its result. One thread at a time may call one rank's
+/// communicator.
+///
+/// Functions throw rank_error where another rank does not come within the adapter's time limit.
+class communicator {
+ public:
+  virtual ~communicator() = default;
+  /// Number of this rank.
+  virtual std::uint32_t rank() const = 0;
+  /// Number of ranks, at least 1.
+  virtual std::uint32_t size() const = 0;
+  /// Replaces each value by its sum over all ranks, modulo 2^32 or 2^64. O(values) of traffic a rank.
+  virtual void all_reduce_sum(array_view<std::uint32_t> values) = 0;
+  virtual void all_reduce_sum(array_view<std::uint64_t> values) = 0;
+  /// Replaces each value by the largest of all ranks.
+  virtual void all_reduce_max(array_view<std::uint32_t> values) = 0;
+  virtual void all_reduce_max(array_view<std::uint64_t> values) = 0;
+  /// Gathers the ranks' parts of an array. This rank has the values [first, first + count), and the parts do
+  /// not overlap. All other values are 0 before the call. An adapter may do better than add.
+  virtual void all_gather(array_view<std::uint64_t> values, std::size_t first, std::size_t count) {
+    (void)first;
+    (void)count;
+    all_reduce_sum(values);
+  }
+  /// Replaces the bytes of all ranks by those of the rank `root`.
+  virtual void broadcast(array_view<unsigned char> bytes, std::uint32_t root) = 0;
+};
+
+}  // namespace wfpg

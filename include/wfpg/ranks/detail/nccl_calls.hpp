@@ -1,0 +1,74 @@
+// Calls of NCCL and of CUDA's runtime as exceptions. Owners of a CUDA event and of device memory.
+// Cost: one comparison a call. Memory: that which they own.
+#pragma once
+
+#include <wfpg/base/error.hpp>
+#include <wfpg/ranks/communicator.hpp>
+#include <wfpg/ranks/detail/same_call.hpp>
+
+#include <cuda_runtime_api.h>
+#include <nccl.h>
+
+#include <cstdint>
+#include <string>
+
+static_assert(NCCL_VERSION_CODE >= NCCL_VERSION(2, 18, 0), "wfpg/ranks/nccl.hpp needs NCCL 2.18 or later");
+
+namespace wfpg::detail {
+
+/// Throws rank_error that names the failed function of NCCL.
+/// A call that is not done yet is no error.
+inline void check_nccl(ncclResult_t code, const char* function) {
+  if (code == ncclSuccess || code == ncclInProgress) return;
+  throw rank_error(std::string(function) + " failed: " + ncclGetErrorString(code) +
+                   "; NCCL_DEBUG=INFO in the environment tells more");
+}
+
+/// Throws device_error that names the failed function of CUDA's runtime.
+inline void check_runtime(cudaError_t code, const char* function) {
+  if (code == cudaSuccess) return;
+  cudaGetLastError();  // clears it
+  throw device_error(static_cast<int>(code), cudaGetErrorString(code), function);
+}
+
+/// An event of the current device that ends with its owner.
+class cuda_event {
+ public:
+  /// Throws device_error.
+  cuda_event() {
+    check_runtime(cudaEventCreateWithFlags(&event_, cudaEventDisableTiming), "cudaEventCreateWithFlags");
+  }
+  /// Not copyable: an event has one owner.
+  cuda_event(const cuda_event&) = delete;
+  cuda_event& operator=(const cuda_event&) = delete;
+  /// Errors are ignored, as destructors must not throw.
+  ~cuda_event() { cudaEventDestroy(event_); }
+  /// Returns the runtime's handle.
+  cudaEvent_t get() const { return event_; }
+
+ private:
+  cudaEvent_t event_ = nullptr;
+};
+
+/// Memory of the current device for the words that ranks compare.
+class rank_words {
+ public:
+  /// Throws device_error.
+  rank_words() {
+    check_runtime(cudaMalloc(&words_, rank_call::word_count * sizeof(std::uint64_t)), "cudaMalloc");
+  }
+  /// Not copyable: the memory has one owner.
+  rank_words(const rank_words&) = delete;
+  rank_words& operator=(const rank_words&) = delete;
+  /// Errors are ignored, as destructors must not throw.
+  ~rank_words() { cudaFree(words_); }
+  /// Returns a view of the words, in device memory.
+  array_view<std::uint64_t> view() const {
+    return {static_cast<std::uint64_t*>(words_), rank_call::word_count};
+  }
+
+ private:
+  void* words_ = nullptr;
+};
+
+}  // namespace wfpg::detail

@@ -1,0 +1,290 @@
+// Joins GPUs by NCCL, each a rank with its own CUDA policy.
+// GPUs may lie in one machine or in many, in one process or in many.
+// Values stay in device memory.
+// NCCL gives each rank a GPU of its own; for ranks that share a GPU there is ranks/threads.hpp.
+// It needs NCCL 2.18 or later, the first with communicators that do not block.
+// The CMake target wfpg::nccl brings its header and library.
+//
+// Source: NCCL's user guide, "Creating a communicator with options" and "Fault tolerance".
+// Cost: two collectives a call, one of 32 bytes that checks that ranks agree.
+// The host waits for each call, since a kernel that waits for a lost rank never ends.
+// Memory: NCCL's own, and 32 bytes on the device.
+#pragma once
+
+#include <wfpg/base/error.hpp>
+#include <wfpg/ranks/communicator.hpp>
+#include <wfpg/ranks/detail/nccl_calls.hpp>
+#include <wfpg/ranks/detail/same_call.hpp>
+
+#include <cuda_runtime_api.h>
+#include <nccl.h>
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+namespace wfpg {
+
+/// Options of nccl_communicator.
+/// All ranks must have the same.
+struct nccl_options {
+  /// Seconds after which a rank that waits for others throws rank_error, in (0, 1e6].
+  /// Work of the rank's own stream does not count.
+  double seconds = 30.0;
+};
+
+/// A GPU that takes part, for join_devices().
+/// The policy was made while that GPU was current.
+template <class Exec>
+struct nccl_device {
+  int device = 0;  ///< the runtime's number of the GPU
+  Exec exec;       ///< the policy on a stream of that GPU
+};
+
+/// Returns what all ranks of a new communicator must be given.
+/// One rank makes it.
+/// The host brings its bytes to the others, by MPI for example.
+/// It serves one communicator.
+/// Throws rank_error.
+inline ncclUniqueId make_nccl_id() {
+  ncclUniqueId id;
+  detail::check_nccl(ncclGetUniqueId(&id), "ncclGetUniqueId");
+  return id;
+}
+
+/// The ranks of an NCCL communicator.
+/// Exec is a policy that has a stream(), such as exec::cuda.
+/// Arrays lie in device memory, of the GPU whose stream the policy has.
+/// That GPU must be current in all calls, as for the policy.
+///
+/// One process with all GPUs of a machine calls join_devices().
+/// One process a GPU, with MPI between them:
+///
+///   ncclUniqueId id = {};
+///   if (rank == 0) id = wfpg::make_nccl_id();
+///   MPI_Bcast(&id, sizeof id, MPI_BYTE, 0, MPI_COMM_WORLD);
+///   cudaSetDevice(device);
+///   const wfpg::exec::cuda exec;
+///   wfpg::nccl_communicator<wfpg::exec::cuda> ranks(exec, rank, size, id);
+///
+/// After rank_error, further calls throw at once.
+/// What NCCL had begun is aborted, so that the stream can be used.
+/// The guider's own arrays may then hold sums of some ranks.
+///
+/// One thread at a time may call one rank's communicator.
+/// Ranks of one process need a thread each, since calls wait for the other ranks.
+template <class Exec>
+class nccl_communicator final : public communicator {
+ public:
+  /// Joins ranks 0 to size - 1, which all must make one with the same `id`.
+  /// Throws rank_error where a rank does not come within the time limit.
+  /// Throws std::invalid_argument where `rank` is not less than `size`, or for options out of range.
+  nccl_communicator(const Exec& exec, std::uint32_t rank, std::uint32_t size, const ncclUniqueId& id,
+                    const nccl_options& options = {})
+      : nccl_communicator(exec, rank, size, options) {
+    begin(id);
+    wait_for_nccl("ncclCommInitRankConfig");
+  }
+  /// Not copyable: ranks are joined once.
+  nccl_communicator(const nccl_communicator&) = delete;
+  nccl_communicator& operator=(const nccl_communicator&) = delete;
+  /// Leaves the communicator.
+  /// Waits for NCCL's last work, no longer than the time limit.
+  ~nccl_communicator() override {
+    if (!ranks_) return;
+    try {
+      detail::check_nccl(ncclCommFinalize(ranks_), "ncclCommFinalize");
+      wait_for_nccl("ncclCommFinalize");
+      ncclCommDestroy(ranks_);
+    } catch (const rank_error&) {
+      // NCCL's communicator is aborted, and destructors must not throw.
+    }
+  }
+
+  /// Returns the communicators of GPUs of this process, all of them, in the order of `devices`.
+  /// Each is then for a thread of its own.
+  /// The current GPU stays what it was.
+  /// Throws rank_error, device_error, or std::invalid_argument where there is no GPU.
+  static std::vector<std::unique_ptr<nccl_communicator>> join_devices(
+      const std::vector<nccl_device<Exec>>& devices, const nccl_options& options = {}) {
+    require(!devices.empty(), "devices", devices.size(), "one or more");
+    int before = 0;
+    detail::check_runtime(cudaGetDevice(&before), "cudaGetDevice");
+    std::vector<std::unique_ptr<nccl_communicator>> all;
+    const ncclUniqueId id = make_nccl_id();
+    const auto size = static_cast<std::uint32_t>(devices.size());
+    // A group, so that no call waits for those after it.
+    detail::check_nccl(ncclGroupStart(), "ncclGroupStart");
+    for (std::uint32_t rank = 0; rank < size; ++rank) {
+      detail::check_runtime(cudaSetDevice(devices[rank].device), "cudaSetDevice");
+      all.emplace_back(new nccl_communicator(devices[rank].exec, rank, size, options));
+      all.back()->begin(id);
+    }
+    detail::check_nccl(ncclGroupEnd(), "ncclGroupEnd");
+    for (const std::unique_ptr<nccl_communicator>& one : all) one->wait_for_nccl("ncclCommInitRankConfig");
+    detail::check_runtime(cudaSetDevice(before), "cudaSetDevice");
+    return all;
+  }
+
+  /// Returns the number of this GPU, as it was given.
+  std::uint32_t rank() const override { return rank_; }
+  /// Returns the number of GPUs.
+  std::uint32_t size() const override { return size_; }
+  /// Sums 32-bit values in device memory.
+  /// Throws rank_error where a rank is late, is lost, or calls with another number of values.
+  void all_reduce_sum(array_view<std::uint32_t> values) override {
+    reduce(detail::rank_function::sum32, values, ncclUint32, ncclSum);
+  }
+  /// Sums 64-bit values.
+  /// Throws rank_error likewise.
+  void all_reduce_sum(array_view<std::uint64_t> values) override {
+    reduce(detail::rank_function::sum64, values, ncclUint64, ncclSum);
+  }
+  /// Takes the largest values of 32 bits.
+  /// Throws rank_error likewise.
+  void all_reduce_max(array_view<std::uint32_t> values) override {
+    reduce(detail::rank_function::max32, values, ncclUint32, ncclMax);
+  }
+  /// Takes the largest values of 64 bits.
+  /// Throws rank_error likewise.
+  void all_reduce_max(array_view<std::uint64_t> values) override {
+    reduce(detail::rank_function::max64, values, ncclUint64, ncclMax);
+  }
+  /// Sends the bytes of the rank `root` to all others.
+  /// Throws rank_error likewise.
+  /// Throws std::invalid_argument where no rank has the number `root`.
+  void broadcast(array_view<unsigned char> bytes, std::uint32_t root) override {
+    require(root < size_, "root", root, "less than the number of ranks");
+    const detail::rank_call call{detail::rank_function::broadcast, bytes.size(), root};
+    require_same(call);
+    if (bytes.empty()) return;
+    exchange(detail::name_of(call.function),
+             ncclBroadcast(bytes.data(), bytes.data(), bytes.size(), ncclUint8, static_cast<int>(root),
+                           ranks_, exec_.stream()));
+  }
+
+ private:
+  /// Joins nobody yet.
+  /// Checks arguments, and takes memory of the current GPU.
+  /// begin() and wait_for_nccl() do the rest, so that several can begin before one waits.
+  nccl_communicator(const Exec& exec, std::uint32_t rank, std::uint32_t size, const nccl_options& options)
+      : exec_(exec), options_(options), rank_(rank), size_(size) {
+    require(rank < size, "rank", rank, "less than the number of ranks");
+    require(options.seconds > 0.0 && options.seconds <= 1.0e6, "seconds", options.seconds,
+            "above 0, up to 1e6");
+  }
+
+  /// Begins to join the other ranks, and returns at once.
+  /// NCCL writes ranks_ later where calls are grouped, so this object must not move.
+  void begin(const ncclUniqueId& id) {
+    ncclConfig_t config = NCCL_CONFIG_INITIALIZER;
+    config.blocking = 0;
+    detail::check_nccl(
+        ncclCommInitRankConfig(&ranks_, static_cast<int>(size_), id, static_cast<int>(rank_), &config),
+        "ncclCommInitRankConfig");
+  }
+
+  /// Checks that ranks agree, and reduces values in device memory.
+  template <class T>
+  void reduce(detail::rank_function function, array_view<T> values, ncclDataType_t type,
+              ncclRedOp_t operation) {
+    require_same({function, values.size()});
+    if (!values.empty()) all_reduce(values, type, operation, detail::name_of(function));
+  }
+
+  /// Reduces values in place, and waits for them.
+  /// `doing`: the function that was called, for messages.
+  /// Precondition: ranks agree on the number of values, which is not 0.
+  template <class T>
+  void all_reduce(array_view<T> values, ncclDataType_t type, ncclRedOp_t operation, const char* doing) {
+    exchange(doing, ncclAllReduce(values.data(), values.data(), values.size(), type, operation, ranks_,
+                                  exec_.stream()));
+  }
+
+  /// Throws rank_error unless all ranks make this call.
+  /// NCCL does not check that: its kernels may wait without end.
+  void require_same(const detail::rank_call& call) {
+    if (!ranks_) throw rank_error("the communicator is of no more use, since an earlier call has failed");
+    // The rank's own work comes first, so that the time limit is for the others alone.
+    detail::check_runtime(cudaStreamSynchronize(exec_.stream()), "cudaStreamSynchronize");
+    std::uint64_t words[detail::rank_call::word_count];
+    call.write(words);
+    exec_.copy_from_host(words_.view().data(), words, sizeof words);
+    all_reduce(words_.view(), ncclUint64, ncclMax, detail::name_of(call.function));
+    exec_.copy_to_host(words, words_.view().data(), sizeof words);
+    if (call.agrees(words)) return;
+    // Ranks are no longer in step, so that later calls must fail, too.
+    abandon();
+    call.require_same(words, rank_);
+  }
+
+  /// Waits until a collective is done.
+  /// `begun`: what NCCL returned when it was put on the stream.
+  /// Throws rank_error where that failed, or after the time limit.
+  void exchange(const char* doing, ncclResult_t begun) {
+    if (begun != ncclSuccess && begun != ncclInProgress) abandon();
+    detail::check_nccl(begun, doing);
+    wait_for_nccl(doing);  // until it is on the stream
+    detail::check_runtime(cudaEventRecord(done_.get(), exec_.stream()), "cudaEventRecord");
+    wait(doing, [&] {
+      const cudaError_t code = cudaEventQuery(done_.get());
+      if (code != cudaErrorNotReady) detail::check_runtime(code, doing);
+      return code == cudaSuccess;
+    });
+  }
+
+  /// Waits until NCCL's host code has done what it was asked for.
+  /// Calls that do not block return before that.
+  void wait_for_nccl(const char* doing) {
+    wait(doing, [] { return true; });
+  }
+
+  /// Waits until NCCL has no work on the host, and is_done() returns true.
+  /// Throws rank_error after the time limit, or where NCCL reports an error.
+  /// Such errors are a network's, or a rank's that has aborted.
+  /// Looks without pause, since a pause is as long as a small exchange.
+  template <class Done>
+  void wait(const char* doing, const Done& is_done) {
+    using clock = std::chrono::steady_clock;
+    const clock::time_point begin = clock::now();
+    for (;;) {
+      ncclResult_t state = ncclSuccess;
+      const ncclResult_t asked = ncclCommGetAsyncError(ranks_, &state);
+      const ncclResult_t found = asked != ncclSuccess ? asked : state;
+      if (found == ncclSuccess && is_done()) return;
+      if (found != ncclSuccess && found != ncclInProgress) {
+        abandon();
+        detail::check_nccl(found, doing);
+      }
+      const double waited = std::chrono::duration<double>(clock::now() - begin).count();
+      if (waited > options_.seconds) {
+        abandon();
+        throw detail::late_error(rank_, doing, options_.seconds);
+      }
+      std::this_thread::yield();
+    }
+  }
+
+  /// Ends NCCL's kernels on the stream.
+  /// Later calls see that there is no communicator.
+  void abandon() { ncclCommAbort(std::exchange(ranks_, nullptr)); }
+
+  /// The policy on whose stream the collectives are.
+  Exec exec_;
+  /// As given; ranks are not asked whether they have the same.
+  nccl_options options_;
+  std::uint32_t rank_ = 0, size_ = 0;
+  /// What ranks compare before each exchange.
+  detail::rank_words words_;
+  /// Comes after a collective on the stream.
+  detail::cuda_event done_;
+  /// Null after a failure.
+  ncclComm_t ranks_ = nullptr;
+};
+
+}  // namespace wfpg

@@ -1,0 +1,144 @@
+// Ranks as threads of one process: for tests, and for ranks that share one GPU. Each thread owns a
+// thread_communicator; all of them refer to one thread_ranks.
+//
+//   wfpg::thread_ranks ranks(4);
+//   // in thread r:
+//   wfpg::thread_communicator<Exec> here(exec, ranks, r);
+//   options.ranks = &here;
+//
+// Values are added in the order in which ranks come, which does not matter for integers. The last rank that
+// comes to a call completes it. Ranks that wait throw rank_error where one is late, has
+// destroyed its communicator, or makes another call.
+//
+// Source: wfpg's own.
+// Cost: a call copies the values to the host and back, and adds them under one lock. It waits for the
+// policy's work. Memory: a host copy of the values of the two last calls, and one more a rank.
+#pragma once
+
+#include <wfpg/ranks/communicator.hpp>
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <vector>
+
+namespace wfpg {
+
+/// The meeting point of n ranks in one process. It must outlive their communicators. Any thread may use it.
+/// Neither movable nor copyable.
+class thread_ranks {
+ public:
+  /// A meeting point of ranks 0 to n - 1; n is at least 1. Each of them has to have a communicator. A rank
+  /// waits for others up to `limit`. Then all ranks throw rank_error.
+  explicit thread_ranks(std::uint32_t n, std::chrono::milliseconds limit = std::chrono::seconds(30))
+      : came_(n > 0 ? n : 1, false), limit_(limit) {}
+  // Communicators refer to it.
+  thread_ranks(const thread_ranks&) = delete;
+  thread_ranks& operator=(const thread_ranks&) = delete;
+
+  /// Number of ranks.
+  std::uint32_t size() const { return static_cast<std::uint32_t>(came_.size()); }
+
+ private:
+  template <class Exec>
+  friend class thread_communicator;
+
+  // What a call does with the values of all ranks.
+  enum class reduction { sum32, sum64, max32, max64, broadcast };
+  // What the ranks do together in one turn.
+  struct call {
+    reduction what;
+    std::size_t bytes;   // of each rank's values
+    std::uint32_t root;  // of a broadcast
+
+    // All ranks of a turn must make equal calls.
+    bool operator==(const call& other) const {
+      return what == other.what && bytes == other.bytes && root == other.root;
+    }
+    // As messages say it.
+    std::string text() const;
+  };
+
+  // Waits until all ranks made the call. Then writes its result over `data`.
+  void meet(std::uint32_t rank, const call& now, unsigned char* data);
+  // Adds one rank's values to the turn's result.
+  static void combine(std::uint32_t rank, const call& now, const unsigned char* data,
+                      std::vector<unsigned char>& result);
+  // Ends all calls that wait, and all that follow. The first reason stays.
+  void lose(const std::string& reason);
+  // Whether a rank was lost. No call is made then.
+  bool is_lost() const { return !lost_.empty(); }
+  // A rank's communicator is destroyed.
+  void leave(std::uint32_t rank);
+  // Names the ranks that have not made this turn's call.
+  std::string missing() const;
+
+  // Guards all that follows.
+  std::mutex mutex_;
+  // A turn was completed, or a rank was lost.
+  std::condition_variable changed_;
+  std::vector<bool> came_;  // ranks that made this turn's call
+  // How long a rank waits for others.
+  std::chrono::milliseconds limit_;
+  // Why no further call is made. Empty: calls are made.
+  std::string lost_;
+  std::uint64_t turn_ = 0;     // calls that were completed
+  std::uint32_t arrived_ = 0;  // ranks that made the call of this turn
+  // The call of the turn, and the rank that made it first.
+  call first_{};
+  std::uint32_t first_rank_ = 0;
+  // Of this turn and of the one before, which ranks may still copy.
+  std::vector<unsigned char> results_[2];
+};
+
+/// One rank's communicator, for arrays in the memory of `Exec`. Its thread makes it, uses it and destroys it.
+/// Neither movable nor copyable.
+template <class Exec>
+class thread_communicator final : public communicator {
+ public:
+  /// Rank `rank` of `ranks`, each of which is made once. `exec`: the policy of the guider.
+  thread_communicator(const Exec& exec, thread_ranks& ranks, std::uint32_t rank)
+      : exec_(exec), ranks_(ranks), rank_(rank) {}
+  thread_communicator(const thread_communicator&) = delete;
+  thread_communicator& operator=(const thread_communicator&) = delete;
+  /// Ranks that wait for this one, or will, throw rank_error.
+  ~thread_communicator() override { ranks_.leave(rank_); }
+
+  /// Number of this rank, as the constructor got it.
+  std::uint32_t rank() const override { return rank_; }
+  /// Number of ranks.
+  std::uint32_t size() const override { return ranks_.size(); }
+  /// Replaces each value by its sum over the ranks; waits for all of them. Each of these calls throws
+  /// rank_error where the ranks do not meet within the limit.
+  void all_reduce_sum(array_view<std::uint32_t> values) override { meet(reduction::sum32, values); }
+  void all_reduce_sum(array_view<std::uint64_t> values) override { meet(reduction::sum64, values); }
+  void all_reduce_max(array_view<std::uint32_t> values) override { meet(reduction::max32, values); }
+  void all_reduce_max(array_view<std::uint64_t> values) override { meet(reduction::max64, values); }
+  void broadcast(array_view<unsigned char> bytes, std::uint32_t root) override {
+    meet(reduction::broadcast, bytes, root);
+  }
+
+ private:
+  // As thread_ranks names them.
+  using reduction = thread_ranks::reduction;
+
+  // Takes the values to the host, where the ranks meet, and the result back.
+  template <class T>
+  void meet(reduction what, array_view<T> values, std::uint32_t root = 0) {
+    const std::size_t bytes = values.size() * sizeof(T);
+    host_.resize(bytes);
+    if (bytes > 0) exec_.copy_to_host(host_.data(), values.data(), bytes);
+    ranks_.meet(rank_, {what, bytes, root}, host_.data());
+    if (bytes > 0) exec_.copy_from_host(values.data(), host_.data(), bytes);
+  }
+
+  // As the constructor got it.
+  Exec exec_;  // copies between the policy's memory and the host's
+  thread_ranks& ranks_;
+  std::uint32_t rank_;
+  std::vector<unsigned char> host_;  // values of the last call
+};
+
+}  // namespace wfpg
+
+#include <wfpg/ranks/detail/threads_impl.hpp>
