@@ -303,9 +303,9 @@ TEST_CASE("truncated, altered and foreign guide files have different errors", "[
   for (const std::string& foreign : {std::string(), std::string("\x89PNG\r\n\x1a\n................"),
                                      std::string(1000, '\0'), std::string("glTF"), bytes.substr(1)})
     CHECK(fault(foreign, options) == "wfpg: the guide is not a guide file");
-  CHECK(fault(with_version(bytes, 6), options) ==
-        "wfpg: the guide is of version 6, expected 5 or older: a newer wfpg wrote it");
-  CHECK(fault(with_version(bytes, 2), options) == "wfpg: the guide is of version 2, expected 5");
+  CHECK(fault(with_version(bytes, 7), options) ==
+        "wfpg: the guide is of version 7, expected 6 or older: a newer wfpg wrote it");
+  CHECK(fault(with_version(bytes, 2), options) == "wfpg: the guide is of version 2, expected 6");
   for (const std::size_t at : {8u, 11u, 12u}) {
     std::string altered = bytes;
     altered[at] = static_cast<char>(altered[at] ^ 1);
@@ -430,10 +430,13 @@ TEST_CASE("the content of a guide file is checked, even if its checksums are rig
   refused("counts", 16, 4, 5, "rests in samples that are to come");
   refused("counts", 20, 4, 3, "has rests that no guider has");
   refused("counts", 24, 4, 0, "has rests that no guider has");
-  refused("counts", 36, 8, nan, "has a gain out of range");
+  refused("counts", 28, 4, 0x3f000000u, "has rests that no guider has");
+  refused("counts", 40, 8, nan, "has a gain out of range");
+  refused("counts", 96, 8, nan, "has a gain out of range");
   refused("paths", 0, 4, 2 * nodes, "has paths from no node");
-  refused("paths", 4, 4, infinity, "has radiance that is not finite");
-  refused("paths", section_of(bytes, "paths").size - 8, 4, infinity, "has radiance that is not finite");
+  for (const std::size_t at : {8u, 20u, 24u})
+    refused("paths", at, 4, infinity, "has radiance that is not finite");
+  refused("paths", section_of(bytes, "paths").size - 4, 4, infinity, "has radiance that is not finite");
   refused("levels", 0, 4, 4, "has more samples than there were");
   refused("levels", 4, 4, 36, "has more samples than there were");
   refused("levels", 8, 4, 4, "has more samples than there were");

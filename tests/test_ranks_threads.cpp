@@ -87,7 +87,7 @@ TEST_CASE("ranks that are late, end, or differ are errors of all ranks", "[ranks
                                    if (ranks.rank() == 1) std::this_thread::sleep_for(5 * soon);
                                    ranks.all_reduce_sum(view_of(values));
                                  }),
-          "rank 1 did not come within 100 ms");
+          "did not come within 100 ms");
   const std::vector<std::string> ended = run_ranks<host_policy>(3, later, [&](communicator& ranks) {
     std::vector<std::uint32_t> values{1};
     ranks.all_reduce_sum(view_of(values));
@@ -111,6 +111,27 @@ TEST_CASE("ranks that are late, end, or differ are errors of all ranks", "[ranks
                                      ranks.all_reduce_max(view_of(values));
                                  }),
           "maximum of 32 bits of 8 bytes");
+}
+
+TEST_CASE("ranks that are none, or are made twice, are refused", "[ranks_threads]") {
+  using here = wfpg::thread_communicator<host_policy>;
+  wfpg::thread_ranks ranks(2, later);
+  CHECK_THROWS_AS(here(host_policy(), ranks, 2), std::invalid_argument);
+  here first(host_policy(), ranks, 0), again(host_policy(), ranks, 0);
+  const auto error_of = [](here& rank) {
+    std::vector<std::uint32_t> values{1};
+    try {
+      rank.all_reduce_sum(view_of(values));
+    } catch (const wfpg::rank_error& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  std::string error;
+  std::thread waits([&] { error = error_of(first); });
+  CHECK(error_of(again).find("rank 0 has two communicators") != std::string::npos);
+  waits.join();
+  CHECK(error.find("rank 0 has two communicators") != std::string::npos);
 }
 
 TEST_CASE("a single rank has the values of all ranks", "[ranks_threads]") {

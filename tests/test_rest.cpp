@@ -245,6 +245,31 @@ WFPG_TEST_CASE("rest: a gain below the option's lets a guide rest once it is set
   CHECK(guided_of_40(exec, options, gains_surely) == numbers{3, 4, 6, 7, 8, 16, 32});
 }
 
+WFPG_TEST_CASE("rest: unset, least_gain follows the triangles on CPUs, also of a guide that is loaded",
+               "[rest]") {
+  const Exec exec;
+  wfpg::kept_guide_options options = rest_options();
+  options.least_gain.reset();
+  constexpr chances gains_two{0.5f, 0.6667f};  // a gain of 2: more than 1.75, less than 2.26 for 12 triangles
+  const box_mesh<Exec> mesh(exec);
+  const auto rests_after = [&](wfpg::path_guider<Exec>& guider, std::uint32_t first) {
+    guided_samples(exec, guider, first, 17, gains_two);
+    return guider.resting();
+  };
+  const bool on_cpu = Exec::warps_per_block == 1;
+  wfpg::path_guider<Exec> of_mesh(exec, mesh.view(), options), begun(exec, mesh.view(), options);
+  CHECK(rests_after(of_mesh, 1) == on_cpu);
+  guided_samples(exec, begun, 1, 4, gains_two);
+  std::ostringstream out;
+  wfpg::save_guide(begun, out);
+  std::istringstream in(out.str());
+  wfpg::path_guider<Exec> loaded = wfpg::load_guide(exec, in, options);
+  CHECK(rests_after(loaded, 5) == on_cpu);
+  wfpg::path_guider<Exec> unknown(exec, wfpg::voxelize(exec, mesh.view(), options.octree_resolution),
+                                  options);
+  CHECK(!rests_after(unknown, 1));
+}
+
 WFPG_TEST_CASE("rest: directions of samples that rest are the BSDF's, and nothing is recorded", "[rest]") {
   const Exec exec;
   wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), rest_options());

@@ -211,6 +211,7 @@ incident_light learnt_scene::arriving(const render::hit_surface& at, const direc
     const bool is_second = picture == &light.second;
     render::tracer_settings settings = render::tracer_settings_of(s.options);
     settings.width = settings.height = side;
+    settings.share = {};  // all cells
     --settings.max_depth;
     settings.seed += reference_seed + (is_second ? 1 : 0);
     tracer_type tracer(s.exec, settings, {s.geometry.view(), s.lights_by_power.view(), s.options.nee},

@@ -165,7 +165,7 @@ class path_guider {
   /// Returns the view that chooses lights for next-event estimation, valid for the current sample. A
   /// light_guide_view, or no_light_choices for a guide that does not choose lights. Empty where choices of
   /// lights rest with the guide, since they gain little: rest_constants::light_gain.
-  auto lights() const { return lights_rest() ? decltype(guide_.lights())() : guide_.lights(); }
+  auto lights() const { return lights_rest_now_ ? decltype(guide_.lights())() : guide_.lights(); }
 
   /// The guide, to look at what it learnt.
   const Guide& guide() const { return guide_; }
@@ -217,17 +217,18 @@ class path_guider {
                           static_cast<std::uint32_t>(options_.first_path)}),
         shared_counters_(exec_, options_.ranks ? recorder_.counters().size() : 0) {
     require(needs_.sample_stride >= 1, "sample_stride", needs_.sample_stride, "at least 1");
-    if (options_.ranks) join_ranks();
+    const float least = least_gain<std::decay_t<Scene>>(scene);
+    if (options_.ranks) join_ranks(least);
     if constexpr (Guide::measures_gain) {
       if (!guide_.measures()) return;
-      rests_ = rest_schedule(least_gain<std::decay_t<Scene>>(scene), options_.unguided_samples);
+      rests_ = rest_schedule(least, options_.unguided_samples);
       compared_ = {needs_.fraction_shift, static_cast<std::uint32_t>(seed_of(0)), guide_.rarer(),
                    static_cast<std::uint32_t>(options_.first_path)};
     }
   }
 
-  /// Whether choices of lights rest in the current sample.
-  bool lights_rest() const { return rests_now_ && gain_.value() < rest_constants::light_gain; }
+  /// Whether choices of lights rest in samples that the guide rests in.
+  bool lights_rest() const { return gain_.value() < rest_constants::light_gain; }
   /// Gain below which guiding does not pay: the option, or what suits policy and scene. A CPU policy's blocks
   /// have one warp.
   template <class Scene>
@@ -246,10 +247,12 @@ class path_guider {
     detail::require_valid(static_cast<const sampling_options&>(options));
     require(!options.ranks || Guide::joins_ranks, "ranks", "set", "null: ranks cannot share this guide");
     if (!options.max_rays) options.max_rays = options.max_paths;
+    require(!options.ranks || *options.max_rays <= options.max_paths, "max_rays", *options.max_rays,
+            "at most max_paths where ranks share a sample");
     return options;
   }
-  /// Checks that all ranks learn the same guide.
-  void join_ranks();
+  /// Checks that all ranks learn the same guide, and rest below the same gain.
+  void join_ranks(float least_gain);
   /// Fails to compile where the renderer's types lack what they need; throws where the wave is too large.
   template <class Surfaces, class Random, class Caster>
   void check(const wave<Surfaces, Random>& w, const Caster& caster) const;
@@ -307,6 +310,7 @@ class path_guider {
   std::uint32_t warm_up_end_ = recording_needs::warm_up_samples;  // the last sample of the warm-up
   bool recorded_ = true;                                          // the current sample
   bool rests_now_ = false;                                        // the current sample
+  bool lights_rest_now_ = false;                                  // the current sample
   bool probes_now_ = false;                                       // the current sample
   float weight_ = 1.0f;                                           // the current sample, if it is guided
   bool measured_ = false;                                         // the current sample, in end_sample()

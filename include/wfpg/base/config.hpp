@@ -22,8 +22,9 @@
 #define WFPG_HD
 #endif
 
-/// Stands before a host's function that many places call and that takes long beside a call.
-/// The compiler then makes it once, not once in each of its callers.
+/// Stands before a function that many places call and that takes long beside a call.
+/// The compiler then makes it once, not once in each of its callers. So its floats are rounded alike in all
+/// of them, too.
 #define WFPG_NOINLINE __attribute__((noinline))
 
 /// Stands before a host's function that seldom runs, such as one that makes an exception.

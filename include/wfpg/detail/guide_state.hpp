@@ -31,8 +31,10 @@ struct state_access {
     key = hash(key, o.deposits_per_leaf.value_or(0));
     key = hash(key, o.seed);
     key = hash(key, o.unguided_samples);
-    return static_cast<std::uint32_t>(
-        hash(key, float_bits(guider.guide_.measures() ? o.least_gain.value_or(0.5f) : -1.0f)));
+    return static_cast<std::uint32_t>(hash(
+        key,
+        float_bits(guider.guide_.measures() ? o.least_gain.value_or(Exec::warps_per_block > 1 ? 0.25f : 0.5f)
+                                            : -1.0f)));
   }
   template <class Exec, class Guide>
   static void put_rests(const path_guider<Exec, Guide>& guider, section_writer& bytes) {
@@ -80,6 +82,7 @@ struct state_access {
     bytes.require(guider.rests_.restore(guider.samples_, state), "has rests that no guider has");
     guider.rests_now_ = guider.rests_.rests(guider.samples_);
     guider.gain_ = gain;
+    guider.lights_rest_now_ = guider.rests_now_ && guider.lights_rest();
   }
 
   template <class Exec, class Guide>
@@ -127,6 +130,11 @@ struct state_access {
     guide_sections::load_lights(guider.exec_, file, guider.guide_);
     guide_sections::load_paths(guider.exec_, file, guider.guide_);
     file.end();
+    if (options.ranks) {
+      agreed_items items;
+      items.add("the guide that they load", file.checksums());
+      items.check(guider.exec_, *options.ranks);
+    }
     return guider;
   }
 };

@@ -24,6 +24,7 @@ path_guider<Exec, Guide>& path_guider<Exec, Guide>::operator=(path_guider&& othe
   warm_up_end_ = other.warm_up_end_;
   recorded_ = other.recorded_;
   rests_now_ = other.rests_now_;
+  lights_rest_now_ = other.lights_rest_now_;
   probes_now_ = other.probes_now_;
   weight_ = other.weight_;
   measured_ = other.measured_;
@@ -34,7 +35,7 @@ path_guider<Exec, Guide>& path_guider<Exec, Guide>::operator=(path_guider&& othe
 
 // The version first: others may have other items.
 template <class Exec, class Guide>
-void path_guider<Exec, Guide>::join_ranks() {
+void path_guider<Exec, Guide>::join_ranks(float least_gain) {
   agreed_items version;
   version.add("the version of wfpg",
               std::uint64_t(1000000 * WFPG_VERSION_MAJOR + 1000 * WFPG_VERSION_MINOR + WFPG_VERSION_PATCH));
@@ -42,6 +43,7 @@ void path_guider<Exec, Guide>::join_ranks() {
   agreed_items items;
   items.add("the kind of policy", std::uint64_t(Exec::warps_per_block > 1));
   detail::add_options(items, options_);
+  items.add("least_gain, or the number of triangles", least_gain);
   if constexpr (Guide::joins_ranks) guide_.agree(exec_, items);
   items.check(exec_, *options_.ranks);
   detail::require_all_paths(exec_, options_);
@@ -62,10 +64,11 @@ void path_guider<Exec, Guide>::begin_sample() {
   const std::uint64_t chosen = is_measured ? seed_of(0) : seed_of(sample);
   recorder_.begin_sample(exec_, static_cast<std::uint32_t>(chosen), recorded_,
                          probes_now_ ? compared_.rarer : 0);
-  if (rests_now_)
-    guide_.begin_rest(at(sample));
-  else
+  lights_rest_now_ = rests_now_ && lights_rest();
+  if (!rests_now_)
     guide_.begin_sample(at(sample));
+  else if (!lights_rest_now_)
+    guide_.begin_rest(at(sample));
   measured_ = false;
   samples_ = sample;  // last, with the count: a call that threw is made again for the same sample
   rests_.count(sample);
@@ -85,7 +88,7 @@ void path_guider<Exec, Guide>::end_sample() {
   const auto timed = clock_.time(stage::cache);
   if (!rests_now_)
     guide_.update(now());
-  else if (!lights_rest())
+  else if (!lights_rest_now_)
     guide_.end_rest(now());
   if (options_.ranks)
     shared_counters_.sum(exec_, *options_.ranks,

@@ -134,10 +134,10 @@ struct guide_base {
   /// and a default view_type guides no ray. The last two run before learn(), keep_unguided() after an
   /// unguided sample.
   static constexpr bool measures_gain = false;
-  /// Runs in place of begin_sample() before a sample that the guide rests in.
+  /// Runs in place of begin_sample() before a sample that the guide rests in, but for its choices of lights.
   template <class Exec>
   void begin_rest(const sample_context<Exec>&) {}
-  /// Runs in place of learn() and update() after a sample that the guide rested in.
+  /// Runs in place of learn() and update() after a sample that began with begin_rest().
   template <class Exec>
   void end_rest(const sample_context<Exec>&) {}
 

@@ -3,7 +3,8 @@
 //
 // Ranks that differ would learn different guides, or wait for each other in calls that others do not make.
 //
-// Source: wfpg's own. Cost: two reductions when a guider is made. Memory: 24 bytes an item, during the call.
+// Source: wfpg's own. Cost: three reductions when a guider is made. Memory: 24 bytes an item, during the
+// call.
 #pragma once
 
 #include <wfpg/base/math.hpp>

@@ -41,9 +41,10 @@ struct rest_constants {
   /// least_gain of policies whose blocks have several warps. On an H200 a guided vertex takes 1.3 times an
   /// unguided one's time.
   static constexpr float gpu_least_gain = 1.25f;
-  /// least_gain of other policies, for a scene of `triangles`; 0: it is not known. On one thread a guided
-  /// vertex takes 2.2 times an unguided one's time among 32 triangles, and 1.6 times among 600,000. What
-  /// guiding costs does not depend on them. A ray takes the longer, the more they are.
+  /// least_gain of other policies, for a scene of `triangles`; 0: it is not known. What guiding costs does
+  /// not depend on them, and a ray takes the longer, the more they are. On one thread a guided vertex
+  /// takes 2.2 times an unguided one's time among 32 triangles, and 1.6 times among 600,000. There the gain
+  /// of typical paths is less than that of all, so that less is asked for.
   static float cpu_least_gain(std::size_t triangles) {
     if (triangles == 0) return 1.75f;
     const int bits = bits_of(static_cast<std::uint32_t>(min<std::size_t>(triangles, 1u << 31)));
@@ -114,10 +115,11 @@ class rest_schedule {
         static_cast<float>(age_of(sample)) / static_cast<float>(rest_constants::settled_samples);
     return 1.0f + (least_gain_ - 1.0f) * min(part, 1.0f);
   }
-  /// Takes what was measured in a sample. From the next one on the guide rests where the gain is known and
-  /// less than threshold(). It takes part in all paths where the gain is at least least_gain, or not known.
-  /// Between them it goes on as it did. Nothing is decided before the first comparison. Precondition:
-  /// compares(sample).
+  /// Takes what was measured in a sample, which decides from the next one on. The guide takes part in all
+  /// paths where the gain is not known, or at least least_gain. It rests where the gain is less than
+  /// threshold(). Between them it takes part in as many as before, and in few where it rested. Noisy paths
+  /// have limits of their own, gain_in_noise and loss_in_noise. Nothing is decided before the first
+  /// comparison. Precondition: compares(sample).
   void decide(std::uint32_t sample, const guiding_gain& measured) {
     if (age_of(sample) < rest_constants::first_comparison) return;
     weight_ = weight_of(measured);

@@ -111,7 +111,7 @@ struct guiding_gain {
 struct guider_statistics {
   std::uint32_t samples = 0;         ///< samples begun
   std::uint32_t guided_samples = 0;  ///< samples begun after unguided_samples, where the guide can guide and
-                                     ///< did not rest; up to three were left out, to be compared
+                                     ///< did not rest; of these, samples that are compared may be unguided
   /// Samples begun in which the guide rested, since guiding gained less than least_gain.
   std::uint32_t rested_samples = 0;
   /// Mean of the comparisons of guided samples with an unguided one. Each weighs half of the one after it.

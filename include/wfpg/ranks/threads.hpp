@@ -29,15 +29,17 @@ namespace wfpg {
 class thread_ranks {
  public:
   /// A meeting point of ranks 0 to n - 1; n is at least 1. Each of them has to have a communicator. A rank
-  /// waits for others up to `limit`. Then all ranks throw rank_error.
+  /// waits for others up to `limit`, at most a day. Then all ranks throw rank_error.
   explicit thread_ranks(std::uint32_t n, std::chrono::milliseconds limit = std::chrono::seconds(30))
-      : came_(n > 0 ? n : 1, false), limit_(limit) {}
+      : size_(n > 0 ? n : 1),
+        came_(size_, false),
+        limit_(limit < std::chrono::hours(24) ? limit : std::chrono::hours(24)) {}
   // Communicators refer to it.
   thread_ranks(const thread_ranks&) = delete;
   thread_ranks& operator=(const thread_ranks&) = delete;
 
   /// Number of ranks.
-  std::uint32_t size() const { return static_cast<std::uint32_t>(came_.size()); }
+  std::uint32_t size() const { return size_; }
 
  private:
   template <class Exec>
@@ -73,6 +75,7 @@ class thread_ranks {
   // Names the ranks that have not made this turn's call.
   std::string missing() const;
 
+  const std::uint32_t size_;
   // Guards all that follows.
   std::mutex mutex_;
   // A turn was completed, or a rank was lost.
@@ -96,9 +99,14 @@ class thread_ranks {
 template <class Exec>
 class thread_communicator final : public communicator {
  public:
-  /// Rank `rank` of `ranks`, each of which is made once. `exec`: the policy of the guider.
+  /// Rank `rank` of `ranks`, each of which is made once. `exec`: the policy of the guider. Throws
+  /// std::invalid_argument where there is no such rank.
   thread_communicator(const Exec& exec, thread_ranks& ranks, std::uint32_t rank)
-      : exec_(exec), ranks_(ranks), rank_(rank) {}
+      : exec_(exec), ranks_(ranks), rank_(rank) {
+    if (rank >= ranks.size())
+      throw std::invalid_argument("wfpg: rank is " + std::to_string(rank) + ", but must be less than " +
+                                  std::to_string(ranks.size()));
+  }
   thread_communicator(const thread_communicator&) = delete;
   thread_communicator& operator=(const thread_communicator&) = delete;
   /// Ranks that wait for this one, or will, throw rank_error.

@@ -61,7 +61,6 @@ inline void add_options(agreed_items& items, const sampling_options& o) {
   items.add("guided_depths", std::uint64_t(o.guided_depths));
   items.add("include_emission", std::uint64_t(o.include_emission));
   items.add("unguided_samples", std::uint64_t(o.unguided_samples));
-  items.add("least_gain", o.least_gain.value_or(-1.0f));
   items.add("seed", o.seed);
   items.add("silent_escapes", std::uint64_t(o.silent_escapes));
 }

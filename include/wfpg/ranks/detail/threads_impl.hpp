@@ -53,6 +53,10 @@ inline void thread_ranks::meet(std::uint32_t rank, const call& now, unsigned cha
          ": all ranks must have the same options, samples and waves");
     throw rank_error(lost_);
   }
+  if (came_[rank]) {
+    lose("rank " + std::to_string(rank) + " has two communicators: make one a rank");
+    throw rank_error(lost_);
+  }
   combine(rank, now, data, result);
   came_[rank] = true;
   if (++arrived_ == size()) {

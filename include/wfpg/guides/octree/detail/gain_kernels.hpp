@@ -84,8 +84,9 @@ struct measured_paths {
 
   /// Number of paths, which i counts. Some may not be recorded.
   std::size_t size() const { return compared.size(recorded.paths()); }
-  /// Path i: without radiance where it is not recorded, or hit no surface first.
-  WFPG_HD measured_path operator()(std::size_t i) const {
+  /// Path i: without radiance where it is not recorded, or hit no surface first. Not inlined: a reduction
+  /// calls it from several places, and radiance must not depend on which of them.
+  WFPG_HD WFPG_NOINLINE measured_path operator()(std::size_t i) const {
     std::uint32_t index;
     if (!recorded.has_place(compared.path(static_cast<std::uint32_t>(i)), index)) return {};
     const recorded_path path(recorded, index);
