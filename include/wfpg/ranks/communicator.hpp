@@ -19,7 +19,7 @@
 namespace wfpg {
 
 /// Thrown where a rank is lost, is late, or renders something else than the others do. The communicator is of
-/// no more use, and a guider that uses it may only be destroyed: its guide may have a part of a sample.
+/// no more use then. A guider that uses it may only be destroyed: its guide may have a part of a sample.
 class rank_error : public std::runtime_error {
  public:
   /// The message becomes "wfpg: REASON".

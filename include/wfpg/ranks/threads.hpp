@@ -75,6 +75,7 @@ class thread_ranks {
   // Names the ranks that have not made this turn's call.
   std::string missing() const;
 
+  // Number of ranks.
   const std::uint32_t size_;
   // Guards all that follows.
   std::mutex mutex_;
