@@ -86,6 +86,7 @@ class thread_ranks {
   std::chrono::milliseconds limit_;
   // Why no further call is made. Empty: calls are made.
   std::string lost_;
+  // Turns are counted, so that a rank that waits knows its own.
   std::uint64_t turn_ = 0;     // calls that were completed
   std::uint32_t arrived_ = 0;  // ranks that made the call of this turn
   // The call of the turn, and the rank that made it first.
