@@ -47,6 +47,9 @@ class Wfpg(ConanFile):
         toolchain = CMakeToolchain(self)
         for what in ("TESTS", "EXAMPLES"):
             toolchain.cache_variables[f"WFPG_BUILD_{what}"] = False
+        # The package has these targets either way.
+        for what in ("MPI", "NCCL"):
+            toolchain.cache_variables[f"WFPG_{what}"] = False
         toolchain.cache_variables["WFPG_INSTALL"] = True
         toolchain.cache_variables["CMAKE_DISABLE_FIND_PACKAGE_TBB"] = not self.options.with_tbb
         toolchain.generate()

@@ -1,8 +1,10 @@
 // Ranks as GPUs of one process, a thread each, joined by NCCL. With one GPU there is one rank.
+#include "cuda/shared_walls.hpp"
 #include "support/catch.hpp"
 
 #include <wfpg/exec/cuda.hpp>
 #include <wfpg/ranks/nccl.hpp>
+#include <wfpg/ranks/single.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -26,6 +28,14 @@ std::vector<T> values_of(std::uint32_t rank, std::size_t count) {
   std::vector<T> values(count);
   for (std::size_t i = 0; i < count; ++i) values[i] = static_cast<T>(value_of(rank, i));
   return values;
+}
+
+/// Whether there are several GPUs. Where there are not, says that the test is skipped.
+bool has_several_devices() {
+  int count = 0;
+  wfpg::check_cuda(cudaGetDeviceCount(&count), "cudaGetDeviceCount");
+  if (count < 2) WARN("skipped: it needs two GPUs");
+  return count >= 2;
 }
 
 // Calls f(communicator, policy) of every GPU, a thread each, and returns what each throws.
@@ -99,9 +109,7 @@ TEST_CASE("NCCL: sums, maxima and broadcasts are those of all GPUs", "[ranks][nc
 }
 
 TEST_CASE("NCCL: a late GPU, or one that disagrees, is an error on the others", "[ranks][nccl]") {
-  int count = 0;
-  wfpg::check_cuda(cudaGetDeviceCount(&count), "cudaGetDeviceCount");
-  if (count < 2) return;
+  if (!has_several_devices()) return;
   const bool is_late = GENERATE(false, true);
   const std::vector<std::string> errors =
       on_all_devices({1.0}, [&](nccl_communicator& ranks, const exec& policy) {
@@ -111,4 +119,35 @@ TEST_CASE("NCCL: a late GPU, or one that disagrees, is an error on the others", 
       });
   CHECK_THAT(errors[0], WFPG_TEST_CONTAINS(is_late ? "rank 0 waited 1 s in all_reduce_sum"
                                                    : "with 5 values, ranks have 5 to 6"));
+}
+
+TEST_CASE("NCCL: GPUs learn the guide of one", "[ranks][nccl]") {
+  if (!has_several_devices()) return;
+  constexpr std::uint32_t rays = 3000;
+  const exec policy;
+  wfpg::single_rank alone;
+  const std::string expected = wfpg_test::learnt_by_ranks(policy, alone, rays);
+  CHECK(expected.size() > 1000);
+  const std::vector<std::string> errors = on_all_devices({}, [&](nccl_communicator& ranks, const exec& own) {
+    if (wfpg_test::learnt_by_ranks(own, ranks, rays) != expected) throw std::runtime_error("other bytes");
+  });
+  for (const std::string& error : errors) CHECK(error.empty());
+}
+
+TEST_CASE("NCCL: one thread may destroy all communicators of a process", "[ranks][nccl]") {
+  if (!has_several_devices()) return;
+  cudaSetDevice(0);
+  const exec first;
+  cudaSetDevice(1);
+  const exec second;
+  const auto begin = std::chrono::steady_clock::now();
+  nccl_communicator::join_devices({{0, first}, {1, second}}).clear();
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(20));
+  int current = 0;
+  cudaGetDevice(&current);
+  CHECK(current == 1);
+  // A GPU that there is not: the error leaves no group open.
+  CHECK_THROWS_AS(nccl_communicator::join_devices({{0, first}, {1000, second}}), wfpg::device_error);
+  CHECK(nccl_communicator::join_devices({{0, first}, {1, second}}).size() == 2);
+  cudaSetDevice(0);
 }

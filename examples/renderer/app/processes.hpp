@@ -7,18 +7,21 @@
 
 namespace render {
 
+/// Number of processes that mpirun or the like has started, as the environment says; 1 where it says nothing.
+int started_processes();
+
 class processes {
  public:
-  /// Joins them. One process alone is one rank. To be made once a process. Throws std::runtime_error where
-  /// this was built without MPI, wfpg::rank_error where a process does not come within `seconds`.
-  explicit processes(double seconds);
+  /// Starts MPI. To be made once a process. Throws std::runtime_error where this was built without MPI.
+  processes();
   processes(const processes&) = delete;
   processes& operator=(const processes&) = delete;
   /// Waits for all of them.
   ~processes();
 
-  /// Of the host's memory.
-  wfpg::communicator& ranks() { return *ranks_; }
+  /// Joins all processes, and returns their ranks, of the host's memory. One process alone is one rank.
+  /// Throws wfpg::rank_error where a process does not come within `seconds`; abort() then ends the others.
+  wfpg::communicator& join(double seconds);
   /// Ends all processes at once, since others may wait for this one.
   [[noreturn]] void abort(int code);
 

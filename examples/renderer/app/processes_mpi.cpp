@@ -8,14 +8,18 @@
 
 namespace render {
 
-processes::processes(double seconds) {
+processes::processes() {
   // Policies have threads, which leave MPI alone.
   int provided = 0;
   MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided);
+}
+
+wfpg::communicator& processes::join(double seconds) {
   wfpg::mpi_options options;
   options.seconds = seconds;
   ranks_ =
       std::make_unique<wfpg::mpi_communicator<wfpg::exec::seq>>(wfpg::exec::seq(), MPI_COMM_WORLD, options);
+  return *ranks_;
 }
 
 processes::~processes() {

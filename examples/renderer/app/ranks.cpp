@@ -4,8 +4,11 @@
 #include "app/render_state.hpp"
 
 #include <wfpg/base/error.hpp>
+#include <wfpg/state/section_file.hpp>
 
+#include <istream>
 #include <string>
+#include <vector>
 
 namespace render {
 
@@ -33,16 +36,40 @@ void require_shared(const render_options& options) {
     require(options.ranks->size() <= paths, "ranks", options.ranks->size(), "at most the paths of a wave");
 }
 
+namespace {
+
+/// Hash of the files that a rendering goes on from, or begins with. Throws wfpg::file_error.
+std::uint64_t checksum_of_files(const render_options& options) {
+  std::uint64_t hash = wfpg::checksum("");
+  std::vector<char> part(1 << 16);
+  for (const std::string& path : {options.resume, options.load_guide}) {
+    hash = wfpg::checksum(path.empty() ? "no file" : "a file", hash);
+    if (path.empty()) continue;
+    hash = wfpg::read_file(path, [&](std::istream& in) {
+      std::uint64_t read = hash;
+      while (in.read(part.data(), static_cast<std::streamsize>(part.size())), in.gcount() > 0)
+        read = wfpg::checksum({part.data(), static_cast<std::size_t>(in.gcount())}, read);
+      return read;
+    });
+  }
+  return hash;
+}
+
+}  // namespace
+
 void require_same_rendering(const scene& scene, const render_options& options) {
   if (!options.ranks) return;
-  const std::uint64_t own = checksum_of(scene, options);
-  std::uint64_t most[2] = {own, ~own};
-  options.ranks->all_reduce_max(wfpg::array_view<std::uint64_t>(most, 2));
+  const std::uint64_t own = checksum_of(scene, options), files = checksum_of_files(options);
+  std::uint64_t most[4] = {own, ~own, files, ~files};
+  options.ranks->all_reduce_max(wfpg::array_view<std::uint64_t>(most, 4));
+  const std::string ranks =
+      "rank " + std::to_string(options.ranks->rank()) + " and another rank have different ";
   if (most[0] != own || most[1] != ~own)
     throw wfpg::rank_error(
-        "rank " + std::to_string(options.ranks->rank()) +
-        " and another rank have different scenes, options or versions of the program; give "
-        "all ranks the same");
+        ranks + "scenes, options, kinds of device or versions of the program; give all ranks the same");
+  if (most[2] != files || most[3] != ~files)
+    throw wfpg::rank_error(ranks +
+                           "bytes of the file of --resume or --load-guide; copy one file to all machines");
 }
 
 }  // namespace render

@@ -42,7 +42,8 @@ inline wave_end agree(wfpg::communicator* ranks, wave_end own) {
 /// complete, but for that.
 void require_shared(const render_options& options);
 
-/// Throws wfpg::rank_error where another rank has another scene or other options.
+/// Throws wfpg::rank_error where another rank has another scene, other options, another kind of device, or
+/// resumes or loads other bytes. Throws wfpg::file_error where a file cannot be read.
 void require_same_rendering(const scene& scene, const render_options& options);
 
 /// Ranks of the host's memory for a policy of a device's. It copies there and back.

@@ -9,10 +9,11 @@ namespace render {
 
 render_result render_on_cuda(const scene& scene, const render_options& options,
                              const progress_callback& progress) {
-  wfpg::check_cuda(cudaFree(nullptr), "--device cuda finds no GPU that it can use; cudaFree");
+  // The number comes first, since any other call makes a context on GPU 0.
   if (!options.devices.empty())
     wfpg::check_cuda(cudaSetDevice(options.devices.front()),
                      "--device cuda finds no GPU of this number; cudaSetDevice");
+  wfpg::check_cuda(cudaFree(nullptr), "--device cuda finds no GPU that it can use; cudaFree");
   const wfpg::exec::cuda exec;
   const device_options<wfpg::exec::cuda> own(exec, options);
   return render_on<bvh_scene<wfpg::exec::cuda>>(exec, scene, own.get(), progress);

@@ -30,10 +30,11 @@
 
 namespace render {
 
-inline bool is_kept(checkpoint_times times, int samples, bool is_last) {
-  const bool is_power_of_two = (samples & (samples - 1)) == 0;
+/// Whether a wave of the samples [before, after) ends with a checkpoint. A wave may pass a power of two.
+inline bool is_kept(checkpoint_times times, int before, int after, bool is_last) {
+  const bool has_power_of_two = (before ^ after) > before;  // the highest bit has changed
   return times == checkpoint_times::all ||
-         (times == checkpoint_times::powers_of_two && (is_power_of_two || is_last));
+         (times == checkpoint_times::powers_of_two && (has_power_of_two || is_last));
 }
 
 /// The sample before which a rendering ends by its number of samples.
@@ -58,7 +59,7 @@ void take_samples(Tracer& tracer, Guider& guider, const pinhole& camera, const r
         agree(options.ranks, {is_spent, !is_spent && options.is_stopped && options.is_stopped()});
     result.is_stopped = ends.is_stopped && !ends.is_spent;
     is_last = ends.is_spent || ends.is_stopped;
-    if (is_kept(options.checkpoints, budget.samples(), is_last)) {
+    if (is_kept(options.checkpoints, static_cast<int>(sample), budget.samples(), is_last)) {
       const double seconds = budget.seconds();
       const stopwatch keeping;
       result.checkpoints.push_back(

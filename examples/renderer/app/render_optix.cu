@@ -33,10 +33,11 @@ class optix_accelerated {
 
 render_result render_on_optix(const scene& scene, const render_options& options,
                               const progress_callback& progress) {
-  wfpg::check_cuda(cudaFree(nullptr), "--device optix finds no GPU that it can use; cudaFree");
+  // The number comes first, since any other call makes a context on GPU 0.
   if (!options.devices.empty())
     wfpg::check_cuda(cudaSetDevice(options.devices.front()),
                      "--device optix finds no GPU of this number; cudaSetDevice");
+  wfpg::check_cuda(cudaFree(nullptr), "--device optix finds no GPU that it can use; cudaFree");
   const wfpg::exec::cuda exec;
   const device_options<wfpg::exec::cuda> own(exec, options);
   return render_on<optix_accelerated>(exec, scene, own.get(), progress);

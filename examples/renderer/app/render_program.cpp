@@ -169,6 +169,21 @@ void warn_of_far_lights(const scene& scene, std::ostream& log) {
     log << "wfpg-render: warning: the environment and directional lights do not shine through fog\n";
 }
 
+/// Throws std::invalid_argument where each process of mpirun would render the whole picture.
+void require_shared_processes(const render_options& options) {
+  const int started = started_processes();
+  if (started <= 1 || (options.split && options.devices.size() <= 1)) return;
+  const std::string found = std::to_string(started) + " processes were started, as by mpirun, and each ";
+  if (options.devices.size() > 1)
+    throw std::invalid_argument(
+        found +
+        "would render on several GPUs; start one process, or set CUDA_VISIBLE_DEVICES for each and leave "
+        "the numbers out of --device");
+  throw std::invalid_argument(found +
+                              "would render the whole picture; add --split tiles or --split samples, or "
+                              "start one process");
+}
+
 int render_scene(arguments& given, std::ostream& out, std::ostream& log) {
   // Of several ranks, the first writes all files.
   const bool writes = !given.options.ranks || given.options.ranks->rank() == 0;
@@ -230,11 +245,15 @@ int run_program(int argc, const char* const* argv, std::ostream& out, std::ostre
   }
   std::optional<processes> joined;
   try {
+    require_shared_processes(given.options);
     // Several GPUs are threads of this process, which mpirun has not started.
     if (!given.options.split || given.options.devices.size() > 1) return render_scene(given, out, log);
-    given.options.ranks = &joined.emplace(given.options.rank_seconds).ranks();
+    // A process that cannot join the others ends them, too.
+    given.options.ranks = &joined.emplace().join(given.options.rank_seconds);
     std::ostream none(nullptr);
     const bool is_first = given.options.ranks->rank() == 0;
+    if (is_first && given.options.ranks->size() > 1)
+      log << "wfpg-render: " << given.options.ranks->size() << " processes share the picture" << std::endl;
     return render_scene(given, is_first ? out : none, is_first ? log : none);
   } catch (const std::exception& error) {
     say(log, error);

@@ -146,6 +146,9 @@ std::uint64_t checksum_of(const scene& scene, const render_options& o) {
     bytes.put(static_cast<std::uint32_t>(version));
   bytes.put(static_cast<std::uint32_t>(o.spp));
   bytes.put(o.seconds);
+  // CPU policies give equal bits. GPUs give others.
+  const bool is_gpu = o.where == device::cuda || o.where == device::optix;
+  bytes.put(static_cast<std::uint32_t>(is_gpu ? o.where : device::cpu));
   bytes.put(static_cast<std::uint32_t>(o.split.value_or(rank_split::tiles)));
   bytes.put(static_cast<std::uint32_t>(o.samples_a_wave));
   bytes.put(static_cast<std::uint32_t>(o.checkpoints));

@@ -9,7 +9,8 @@
 
 namespace render {
 
-/// A sum of up to 2^32 numbers in units of 2^-56. Each counts as at most 2^40, negative ones and NaN as 0.
+/// A sum of up to 2^32 numbers in units of 2^-56. It is exact for numbers from 0 to 2^40 that have no bits
+/// below 2^-56. Bits below are cut off. More than 2^40 counts as 2^40, negative numbers and NaN as 0.
 struct exact_sum {
   std::uint64_t low = 0, high = 0;
 

@@ -2,7 +2,7 @@
 // GPUs may lie in one machine or in many, in one process or in many.
 // Values stay in device memory.
 // NCCL gives each rank a GPU of its own; for ranks that share a GPU there is ranks/threads.hpp.
-// It needs NCCL 2.18 or later, the first with communicators that do not block.
+// It asks for NCCL 2.18 or later: 2.14 has the same functions, but is not tested.
 // The CMake target wfpg::nccl brings its header and library.
 //
 // Source: NCCL's user guide, "Creating a communicator with options" and "Fault tolerance".
@@ -87,22 +87,31 @@ class nccl_communicator final : public communicator {
   nccl_communicator(const Exec& exec, std::uint32_t rank, std::uint32_t size, const ncclUniqueId& id,
                     const nccl_options& options = {})
       : nccl_communicator(exec, rank, size, options) {
-    begin(id);
-    wait_for_nccl("ncclCommInitRankConfig");
+    try {
+      begin(id);
+      wait_for_nccl("ncclCommInitRankConfig");
+    } catch (...) {
+      // The destructor must not wait for ranks that have not joined.
+      abandon();
+      throw;
+    }
   }
   /// Not copyable: ranks are joined once.
   nccl_communicator(const nccl_communicator&) = delete;
   nccl_communicator& operator=(const nccl_communicator&) = delete;
   /// Leaves the communicator.
-  /// Waits for NCCL's last work, no longer than the time limit.
+  /// Ranks of other processes are waited for, no longer than the time limit.
+  /// Ranks of one process are not: NCCL frees all of them with the last.
   ~nccl_communicator() override {
     if (!ranks_) return;
     try {
-      detail::check_nccl(ncclCommFinalize(ranks_), "ncclCommFinalize");
-      wait_for_nccl("ncclCommFinalize");
-      ncclCommDestroy(ranks_);
-    } catch (const rank_error&) {
-      // NCCL's communicator is aborted, and destructors must not throw.
+      if (!is_of_one_process_) {
+        require_begun(ncclCommFinalize(ranks_), "ncclCommFinalize");
+        wait_for_nccl("ncclCommFinalize");
+      }
+      ncclCommDestroy(std::exchange(ranks_, nullptr));
+    } catch (...) {
+      abandon();  // destructors must not throw
     }
   }
 
@@ -113,21 +122,16 @@ class nccl_communicator final : public communicator {
   static std::vector<std::unique_ptr<nccl_communicator>> join_devices(
       const std::vector<nccl_device<Exec>>& devices, const nccl_options& options = {}) {
     require(!devices.empty(), "devices", devices.size(), "one or more");
-    int before = 0;
-    detail::check_runtime(cudaGetDevice(&before), "cudaGetDevice");
+    const detail::device_keeper keeper;
     std::vector<std::unique_ptr<nccl_communicator>> all;
-    const ncclUniqueId id = make_nccl_id();
-    const auto size = static_cast<std::uint32_t>(devices.size());
-    // A group, so that no call waits for those after it.
-    detail::check_nccl(ncclGroupStart(), "ncclGroupStart");
-    for (std::uint32_t rank = 0; rank < size; ++rank) {
-      detail::check_runtime(cudaSetDevice(devices[rank].device), "cudaSetDevice");
-      all.emplace_back(new nccl_communicator(devices[rank].exec, rank, size, options));
-      all.back()->begin(id);
+    try {
+      begin_all(devices, options, all);
+      for (const std::unique_ptr<nccl_communicator>& one : all) one->wait_for_nccl("ncclCommInitRankConfig");
+    } catch (...) {
+      // Where one has not joined, NCCL may still write to the others.
+      for (const std::unique_ptr<nccl_communicator>& one : all) one->abandon();
+      throw;
     }
-    detail::check_nccl(ncclGroupEnd(), "ncclGroupEnd");
-    for (const std::unique_ptr<nccl_communicator>& one : all) one->wait_for_nccl("ncclCommInitRankConfig");
-    detail::check_runtime(cudaSetDevice(before), "cudaSetDevice");
     return all;
   }
 
@@ -184,9 +188,35 @@ class nccl_communicator final : public communicator {
   void begin(const ncclUniqueId& id) {
     ncclConfig_t config = NCCL_CONFIG_INITIALIZER;
     config.blocking = 0;
-    detail::check_nccl(
+    require_begun(
         ncclCommInitRankConfig(&ranks_, static_cast<int>(size_), id, static_cast<int>(rank_), &config),
         "ncclCommInitRankConfig");
+  }
+
+  /// Begins to join GPUs of this process, and adds their communicators to `all`.
+  /// Changes the current GPU.
+  /// After an exception, `all` has those that were made.
+  static void begin_all(const std::vector<nccl_device<Exec>>& devices, const nccl_options& options,
+                        std::vector<std::unique_ptr<nccl_communicator>>& all) {
+    const ncclUniqueId id = make_nccl_id();
+    const auto size = static_cast<std::uint32_t>(devices.size());
+    // A group, so that no call waits for those after it.
+    detail::nccl_group group;
+    for (std::uint32_t rank = 0; rank < size; ++rank) {
+      detail::check_runtime(cudaSetDevice(devices[rank].device), "cudaSetDevice");
+      all.emplace_back(new nccl_communicator(devices[rank].exec, rank, size, options));
+      all.back()->is_of_one_process_ = true;
+      all.back()->begin(id);
+    }
+    group.end();
+  }
+
+  /// Throws rank_error where NCCL has not taken a call.
+  /// The communicator is then of no more use.
+  /// `begun`: what the call returned.
+  void require_begun(ncclResult_t begun, const char* doing) {
+    if (begun != ncclSuccess && begun != ncclInProgress) abandon();
+    detail::check_nccl(begun, doing);
   }
 
   /// Checks that ranks agree, and reduces values in device memory.
@@ -227,8 +257,7 @@ class nccl_communicator final : public communicator {
   /// `begun`: what NCCL returned when it was put on the stream.
   /// Throws rank_error where that failed, or after the time limit.
   void exchange(const char* doing, ncclResult_t begun) {
-    if (begun != ncclSuccess && begun != ncclInProgress) abandon();
-    detail::check_nccl(begun, doing);
+    require_begun(begun, doing);
     wait_for_nccl(doing);  // until it is on the stream
     detail::check_runtime(cudaEventRecord(done_.get(), exec_.stream()), "cudaEventRecord");
     wait(doing, [&] {
@@ -272,13 +301,18 @@ class nccl_communicator final : public communicator {
 
   /// Ends NCCL's kernels on the stream.
   /// Later calls see that there is no communicator.
-  void abandon() { ncclCommAbort(std::exchange(ranks_, nullptr)); }
+  /// Does nothing where there is none.
+  void abandon() {
+    if (ranks_) ncclCommAbort(std::exchange(ranks_, nullptr));
+  }
 
   /// The policy on whose stream the collectives are.
   Exec exec_;
   /// As given; ranks are not asked whether they have the same.
   nccl_options options_;
   std::uint32_t rank_ = 0, size_ = 0;
+  /// Whether join_devices() made all ranks.
+  bool is_of_one_process_ = false;
   /// What ranks compare before each exchange.
   detail::rank_words words_;
   /// Comes after a collective on the stream.

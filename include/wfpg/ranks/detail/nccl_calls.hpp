@@ -1,5 +1,5 @@
-// Calls of NCCL and of CUDA's runtime as exceptions. Owners of a CUDA event and of device memory.
-// Cost: one comparison a call. Memory: that which they own.
+// Calls of NCCL and of CUDA's runtime as exceptions. Owners of a CUDA event, of device memory and of a group
+// of NCCL's calls. A keeper of the current device. Cost: one comparison a call. Memory: that which they own.
 #pragma once
 
 #include <wfpg/base/error.hpp>
@@ -30,6 +30,43 @@ inline void check_runtime(cudaError_t code, const char* function) {
   cudaGetLastError();  // clears it
   throw device_error(static_cast<int>(code), cudaGetErrorString(code), function);
 }
+
+/// A group of NCCL's calls, which begin together at its end.
+class nccl_group {
+ public:
+  /// Throws rank_error.
+  nccl_group() { check_nccl(ncclGroupStart(), "ncclGroupStart"); }
+  /// Not copyable: a group ends once.
+  nccl_group(const nccl_group&) = delete;
+  nccl_group& operator=(const nccl_group&) = delete;
+  /// Ends the group after an exception, so that the thread's later calls are not part of it.
+  ~nccl_group() {
+    if (is_open_) ncclGroupEnd();
+  }
+  /// Begins the calls. Throws rank_error.
+  void end() {
+    is_open_ = false;
+    check_nccl(ncclGroupEnd(), "ncclGroupEnd");
+  }
+
+ private:
+  bool is_open_ = true;
+};
+
+/// Makes the device current again that was current before.
+class device_keeper {
+ public:
+  /// Throws device_error.
+  device_keeper() { check_runtime(cudaGetDevice(&before_), "cudaGetDevice"); }
+  /// Not copyable: the device is restored once.
+  device_keeper(const device_keeper&) = delete;
+  device_keeper& operator=(const device_keeper&) = delete;
+  /// Errors are ignored, as destructors must not throw.
+  ~device_keeper() { cudaSetDevice(before_); }
+
+ private:
+  int before_ = 0;
+};
 
 /// An event of the current device that ends with its owner.
 class cuda_event {
