@@ -14,6 +14,7 @@
 #include <optional>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 using namespace wfpg_test;
@@ -315,10 +316,11 @@ struct deposit_lights {
 
 /// A guider with two lights, after samples 1 to `last`.
 template <class Exec>
-wfpg::path_guider<Exec> guider_of_lights(const Exec& exec, float least_gain, std::uint32_t last, chances p) {
+wfpg::path_guider<Exec> guider_of_lights(const Exec& exec, float least_gain, std::uint32_t last, chances p,
+                                         std::vector<float> weights = {1.0f, 1.0f}) {
   wfpg::kept_guide_options options = rest_options();
   options.least_gain = least_gain;
-  options.lights.weights = {1.0f, 1.0f};
+  options.lights.weights = std::move(weights);
   options.lights.resolution = 4;
   wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
   guided_samples(exec, guider, 1, last, p);
@@ -340,13 +342,21 @@ WFPG_TEST_CASE("rest: choices of lights learn while the guide rests, where they 
   CHECK(evaluate(exec, find_lights{guider.lights(), 1}) > 0.7f);
 }
 
-WFPG_TEST_CASE("rest: choices of lights rest where nothing is gained, but for samples that are compared",
+WFPG_TEST_CASE("rest: choices of lights are by weight where nothing is gained, but for compared samples",
                "[rest]") {
   const Exec exec;
-  wfpg::path_guider<Exec> guider = guider_of_lights(exec, 1.25f, 4, loses);
-  for (std::uint32_t sample = 5; sample <= 9; ++sample) {
-    take_sample(exec, guider, sample, loses);
-    CHECK(guider.lights().empty() == (sample != 8));
+  wfpg::path_guider<Exec> guider = guider_of_lights(exec, 1.25f, 3, loses, {1.0f, 3.0f});
+  for (std::uint32_t sample = 4; sample <= 9; ++sample) {
+    guider.begin_sample();
+    const float probability = guider.guided() ? loses.guided : loses.unguided;
+    exec.for_each(path_count, record_wall_paths{guider.recorder(), sample, probability, 0});
+    exec.for_each(path_count, deposit_lights{guider.lights()});
+    const float second = evaluate(exec, find_lights{guider.lights(), 1});
+    if (guider.resting()) CHECK(second == 0.75f);
+    if (sample == 8) CHECK(second > 0.9f);
+    CHECK(guider.resting() == (sample > 4 && sample != 8));
+    CHECK(evaluate(exec, find_lights{guider.lights(), 0}) == Approx(1.0f - second));
+    guider.end_sample();
   }
 }
 
