@@ -33,9 +33,11 @@ struct rest_constants {
   /// Variance of typical unguided paths, over the square of the mean, above which bright paths decide. They
   /// hold most of what there is to gain, and a few thousand do not measure it.
   static constexpr double much_noise = 2.0;
-  /// Gain that lets a guide take part in all paths there, in place of least_gain, and the one below which it
-  /// rests. Bright paths gain more than typical ones.
-  static constexpr float gain_in_noise = 0.95f, loss_in_noise = 0.9f;
+  /// Gain that lets a guide take part in all paths there, in place of least_gain. Bright paths gain more than
+  /// typical ones.
+  static constexpr float gain_in_noise = 0.95f;
+  /// Gain below which a guide rests there.
+  static constexpr float loss_in_noise = 0.9f;
   /// Most samples between two comparisons, a power of two: what the camera sees may change.
   static constexpr std::uint32_t longest_rest = 512;
   /// least_gain of policies whose blocks have several warps. On an H200 a guided vertex takes 1.3 times an

@@ -41,9 +41,11 @@ class communicator {
   virtual std::uint32_t size() const = 0;
   /// Replaces each value by its sum over all ranks, modulo 2^32 or 2^64. O(values) of traffic a rank.
   virtual void all_reduce_sum(array_view<std::uint32_t> values) = 0;
+  /// As above, of 64 bits.
   virtual void all_reduce_sum(array_view<std::uint64_t> values) = 0;
   /// Replaces each value by the largest of all ranks.
   virtual void all_reduce_max(array_view<std::uint32_t> values) = 0;
+  /// As above, of 64 bits.
   virtual void all_reduce_max(array_view<std::uint64_t> values) = 0;
   /// Gathers the ranks' parts of an array. This rank has the values [first, first + count), and the parts do
   /// not overlap. All other values are 0 before the call. An adapter may do better than add.

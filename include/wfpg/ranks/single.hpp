@@ -19,8 +19,10 @@ class single_rank final : public communicator {
   /// Leaves the values as they are: they are those of all ranks. The calls below do, too. None of them
   /// throws, or waits.
   void all_reduce_sum(array_view<std::uint32_t>) override {}
+  /// As above, of 64 bits.
   void all_reduce_sum(array_view<std::uint64_t>) override {}
   void all_reduce_max(array_view<std::uint32_t>) override {}
+  /// As above, of 64 bits.
   void all_reduce_max(array_view<std::uint64_t>) override {}
   void broadcast(array_view<unsigned char>, std::uint32_t) override {}
 };

@@ -2,9 +2,7 @@
 // thread_communicator; all of them refer to one thread_ranks.
 //
 //   wfpg::thread_ranks ranks(4);
-//   // in thread r:
-//   wfpg::thread_communicator<Exec> here(exec, ranks, r);
-//   options.ranks = &here;
+//   wfpg::thread_communicator<Exec> here(exec, ranks, r);  // in thread r; options.ranks points to it
 //
 // Values are added in the order in which ranks come, which does not matter for integers. The last rank that
 // comes to a call completes it. Ranks that wait throw rank_error where one is late, has
@@ -121,9 +119,13 @@ class thread_communicator final : public communicator {
   /// Replaces each value by its sum over the ranks; waits for all of them. Each of these calls throws
   /// rank_error where the ranks do not meet within the limit.
   void all_reduce_sum(array_view<std::uint32_t> values) override { meet(reduction::sum32, values); }
+  /// As above, of 64 bits.
   void all_reduce_sum(array_view<std::uint64_t> values) override { meet(reduction::sum64, values); }
+  /// Replaces each value by the largest.
   void all_reduce_max(array_view<std::uint32_t> values) override { meet(reduction::max32, values); }
+  /// As above, of 64 bits.
   void all_reduce_max(array_view<std::uint64_t> values) override { meet(reduction::max64, values); }
+  /// Replaces the bytes by those of the rank `root`.
   void broadcast(array_view<unsigned char> bytes, std::uint32_t root) override {
     meet(reduction::broadcast, bytes, root);
   }
