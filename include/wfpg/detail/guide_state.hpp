@@ -31,10 +31,9 @@ struct state_access {
     key = hash(key, o.deposits_per_leaf.value_or(0));
     key = hash(key, o.seed);
     key = hash(key, o.unguided_samples);
-    return static_cast<std::uint32_t>(hash(
-        key,
-        float_bits(guider.guide_.measures() ? o.least_gain.value_or(Exec::warps_per_block > 1 ? 0.25f : 0.5f)
-                                            : -1.0f)));
+    const float unset = Exec::warps_per_block > 1 ? 0.25f : 0.5f;  // the kinds of policies differ
+    const float least = guider.guide_.measures() ? o.least_gain.value_or(unset) : -1.0f;
+    return static_cast<std::uint32_t>(hash(key, float_bits(least)));
   }
   template <class Exec, class Guide>
   static void put_rests(const path_guider<Exec, Guide>& guider, section_writer& bytes) {

@@ -47,13 +47,6 @@ class communicator {
   virtual void all_reduce_max(array_view<std::uint32_t> values) = 0;
   /// As above, of 64 bits.
   virtual void all_reduce_max(array_view<std::uint64_t> values) = 0;
-  /// Gathers the ranks' parts of an array. This rank has the values [first, first + count), and the parts do
-  /// not overlap. All other values are 0 before the call. An adapter may do better than add.
-  virtual void all_gather(array_view<std::uint64_t> values, std::size_t first, std::size_t count) {
-    (void)first;
-    (void)count;
-    all_reduce_sum(values);
-  }
   /// Replaces the bytes of all ranks by those of the rank `root`.
   virtual void broadcast(array_view<unsigned char> bytes, std::uint32_t root) = 0;
 };

@@ -4,7 +4,7 @@
 // The CMake target wfpg::mpi brings both.
 //
 // Values pass through host memory, piece by piece.
-// So any MPI serves any policy, also an MPI that knows nothing of GPUs.
+// Any MPI serves any policy, also an MPI that knows nothing of GPUs.
 // Messages that are still in flight after a failure point to no memory of a guider.
 //
 // Source: the MPI 3.1 standard, sections 5.12 (non-blocking collectives) and 8.3 (errors).

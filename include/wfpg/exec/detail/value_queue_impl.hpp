@@ -67,7 +67,7 @@ void value_queue<Exec>::gather(const Exec& exec, std::uint32_t first, std::uint3
     entries_ = buffer<std::uint64_t, Exec>(exec, all + all / 4);
   }
   exec.for_each(all, place_queued_values{queue_.data(), entries_.data(), first, n});
-  ranks_->all_gather(entries_.view().subview(0, all), first, n);
+  ranks_->all_reduce_sum(entries_.view().subview(0, all));
   exec.for_each(all, add_values_of_ranks{view_, entries_.data(), all});
 }
 

@@ -58,7 +58,7 @@ struct rank_call {
   }
 
  private:
-  /// What has to be equal beside the number of values: the kind of values, too.
+  /// Has to be equal beside the number of values: the function with its kind of values, and the root.
   std::uint64_t key() const { return std::uint64_t(root) << 32 | static_cast<std::uint32_t>(function); }
 };
 

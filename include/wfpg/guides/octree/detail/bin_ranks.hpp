@@ -1,4 +1,4 @@
-// What ranks exchange of a wave's bins, so that a bin's rays of all ranks sample equal fields: how many rays
+// Exchanges a wave's bins between ranks, so that a bin's rays of all ranks sample equal fields: how many rays
 // a bin has on all ranks, and where its field starts. A bin's field starts from the ray of all ranks that has
 // the least random number. Each rank makes the fields of the bins in which it has rays.
 //
@@ -173,7 +173,7 @@ class bin_ranks {
     std::uint64_t* const entries = entries_.data() + std::size_t(told_bins::words) * first;
     exec.for_each(n, pick_bin_ray<Fields, Rays>{fields, rays, candidates_.data(), nullptr});
     if (own > 0) exec.for_each(n, pick_bin_ray<Fields, Rays>{fields, rays, candidates_.data(), entries});
-    ranks_->all_gather(entries_.view().subview(0, words), told_bins::words * first, told_bins::words * own);
+    ranks_->all_reduce_sum(entries_.view().subview(0, words));  // where other ranks write, it is 0
     const told_bins told{entries_.data(), begins_.data(), ranks_->size()};
     exec.for_each(own, find_told_bins{fields.bins, told, sizes_.data(), winners_.data()});
     exec.fill_bytes(count_.data(), 0, count_.bytes());

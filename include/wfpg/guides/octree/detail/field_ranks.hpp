@@ -1,4 +1,4 @@
-// What ranks exchange of kept fields, so that all of them have equal ones: keys that want a slot, the ray
+// Exchanges kept fields between ranks, so that all of them have equal ones: keys that want a slot, the ray
 // that each build starts from, which slots were used, and what fractions of guided directions learnt.
 //
 // A build starts from the surface of a ray, which one rank knows. It sends position and normal.

@@ -92,13 +92,13 @@ guide_view field_store<Exec>::prepare(const Exec& exec, const kept_field_wave<Su
                               ranks_.origins()};
   if (builds_in_wave()) {
     const kept_field_builder<kept_field_wave<Surfaces>> builder{wave, kept};
-    if (ranks_)
+    if (ranks_) {
       ranks_.send_origins(exec, builder, rays_of(wave), wave.ray_count, field_of_ray_.data(),
                           table_.listed(true), counts());
-    if (ranks_)
       build_of_ranks(exec, builder, caster, caster_buffer_bytes);
-    else
+    } else {
       build(exec, builder, caster, caster_buffer_bytes);
+    }
   }
   end_wave();
   return {{field_of_ray_.data(), wave.ray_count}, fields(wave.points)};

@@ -35,7 +35,6 @@ template <class Exec>
 void gain_meter<Exec>::keep_unguided(const Exec& exec, const path_recorder<Exec>& recorder,
                                      const recorded_runs& compared, const exitance_cache_view& cache,
                                      std::uint32_t number) {
-  if (number == 0) forget(exec);
   keep(exec, {recorder.view(), cache, compared}, number);
 }
 
