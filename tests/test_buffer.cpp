@@ -57,6 +57,19 @@ class counting_resource : public wfpg::memory_resource {
   std::thread::id owner_ = std::this_thread::get_id();
 };
 
+WFPG_TEST_CASE("a buffer that is fit to a size grows with what is spare, and stays where it is large enough",
+               "[buffer]") {
+  const Exec exec;
+  wfpg::buffer<std::uint32_t, Exec> values;
+  CHECK(values.fit(exec, 10, 5).size() == 10);
+  CHECK(values.size() == 15);
+  const std::uint32_t* const before = values.data();
+  CHECK(values.fit(exec, 15, 100).data() == before);
+  CHECK(values.size() == 15);
+  CHECK(values.fit(exec, 16, 0).size() == 16);
+  CHECK(values.size() == 16);
+}
+
 WFPG_TEST_CASE("a buffer owns its elements", "[buffer]") {
   counting_resource resource(default_resource());
   const Exec exec = Exec().with_resource(&resource);

@@ -51,10 +51,21 @@ class buffer {
   /// Both keep the resources their memory came from. O(1).
   void swap(buffer& other) noexcept { memory_.swap(other.memory_); }
 
+  /// Returns a view of the first n elements.
+  /// A smaller buffer is freed first, and allocated anew with `spare` more: what it held is lost.
+  /// Throws out_of_memory.
+  array_view<T> fit(const Exec& exec, std::size_t n, std::size_t spare) {
+    if (size() < n) {
+      *this = buffer();
+      *this = buffer(exec, n + spare);
+    }
+    return view().subview(0, n);
+  }
+
   /// Returns the address of the first element, in the policy's memory; null where empty.
   T* data() const { return static_cast<T*>(memory_.data()); }
   /// Returns the number of elements.
-  /// It never changes: a buffer that is too small is replaced.
+  /// Only fit() changes it: otherwise a buffer that is too small is replaced.
   std::size_t size() const { return memory_.bytes() / sizeof(T); }
   /// Returns the size of all elements, bytes.
   std::size_t bytes() const { return memory_.bytes(); }

@@ -62,13 +62,10 @@ void value_queue<Exec>::add_sums(const Exec& exec) {
 
 template <class Exec>
 void value_queue<Exec>::gather(const Exec& exec, std::uint32_t first, std::uint32_t n, std::uint32_t all) {
-  if (entries_.size() < all) {
-    entries_ = {};  // freed first
-    entries_ = buffer<std::uint64_t, Exec>(exec, all + all / 4);
-  }
-  exec.for_each(all, place_queued_values{queue_.data(), entries_.data(), first, n});
-  ranks_->all_reduce_sum(entries_.view().subview(0, all));
-  exec.for_each(all, add_values_of_ranks{view_, entries_.data(), all});
+  const array_view<std::uint64_t> entries = entries_.fit(exec, all, all / 4);
+  exec.for_each(all, place_queued_values{queue_.data(), entries.data(), first, n});
+  ranks_->all_reduce_sum(entries);
+  exec.for_each(all, add_values_of_ranks{view_, entries.data(), all});
 }
 
 }  // namespace wfpg::detail

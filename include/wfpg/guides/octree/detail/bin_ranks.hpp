@@ -163,17 +163,14 @@ class bin_ranks {
     const std::vector<std::uint32_t> begins = begins_of_ranks(exec, own);
     const std::uint32_t first = begins[ranks_->rank()], all = begins.back();
     const std::size_t words = std::size_t(told_bins::words) * all;
-    if (entries_.size() < words) {
-      entries_ = {};  // freed first
-      entries_ = buffer<std::uint64_t, Exec>(exec, words + words / 2);
-    }
-    exec.fill_bytes(entries_.data(), 0, words * sizeof(std::uint64_t));
+    const array_view<std::uint64_t> shared = entries_.fit(exec, words, words / 2);
+    exec.fill_bytes(shared.data(), 0, words * sizeof(std::uint64_t));
     exec.fill_bytes(candidates_.data(), 0xff, candidates_.bytes());
     const std::size_t n = fields.bins.permutation.size();
     std::uint64_t* const entries = entries_.data() + std::size_t(told_bins::words) * first;
     exec.for_each(n, pick_bin_ray<Fields, Rays>{fields, rays, candidates_.data(), nullptr});
     if (own > 0) exec.for_each(n, pick_bin_ray<Fields, Rays>{fields, rays, candidates_.data(), entries});
-    ranks_->all_reduce_sum(entries_.view().subview(0, words));  // where other ranks write, it is 0
+    ranks_->all_reduce_sum(shared);  // where other ranks write, it is 0
     const told_bins told{entries_.data(), begins_.data(), ranks_->size()};
     exec.for_each(own, find_told_bins{fields.bins, told, sizes_.data(), winners_.data()});
     exec.fill_bytes(count_.data(), 0, count_.bytes());

@@ -165,12 +165,9 @@ class field_ranks {
   }
   /// Room for what all cones of the wave hit, which is 0 bytes.
   array_view<cone_hit> begin_hits(const Exec& exec, std::size_t cones) {
-    if (hits_.size() < cones) {
-      hits_ = {};  // freed first
-      hits_ = buffer<cone_hit, Exec>(exec, cones + cones / 2);
-    }
-    exec.fill_bytes(hits_.data(), 0, cones * sizeof(cone_hit));
-    return hits_.view().subview(0, cones);
+    const array_view<cone_hit> hits = hits_.fit(exec, cones, cones / 2);
+    exec.fill_bytes(hits.data(), 0, cones * sizeof(cone_hit));
+    return hits;
   }
   /// Tells all ranks what the cones hit. Each cone is one rank's.
   void share_hits(array_view<cone_hit> hits) {
