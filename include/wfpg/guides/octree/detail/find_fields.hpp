@@ -42,8 +42,9 @@ struct use_slot {
   wanted_builds wanted;
   build_list builds;
 
-  // `ray`: its number, wave_rays::number().
-  WFPG_HD void operator()(std::uint32_t slot, std::uint32_t ray) const {
+  // `number`: () -> wave_rays::number() of the ray, which is asked for where a build is due.
+  template <class Number>
+  WFPG_HD void operator()(std::uint32_t slot, const Number& number) const {
     if (atomic_load_cached(slots.noted + slot) != 0) return;
     field_slot& s = slots.slots[slot];
     const bool is_due = s.is_due(sample);
@@ -51,7 +52,7 @@ struct use_slot {
       atomic_store(&s.last_used, sample);
       if (!is_due) atomic_store(slots.noted + slot, std::uint8_t(1));
     }
-    if (is_due && wanted != wanted_builds::none) want_build(s, slot, ray);
+    if (is_due && wanted != wanted_builds::none) want_build(s, slot, number());
   }
 
  private:
@@ -116,13 +117,14 @@ struct use_ancestor {
   sparse_voxel_octree_view tree;
   use_slot use;
 
-  WFPG_HD std::uint32_t operator()(std::uint32_t key, std::uint32_t ray, std::uint32_t& field) const {
+  template <class Number>
+  WFPG_HD std::uint32_t operator()(std::uint32_t key, const Number& number, std::uint32_t& field) const {
     std::uint32_t slot = no_slot;
     for (node_id node = key / orientations; slot == no_slot && node != invalid_node; node = tree.parent(node))
       slot = use.slots.find(node * orientations + key % orientations);
     field = slot;
     if (slot == no_slot) return ray_counts::without_field;
-    use(slot, ray);
+    use(slot, number);
     return ray_counts::with_field;
   }
 };
@@ -147,8 +149,9 @@ struct find_field {
       if (ray.active) counts.unbinned();
       return 0;
     }
-    const std::uint32_t number = rays.number(i);
-    if (counted.includes(number)) marks.count(leaf, counted.stride * ray.paths);
+    const auto number = [&] { return rays.number(i); };
+    // Most samples count no rays. Numbers of rays are then not needed.
+    if (counted.stride > 0 && counted.includes(number())) marks.count(leaf, counted.stride * ray.paths);
     const std::uint32_t key = marks.bin(leaf) * orientations + ray.orientation;
     const std::uint32_t slot = use.slots.find(key);
     if (slot != no_slot) {
@@ -218,7 +221,8 @@ struct find_missing_fields {
     if (blocks.counts.counts->missing == 0) return;
     blocks.find(block, i, [&](std::size_t ray, std::uint32_t& field) {
       if (!missing_key::is_marked(field)) return 0u;
-      return own_or_ancestor(missing_key::key(field), rays.number(ray), field);
+      return own_or_ancestor(
+          missing_key::key(field), [&] { return rays.number(ray); }, field);
     });
   }
 };
