@@ -7,34 +7,27 @@
 // Of 2²⁰ values, those down to 2⁻¹⁹ of their group's largest keep all 24 bits.
 // Below 2⁻⁴³ they count as 0.
 // Where several ranks share a sample, each queues the values of its paths.
-// sum() then gathers the values of all ranks, or adds up their sums, whichever is less.
-// Traffic: 8 bytes a value or 16 a key, 4 a group, and 4 a rank.
+// sum() then adds up the sums of all ranks, too.
+// Traffic: 8 bytes, 4 a group, and that of packed_sums.hpp.
 // Source: sums of floats in fixed point, as in reproducible summation (Demmel and Nguyen 2013).
 // Cost: two atomics a value, one a reservation, and one where a value is its group's largest so far.
 // Memory: 8 bytes for each value of the capacity, 16 for each key, 8 for each group, and 4.
-// With ranks, 8 bytes for each value of a sample more.
+// With ranks, that of packed_sums.hpp more.
 #pragma once
 
 #include <wfpg/base/math.hpp>
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/support/atomic.hpp>
+#include <wfpg/exec/support/packed_sums.hpp>
 #include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/ranks/communicator.hpp>
 
 #include <thrust/fill.h>
 
-#include <vector>
-
 namespace wfpg::detail {
 
 /// Largest capacity of a queue: the 32-bit counter cannot wrap around beyond it.
 inline constexpr std::size_t most_queued = std::size_t(1) << 31;
-
-/// Values that a key has received in the sample. 16 bytes, so that they lie in one line of a cache.
-struct pending_values {
-  std::uint64_t sum = 0;    ///< in units of its group's exact_sum
-  std::uint32_t count = 0;  ///< values in the sum
-};
 
 /// Adds `n` values with the given sum to a mean of `count` values.
 /// The count stays at `most` once it is reached: from then on old values fade, and nothing overflows.
@@ -119,18 +112,16 @@ class value_queue_view {
   WFPG_HD void drop(std::uint32_t entry) const { queue_[entry] = dropped; }
 
   /// Adds an entry to its key's sum.
-  /// Precondition: set_unit() was called for all groups.
-  WFPG_HD void add(std::uint32_t entry) const { add(queue_, min(*queued_, capacity_), entry); }
-  /// Adds one of n entries that lie elsewhere, such as those of all ranks.
   /// Entries ahead are fetched, as they are scattered over the keys.
-  WFPG_HD void add(const std::uint64_t* entries, std::uint32_t n, std::uint32_t entry) const {
+  /// Precondition: set_unit() was called for all groups.
+  WFPG_HD void add(std::uint32_t entry) const {
     constexpr std::uint32_t ahead = 16;  // as many lines as a processor may wait for
-    if (entry + ahead < n && entries[entry + ahead] != dropped)
-      prefetch(pending_ + key_of(entries[entry + ahead]));
-    if (entries[entry] == dropped) return;
-    const std::uint32_t key = key_of(entries[entry]);
+    if (entry + ahead < min(*queued_, capacity_) && queue_[entry + ahead] != dropped)
+      prefetch(pending_ + key_of(queue_[entry + ahead]));
+    if (queue_[entry] == dropped) return;
+    const std::uint32_t key = key_of(queue_[entry]);
     pending_values& to = pending_[key];
-    atomic_add(&to.sum, unit_of(group_of(key)).term(bits_of_value(entries[entry])));
+    atomic_add(&to.sum, unit_of(group_of(key)).term(bits_of_value(queue_[entry])));
     atomic_add(&to.count, 1);
   }
   /// Chooses the unit of a group's sums, from the values in the queue.
@@ -234,7 +225,8 @@ class value_queue {
         largest_(exec, value_queue_view::groups(pending_.size())),
         units_(exec, largest_.size()),
         queued_(exec, 1),
-        counts_(exec, ranks ? ranks->size() : 0) {
+        all_queued_(exec, ranks ? 1 : 0),
+        packed_(exec, ranks ? pending_.size() : 0) {
     view_.queue_ = queue_.data();
     view_.pending_ = pending_.data();
     view_.largest_ = largest_.data();
@@ -253,7 +245,7 @@ class value_queue {
   /// Returns the memory in use, bytes.
   std::size_t bytes() const {
     return queue_.bytes() + pending_.bytes() + largest_.bytes() + units_.bytes() + queued_.bytes() +
-           counts_.bytes() + entries_.bytes();
+           all_queued_.bytes() + packed_.bytes();
   }
 
   /// Forgets all values, those that are summed and not yet taken included. O(keys).
@@ -279,12 +271,8 @@ class value_queue {
   void end_takes(const Exec& exec) { exec.fill_bytes(units_.data(), 0, units_.bytes()); }
 
  private:
-  /// Adds the entries of all ranks to their keys' sums.
+  /// Adds the values of all ranks to their keys' sums.
   void sum_of_ranks(const Exec& exec);
-  /// Adds up the ranks' own sums. Less is sent so where there are more than two values a key.
-  void add_sums(const Exec& exec);
-  /// Adds `all` values of all ranks. This rank's n values begin at `first`.
-  void gather(const Exec& exec, std::uint32_t first, std::uint32_t n, std::uint32_t all);
   void empty(const Exec& exec) {
     exec.fill_bytes(largest_.data(), 0, largest_.bytes());
     // Should this fail, a repeated sum adds and counts all values twice, which leaves their means.
@@ -296,8 +284,8 @@ class value_queue {
   buffer<pending_values, Exec> pending_;         // a key
   buffer<std::uint32_t, Exec> largest_, units_;  // a group
   buffer<std::uint32_t, Exec> queued_;
-  buffer<std::uint32_t, Exec> counts_;   // a rank: its values
-  buffer<std::uint64_t, Exec> entries_;  // values of all ranks; as many as a sample had
+  buffer<std::uint64_t, Exec> all_queued_;  // one number, with ranks
+  packed_sums<Exec> packed_;
   value_queue_view view_;
 };
 

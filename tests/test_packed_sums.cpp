@@ -1,0 +1,162 @@
+// Sums by key over ranks: any number of ranks has those of one queue with all values, and sends as many
+// bytes.
+#include "support/catch.hpp"
+#include "support/policies.hpp"
+#include "support/ranks.hpp"
+#include "support/scenes.hpp"
+
+#include <wfpg/exec/support/value_queue.hpp>
+
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace {
+
+using namespace wfpg_test;
+using wfpg::vec2;
+
+constexpr std::chrono::seconds limit(10);
+constexpr std::size_t keys = 64 * 40 + 13;
+
+struct keyed_value {
+  std::uint32_t key;
+  float value;  // negative: an entry that is dropped
+};
+
+/// Counts what it passes on.
+class counting_communicator final : public wfpg::communicator {
+ public:
+  explicit counting_communicator(wfpg::communicator& to) : to_(to) {}
+  std::uint32_t rank() const override { return to_.rank(); }
+  std::uint32_t size() const override { return to_.size(); }
+  void all_reduce_sum(wfpg::array_view<std::uint32_t> values) override {
+    bytes += 4 * values.size();
+    to_.all_reduce_sum(values);
+  }
+  void all_reduce_sum(wfpg::array_view<std::uint64_t> values) override {
+    bytes += 8 * values.size();
+    to_.all_reduce_sum(values);
+  }
+  void all_reduce_max(wfpg::array_view<std::uint32_t> values) override {
+    bytes += 4 * values.size();
+    to_.all_reduce_max(values);
+  }
+  void all_reduce_max(wfpg::array_view<std::uint64_t> values) override {
+    bytes += 8 * values.size();
+    to_.all_reduce_max(values);
+  }
+  void broadcast(wfpg::array_view<unsigned char> values, std::uint32_t root) override {
+    bytes += values.size();
+    to_.broadcast(values, root);
+  }
+
+  std::size_t bytes = 0;
+
+ private:
+  wfpg::communicator& to_;
+};
+
+/// What take() returns for each key.
+struct taken_sum {
+  double sum;
+  std::uint32_t count;
+  bool operator==(const taken_sum& other) const { return sum == other.sum && count == other.count; }
+};
+
+/// A rank's sums: taken twice, so that the second time finds what the first left.
+std::vector<taken_sum> sums_of(const std::vector<keyed_value>& all, std::uint32_t rank, std::uint32_t ranks,
+                               wfpg::communicator* joins) {
+  const one_policy exec;
+  // Parts of unequal size; that of rank 0 may be empty.
+  const auto begin = [&](std::size_t r) {
+    return all.begin() + static_cast<std::ptrdiff_t>(all.size() * r * r / (ranks * ranks));
+  };
+  const std::vector<keyed_value> own(begin(rank), begin(rank + 1));
+  const wfpg::buffer<keyed_value, one_policy> values(exec, own);
+  wfpg::detail::value_queue<one_policy> queue(exec, all.size() + 1, keys, joins);
+  const wfpg::buffer<taken_sum, one_policy> taken(exec, keys);
+  for (int turn = 0; turn < 2; ++turn) {
+    const wfpg::detail::value_queue_view view = queue.view();
+    const wfpg::array_view<keyed_value> from = values.view();
+    const wfpg::array_view<taken_sum> to = taken.view();
+    exec.for_each(own.size(), [=] WFPG_HD(std::size_t i) {
+      const std::uint32_t entry = view.reserve(1);
+      if (from[i].value < 0.0f)
+        view.drop(entry);
+      else
+        view.write(entry, from[i].key, from[i].value);
+    });
+    queue.sum(exec);
+    exec.for_each(keys, [=] WFPG_HD(std::size_t key) {
+      to[key].sum = 0.0;
+      to[key].count = view.take(key, to[key].sum);
+    });
+    queue.end_takes(exec);
+  }
+  return taken.to_host(exec);
+}
+
+/// Checks any number of ranks, and returns the bytes that each sends a turn.
+std::size_t check_ranks(const std::vector<keyed_value>& all) {
+  const std::vector<taken_sum> alone = sums_of(all, 0, 1, nullptr);
+  std::size_t bytes = 0;
+  for (const std::uint32_t n : {1u, 2u, 3u, 8u}) {
+    CAPTURE(n);
+    std::vector<std::size_t> sent(n);
+    std::vector<std::vector<taken_sum>> found(n);
+    const std::vector<std::string> errors = run_ranks<one_policy>(n, limit, [&](wfpg::communicator& ranks) {
+      counting_communicator counting(ranks);
+      found[ranks.rank()] = sums_of(all, ranks.rank(), n, &counting);
+      sent[ranks.rank()] = counting.bytes / 2;
+    });
+    CHECK(errors == std::vector<std::string>(n));
+    for (const std::vector<taken_sum>& of_rank : found) CHECK((of_rank == alone));
+    if (n == 2) bytes = sent[0];
+    if (n >= 2) CHECK(sent == std::vector<std::size_t>(n, bytes));
+  }
+  return bytes;
+}
+
+/// Values of which many keys have none, one or several, over forty orders of magnitude.
+std::vector<keyed_value> scattered_values(std::size_t n) {
+  std::vector<keyed_value> values;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const hashed_numbers numbers{i};
+    const vec2 u = numbers(0, 0), v = numbers(0, 1);
+    const auto key = static_cast<std::uint32_t>(static_cast<float>(keys) * u.x * (v.x < 0.5f ? 1.0f : u.x));
+    const float value = u.y < 0.1f ? 0.0f : std::exp(46.0f * v.y - 23.0f);
+    values.push_back({key, v.x < 0.05f ? -1.0f : value});
+  }
+  return values;
+}
+
+}  // namespace
+
+TEST_CASE("any number of ranks has the sums of one queue", "[packed_sums]") {
+  // Nothing, few values, about one a key, and many.
+  for (const std::size_t n : {0u, 1u, 40u, 2500u, 20000u}) {
+    CAPTURE(n);
+    check_ranks(scattered_values(n));
+  }
+  // A key has all values of its block. Their number needs one bit more where it is a power of two.
+  for (const std::uint32_t n : {2u, 3u, 4u, 65535u, 65536u}) {
+    CAPTURE(n);
+    std::vector<keyed_value> values(n, {77, 1.5f});
+    values.push_back({64 * 40 + 12, 1.0e-42f});  // the last key, subnormal
+    values.push_back({64 * 40, 3.0e38f});
+    check_ranks(values);
+  }
+}
+
+TEST_CASE("ranks send few bytes a value", "[packed_sums]") {
+  constexpr std::size_t of_each = 8 + 4 * (keys / 512 + 1) + 4 * (keys / 64 + 1);  // without any value
+  CHECK(check_ranks(scattered_values(0)) == 8);
+  CHECK(check_ranks({{5, 1.0f}}) == of_each + 8 + 8);
+  const std::size_t values = 2500;
+  CHECK(check_ranks(scattered_values(values)) < of_each + 6 * values);
+  // Many values of a key are one sum.
+  CHECK(check_ranks(scattered_values(20000)) < of_each + 10 * keys);
+}
