@@ -82,12 +82,15 @@ struct packed_sums_view {
   WFPG_HD void put_counts(std::size_t block) const {
     if (totals[block] == 0) return;
     const std::uint32_t in_word = lanes(block), bits = 64 / in_word;
-    std::uint64_t* const to = counts.begin(block);
-    for (std::uint32_t k = 0; k < size(block); ++k) {
-      const std::uint64_t count = pending[block * keys_a_block + k].count;
-      // The first lane of a word replaces what an earlier sample left there.
-      std::uint64_t& word = to[k / in_word];
-      word = k % in_word == 0 ? count : word | count << k % in_word * bits;
+    const pending_values* const of_block = pending + block * keys_a_block;
+    std::uint64_t* to = counts.begin(block);
+    for (std::uint32_t first = 0; first < size(block); first += in_word) {
+      const std::uint32_t end = min(first + in_word, size(block));
+      std::uint64_t word = 0;
+      // The first key has the lowest lane, so that it comes last.
+      // A lane has at most 32 bits: blocks have at most 2³¹ values.
+      for (std::uint32_t k = end; k-- > first;) word = word << bits | of_block[k].count;
+      *to++ = word;
     }
   }
   /// Writes how many words the sums of a block take, from the counts of all ranks.
@@ -142,10 +145,14 @@ struct packed_sums_view {
   WFPG_HD void for_each_key(std::size_t block, const F& f) const {
     if (totals[block] == 0) return;
     const std::uint32_t in_word = lanes(block), bits = 64 / in_word;
-    const std::uint64_t *from = counts.begin(block), mask = ~0ull >> (64 - bits);
-    for (std::uint32_t k = 0; k < size(block); ++k) {
-      const auto count = static_cast<std::uint32_t>(from[k / in_word] >> k % in_word * bits & mask);
-      if (count > 0) f(block * keys_a_block + k, count);
+    const std::uint64_t* from = counts.begin(block);
+    for (std::uint32_t first = 0; first < size(block); first += in_word) {
+      std::size_t key = block * keys_a_block + first;
+      // Ends where no further lane of the word has a count.
+      for (std::uint64_t word = *from++; word != 0; word >>= bits, ++key) {
+        const auto count = static_cast<std::uint32_t>(word & (~0ull >> (64 - bits)));
+        if (count > 0) f(key, count);
+      }
     }
   }
 };
@@ -159,7 +166,8 @@ struct call_packed_step {
   WFPG_HD void operator()(std::size_t block) const { (view.*step)(block); }
 };
 
-/// Adds up the sums of all ranks, by three reductions.
+/// Adds up the sums of all ranks.
+/// Takes three reductions, since what is sent next follows from what came before.
 /// Owns the memory for it, in that of `Exec`; words grow with what samples have.
 /// Movable, not copyable.
 template <class Exec>
