@@ -8,7 +8,7 @@
 
 #include <wfpg/bins/spatial_binner.hpp>
 #include <wfpg/exec/buffer.hpp>
-#include <wfpg/guides/octree/field_cells.hpp>
+#include <wfpg/guides/octree/detail/shared_origins.hpp>
 #include <wfpg/ranks/communicator.hpp>
 
 #include <vector>
@@ -42,31 +42,16 @@ struct told_bins {
     return low < begins[rank + 1] && key(low) == wanted;
   }
 
-  WFPG_HD static std::uint64_t pair(std::uint32_t low, std::uint32_t high) {
-    return std::uint64_t(high) << 32 | low;
-  }
   // Writes an entry.
   WFPG_HD static void put(std::uint64_t* to, std::uint32_t key, std::uint32_t size, std::uint64_t candidate,
                           const field_origin& from) {
-    to[0] = pair(key, size);
+    to[0] = std::uint64_t(size) << 32 | key;
     to[1] = candidate;
-    to[2] = pair(float_bits(from.position.x), float_bits(from.position.y));
-    to[3] = pair(float_bits(from.position.z), float_bits(from.normal.x));
-    to[4] = pair(float_bits(from.normal.y), float_bits(from.normal.z));
-    to[5] = (from.cosine ? 1u : 0u) | (from.hemisphere ? 2u : 0u);
+    packed_origin::put(reinterpret_cast<std::uint32_t*>(to + 2), from);
   }
   // Origin in an entry, with a seed for the cones.
   WFPG_HD field_origin origin(std::size_t i, std::uint32_t seed) const {
-    const std::uint64_t* const from = entries + words * i;
-    const auto low = [&](int k) { return bits_float(static_cast<std::uint32_t>(from[k])); };
-    const auto high = [&](int k) { return bits_float(static_cast<std::uint32_t>(from[k] >> 32)); };
-    field_origin origin;
-    origin.position = {low(2), high(2), low(3)};
-    origin.normal = {high(3), low(4), high(4)};
-    origin.cosine = (from[5] & 1u) != 0;
-    origin.hemisphere = (from[5] & 2u) != 0;
-    origin.seed = seed;
-    return origin;
+    return packed_origin::get(reinterpret_cast<const std::uint32_t*>(entries + words * i + 2), seed);
   }
 };
 

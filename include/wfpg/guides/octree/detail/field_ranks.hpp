@@ -48,8 +48,8 @@ struct number_builds {
   shared_origins origins;
   WFPG_HD void operator()(std::size_t i) const {
     origins.place_of_slot[list[i < wholes ? i : slots + (i - wholes)]] = static_cast<std::uint32_t>(i);
-    for (std::uint32_t k = 0; k < shared_origins::words; ++k)
-      origins.of_builds[i * shared_origins::words + k] = 0;
+    for (std::uint32_t k = 0; k < packed_origin::words; ++k)
+      origins.of_builds[i * packed_origin::words + k] = 0;
   }
 };
 
@@ -117,7 +117,7 @@ class field_ranks {
   field_ranks(const Exec& exec, std::size_t slots, bool learns, communicator* ranks)
       : ranks_(ranks),
         words_(exec, ranks ? slots : 0),
-        origins_(exec, ranks ? shared_origins::words * slots : 0),
+        origins_(exec, ranks ? packed_origin::words * slots : 0),
         sums_(exec, ranks && learns ? 6 * slots : 0),
         largest_(exec, ranks && learns ? 2 * slots : 0) {}
 
@@ -154,7 +154,7 @@ class field_ranks {
     if (wave_.builds == 0) return;
     exec.for_each(wave_.builds, number_builds{list, words_.size(), wave_.all, origins()});
     exec.for_each(n, write_origins<Builder, Rays>{builder, rays, field_of_ray});
-    ranks_->all_reduce_sum(origins_.view().subview(0, std::size_t(wave_.builds) * shared_origins::words));
+    ranks_->all_reduce_sum(origins_.view().subview(0, std::size_t(wave_.builds) * packed_origin::words));
   }
 
   /// Number of builds of the wave whose origins were sent: of whole fields, or of others.
@@ -196,7 +196,7 @@ class field_ranks {
  private:
   communicator* ranks_ = nullptr;
   buffer<std::uint32_t, Exec> words_;    // a slot: its place among the builds, or its last use
-  buffer<std::uint32_t, Exec> origins_;  // a build: shared_origins::words
+  buffer<std::uint32_t, Exec> origins_;  // a build: packed_origin::words
   buffer<std::uint64_t, Exec> sums_;     // a slot: exchange_fractions
   buffer<std::uint32_t, Exec> largest_;  // likewise
   buffer<cone_hit, Exec> hits_;          // of a wave's cones, whole fields first
