@@ -8,7 +8,9 @@
 // Source: NCCL's user guide, "Creating a communicator with options" and "Fault tolerance".
 // Cost: two collectives a call, one of 32 bytes that checks that ranks agree.
 // The host waits for each call, since a kernel that waits for a lost rank never ends.
-// Memory: NCCL's own, and 32 bytes on the device.
+// Ranks join by a communicator that does not block, so that one that does not come is an error.
+// Calls are those of a second one, which blocks: NCCL begins a thread for each call of one that does not.
+// Memory: NCCL's own, and 32 bytes on the device and on the host.
 #pragma once
 
 #include <wfpg/base/error.hpp>
@@ -19,9 +21,11 @@
 #include <cuda_runtime_api.h>
 #include <nccl.h>
 
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <memory>
 #include <string>
 #include <thread>
@@ -89,7 +93,10 @@ class nccl_communicator final : public communicator {
       : nccl_communicator(exec, rank, size, options) {
     try {
       begin(id);
-      wait_for_nccl("ncclCommInitRankConfig");
+      wait_to_join("ncclCommInitRankConfig");
+      begin_calls();
+      wait_to_join("ncclCommSplit");
+      meet();
     } catch (...) {
       // The destructor must not wait for ranks that have not joined.
       abandon();
@@ -100,19 +107,20 @@ class nccl_communicator final : public communicator {
   nccl_communicator(const nccl_communicator&) = delete;
   nccl_communicator& operator=(const nccl_communicator&) = delete;
   /// Leaves the communicator.
-  /// Ranks of other processes are waited for, no longer than the time limit.
-  /// Ranks of one process are not: NCCL frees all of them with the last.
+  /// Other ranks are waited for, no longer than the time limit.
+  /// After an exception nobody is waited for, nor are ranks of join_devices().
   ~nccl_communicator() override {
     if (!ranks_) return;
     try {
-      if (!is_of_one_process_) {
-        require_begun(ncclCommFinalize(ranks_), "ncclCommFinalize");
-        wait_for_nccl("ncclCommFinalize");
-      }
-      ncclCommDestroy(std::exchange(ranks_, nullptr));
+      if (std::uncaught_exceptions() > exceptions_)
+        abandon();
+      else if (!is_of_one_thread_)
+        meet();
+      if (ranks_) ncclCommDestroy(std::exchange(ranks_, nullptr));
     } catch (...) {
-      abandon();  // destructors must not throw
+      // Destructors must not throw.
     }
+    abandon();
   }
 
   /// Returns the communicators of GPUs of this process, all of them, in the order of `devices`.
@@ -126,7 +134,9 @@ class nccl_communicator final : public communicator {
     std::vector<std::unique_ptr<nccl_communicator>> all;
     try {
       begin_all(devices, options, all);
-      for (const std::unique_ptr<nccl_communicator>& one : all) one->wait_for_nccl("ncclCommInitRankConfig");
+      for (const std::unique_ptr<nccl_communicator>& one : all) one->wait_to_join("ncclCommInitRankConfig");
+      begin_calls_of(devices, all);
+      for (const std::unique_ptr<nccl_communicator>& one : all) one->wait_to_join("ncclCommSplit");
     } catch (...) {
       // Where one has not joined, NCCL may still write to the others.
       for (const std::unique_ptr<nccl_communicator>& one : all) one->abandon();
@@ -164,18 +174,16 @@ class nccl_communicator final : public communicator {
   /// Throws std::invalid_argument where no rank has the number `root`.
   void broadcast(array_view<unsigned char> bytes, std::uint32_t root) override {
     require(root < size_, "root", root, "less than the number of ranks");
-    const detail::rank_call call{detail::rank_function::broadcast, bytes.size(), root};
-    require_same(call);
-    if (bytes.empty()) return;
-    exchange(detail::name_of(call.function),
-             ncclBroadcast(bytes.data(), bytes.data(), bytes.size(), ncclUint8, static_cast<int>(root),
-                           ranks_, exec_.stream()));
+    exchange({detail::rank_function::broadcast, bytes.size(), root}, [&] {
+      return ncclBroadcast(bytes.data(), bytes.data(), bytes.size(), ncclUint8, static_cast<int>(root),
+                           ranks_, exec_.stream());
+    });
   }
 
  private:
   /// Joins nobody yet.
   /// Checks arguments, and takes memory of the current GPU.
-  /// begin() and wait_for_nccl() do the rest, so that several can begin before one waits.
+  /// begin(), begin_calls() and wait_to_join() do the rest, so that several can begin before one waits.
   nccl_communicator(const Exec& exec, std::uint32_t rank, std::uint32_t size, const nccl_options& options)
       : exec_(exec), options_(options), rank_(rank), size_(size) {
     require(rank < size, "rank", rank, "less than the number of ranks");
@@ -184,13 +192,20 @@ class nccl_communicator final : public communicator {
   }
 
   /// Begins to join the other ranks, and returns at once.
-  /// NCCL writes ranks_ later where calls are grouped, so this object must not move.
+  /// NCCL writes joined_ later where calls are grouped, so this object must not move.
   void begin(const ncclUniqueId& id) {
     ncclConfig_t config = NCCL_CONFIG_INITIALIZER;
     config.blocking = 0;
     require_begun(
-        ncclCommInitRankConfig(&ranks_, static_cast<int>(size_), id, static_cast<int>(rank_), &config),
+        ncclCommInitRankConfig(&joined_, static_cast<int>(size_), id, static_cast<int>(rank_), &config),
         "ncclCommInitRankConfig");
+  }
+  /// Begins to make ranks_ of joined_, and returns at once.
+  /// Precondition: all ranks have joined.
+  void begin_calls() {
+    ncclConfig_t config = NCCL_CONFIG_INITIALIZER;
+    config.blocking = 1;
+    require_begun(ncclCommSplit(joined_, 0, static_cast<int>(rank_), &ranks_, &config), "ncclCommSplit");
   }
 
   /// Begins to join GPUs of this process, and adds their communicators to `all`.
@@ -205,8 +220,19 @@ class nccl_communicator final : public communicator {
     for (std::uint32_t rank = 0; rank < size; ++rank) {
       detail::check_runtime(cudaSetDevice(devices[rank].device), "cudaSetDevice");
       all.emplace_back(new nccl_communicator(devices[rank].exec, rank, size, options));
-      all.back()->is_of_one_process_ = true;
+      all.back()->is_of_one_thread_ = true;
       all.back()->begin(id);
+    }
+    group.end();
+  }
+  /// begin_calls() of all of them.
+  /// Changes the current GPU.
+  static void begin_calls_of(const std::vector<nccl_device<Exec>>& devices,
+                             const std::vector<std::unique_ptr<nccl_communicator>>& all) {
+    detail::nccl_group group;
+    for (const std::unique_ptr<nccl_communicator>& one : all) {
+      detail::check_runtime(cudaSetDevice(devices[one->rank_].device), "cudaSetDevice");
+      one->begin_calls();
     }
     group.end();
   }
@@ -219,71 +245,96 @@ class nccl_communicator final : public communicator {
     detail::check_nccl(begun, doing);
   }
 
-  /// Checks that ranks agree, and reduces values in device memory.
+  /// Reduces values in place, in device memory.
   template <class T>
   void reduce(detail::rank_function function, array_view<T> values, ncclDataType_t type,
               ncclRedOp_t operation) {
-    require_same({function, values.size()});
-    if (!values.empty()) all_reduce(values, type, operation, detail::name_of(function));
+    exchange({function, values.size()}, [&] {
+      return ncclAllReduce(values.data(), values.data(), values.size(), type, operation, ranks_,
+                           exec_.stream());
+    });
   }
 
-  /// Reduces values in place, and waits for them.
-  /// `doing`: the function that was called, for messages.
-  /// Precondition: ranks agree on the number of values, which is not 0.
-  template <class T>
-  void all_reduce(array_view<T> values, ncclDataType_t type, ncclRedOp_t operation, const char* doing) {
-    exchange(doing, ncclAllReduce(values.data(), values.data(), values.size(), type, operation, ranks_,
-                                  exec_.stream()));
+  /// Waits for all ranks.
+  /// Throws rank_error.
+  void meet() {
+    exchange({detail::rank_function::meeting, 0}, [] { return ncclSuccess; });
   }
 
+  /// Makes a call with all ranks, and waits for it.
+  /// `begin` puts the collective of its values on the stream.
   /// Throws rank_error unless all ranks make this call.
   /// NCCL does not check that: its kernels may wait without end.
-  void require_same(const detail::rank_call& call) {
+  template <class Begin>
+  void exchange(const detail::rank_call& call, const Begin& begin) {
     if (!ranks_) throw rank_error("the communicator is of no more use, since an earlier call has failed");
+    const char* const doing = detail::name_of(call.function);
     // The rank's own work comes first, so that the time limit is for the others alone.
     detail::check_runtime(cudaStreamSynchronize(exec_.stream()), "cudaStreamSynchronize");
-    std::uint64_t words[detail::rank_call::word_count];
-    call.write(words);
-    exec_.copy_from_host(words_.view().data(), words, sizeof words);
-    all_reduce(words_.view(), ncclUint64, ncclMax, detail::name_of(call.function));
-    exec_.copy_to_host(words, words_.view().data(), sizeof words);
-    if (call.agrees(words)) return;
-    // Ranks are no longer in step, so that later calls must fail, too.
-    abandon();
-    call.require_same(words, rank_);
+    begin_check(call, doing);
+    // NCCL connects GPUs in the first calls of a size, and waits in them. All ranks must have come before.
+    const bool is_connected = call.count == 0 || std::exchange(connected_[size_class(call)], true);
+    if (!is_connected) require_same(call);
+    if (call.count > 0) require_begun(begin(), doing);
+    detail::check_runtime(cudaEventRecord(done_.get(), exec_.stream()), "cudaEventRecord");
+    if (is_connected) require_same(call);
+    wait_for(done_, doing);
   }
 
-  /// Waits until a collective is done.
-  /// `begun`: what NCCL returned when it was put on the stream.
-  /// Throws rank_error where that failed, or after the time limit.
-  void exchange(const char* doing, ncclResult_t begun) {
-    require_begun(begun, doing);
-    wait_for_nccl(doing);  // until it is on the stream
-    detail::check_runtime(cudaEventRecord(done_.get(), exec_.stream()), "cudaEventRecord");
-    wait(doing, [&] {
-      const cudaError_t code = cudaEventQuery(done_.get());
+  /// Puts on the stream what finds out whether all ranks make this call.
+  void begin_check(const detail::rank_call& call, const char* doing) {
+    call.write(words_.host());
+    words_.send(exec_.stream());
+    require_begun(ncclAllReduce(words_.device(), words_.device(), detail::rank_call::word_count, ncclUint64,
+                                ncclMax, ranks_, exec_.stream()),
+                  doing);
+    words_.take(exec_.stream());
+    detail::check_runtime(cudaEventRecord(checked_.get(), exec_.stream()), "cudaEventRecord");
+  }
+
+  /// Waits until the check is done.
+  /// Throws rank_error unless all ranks make this call.
+  void require_same(const detail::rank_call& call) {
+    wait_for(checked_, detail::name_of(call.function));
+    if (call.agrees(words_.host())) return;
+    // Ranks are no longer in step, so that later calls must fail, too.
+    // What the call has on the stream may wait without end.
+    abandon();
+    call.require_same(words_.host(), rank_);
+  }
+
+  /// Calls of a class use the same connections of GPUs: their numbers of values have the same highest bit.
+  static std::size_t size_class(const detail::rank_call& call) {
+    std::size_t bits = 0;
+    while (bits < 63 && call.count >> (bits + 1) > 0) ++bits;
+    return 64 * static_cast<std::size_t>(call.function) + bits;
+  }
+
+  /// Waits until an event of the stream has come, and collectives before it.
+  void wait_for(const detail::cuda_event& event, const char* doing) {
+    wait(ranks_, doing, [&] {
+      const cudaError_t code = cudaEventQuery(event.get());
       if (code != cudaErrorNotReady) detail::check_runtime(code, doing);
       return code == cudaSuccess;
     });
   }
 
-  /// Waits until NCCL's host code has done what it was asked for.
-  /// Calls that do not block return before that.
-  void wait_for_nccl(const char* doing) {
-    wait(doing, [] { return true; });
+  /// Waits until NCCL has done what joined_ was asked for.
+  void wait_to_join(const char* doing) {
+    wait(joined_, doing, [] { return true; });
   }
 
-  /// Waits until NCCL has no work on the host, and is_done() returns true.
+  /// Waits until NCCL has no work of `ranks` on the host, and is_done() returns true.
   /// Throws rank_error after the time limit, or where NCCL reports an error.
   /// Such errors are a network's, or a rank's that has aborted.
   /// Looks without pause, since a pause is as long as a small exchange.
   template <class Done>
-  void wait(const char* doing, const Done& is_done) {
+  void wait(ncclComm_t ranks, const char* doing, const Done& is_done) {
     using clock = std::chrono::steady_clock;
     const clock::time_point begin = clock::now();
     for (;;) {
       ncclResult_t state = ncclSuccess;
-      const ncclResult_t asked = ncclCommGetAsyncError(ranks_, &state);
+      const ncclResult_t asked = ncclCommGetAsyncError(ranks, &state);
       const ncclResult_t found = asked != ncclSuccess ? asked : state;
       if (found == ncclSuccess && is_done()) return;
       if (found != ncclSuccess && found != ncclInProgress) {
@@ -304,6 +355,7 @@ class nccl_communicator final : public communicator {
   /// Does nothing where there is none.
   void abandon() {
     if (ranks_) ncclCommAbort(std::exchange(ranks_, nullptr));
+    if (joined_) ncclCommAbort(std::exchange(joined_, nullptr));
   }
 
   /// The policy on whose stream the collectives are.
@@ -311,12 +363,21 @@ class nccl_communicator final : public communicator {
   /// As given; ranks are not asked whether they have the same.
   nccl_options options_;
   std::uint32_t rank_ = 0, size_ = 0;
-  /// Whether join_devices() made all ranks.
-  bool is_of_one_process_ = false;
+  /// Whether join_devices() made all ranks, so that one thread may destroy them.
+  bool is_of_one_thread_ = false;
+  /// Exceptions in flight when this was made.
+  int exceptions_ = std::uncaught_exceptions();
   /// What ranks compare before each exchange.
   detail::rank_words words_;
-  /// Comes after a collective on the stream.
-  detail::cuda_event done_;
+  /// Come after the check and after the call on the stream.
+  detail::cuda_event checked_, done_;
+  /// By size_class(): whether there was such a call.
+  std::array<bool, 64 * 6> connected_ = {};
+  /// Does not block, and has no calls.
+  /// It must live as long as ranks_ of any rank.
+  /// Null after a failure.
+  ncclComm_t joined_ = nullptr;
+  /// Of all calls.
   /// Null after a failure.
   ncclComm_t ranks_ = nullptr;
 };

@@ -87,25 +87,46 @@ class cuda_event {
   cudaEvent_t event_ = nullptr;
 };
 
-/// Memory of the current device for the words that ranks compare.
+/// The words that ranks compare, in memory of the current device and in the host's.
 class rank_words {
  public:
+  /// Array of the words.
+  using array = std::uint64_t[rank_call::word_count];
+
   /// Throws device_error.
   rank_words() {
-    check_runtime(cudaMalloc(&words_, rank_call::word_count * sizeof(std::uint64_t)), "cudaMalloc");
+    check_runtime(cudaMallocHost(&host_, sizeof(array)), "cudaMallocHost");
+    const cudaError_t code = cudaMalloc(&device_, sizeof(array));
+    if (code != cudaSuccess) cudaFreeHost(host_);
+    check_runtime(code, "cudaMalloc");
   }
   /// Not copyable: the memory has one owner.
   rank_words(const rank_words&) = delete;
   rank_words& operator=(const rank_words&) = delete;
   /// Errors are ignored, as destructors must not throw.
-  ~rank_words() { cudaFree(words_); }
-  /// Returns a view of the words, in device memory.
-  array_view<std::uint64_t> view() const {
-    return {static_cast<std::uint64_t*>(words_), rank_call::word_count};
+  ~rank_words() {
+    cudaFree(device_);
+    cudaFreeHost(host_);
+  }
+  /// Returns the words in the host's memory.
+  /// It is pinned, so that copies do not block.
+  array& host() { return *static_cast<array*>(host_); }
+  /// Returns the words in the device's memory.
+  std::uint64_t* device() const { return static_cast<std::uint64_t*>(device_); }
+  /// Puts a copy to the device on the stream. Throws device_error.
+  void send(cudaStream_t stream) {
+    check_runtime(cudaMemcpyAsync(device_, host_, sizeof(array), cudaMemcpyHostToDevice, stream),
+                  "cudaMemcpyAsync");
+  }
+  /// Puts a copy to the host on the stream. Throws device_error.
+  void take(cudaStream_t stream) {
+    check_runtime(cudaMemcpyAsync(host_, device_, sizeof(array), cudaMemcpyDeviceToHost, stream),
+                  "cudaMemcpyAsync");
   }
 
  private:
-  void* words_ = nullptr;
+  void* host_ = nullptr;
+  void* device_ = nullptr;
 };
 
 }  // namespace wfpg::detail

@@ -15,12 +15,13 @@
 
 namespace wfpg::detail {
 
-/// The functions of a communicator.
-enum class rank_function : std::uint32_t { sum32, sum64, max32, max64, broadcast };
+/// The functions of a communicator, and a meeting: an adapter's own, where ranks wait for each other.
+enum class rank_function : std::uint32_t { sum32, sum64, max32, max64, broadcast, meeting };
 
 /// Returns the function's name, for messages.
 inline const char* name_of(rank_function function) {
   if (function == rank_function::broadcast) return "broadcast";
+  if (function == rank_function::meeting) return "the meeting of ranks that join or leave";
   const bool is_sum = function == rank_function::sum32 || function == rank_function::sum64;
   return is_sum ? "all_reduce_sum" : "all_reduce_max";
 }
