@@ -7,9 +7,6 @@
 
 #include <wfpg/ranks/communicator.hpp>
 
-#include <optional>
-#include <vector>
-
 namespace render {
 
 /// Samples of a pixel in one wave: what the ranks share.
@@ -45,61 +42,5 @@ void require_shared(const render_options& options);
 /// Throws wfpg::rank_error where another rank has another scene, other options, another kind of device, or
 /// resumes or loads other bytes. Throws wfpg::file_error where a file cannot be read.
 void require_same_rendering(const scene& scene, const render_options& options);
-
-/// Ranks of the host's memory for a policy of a device's. It copies there and back.
-template <class Exec>
-class staged_communicator final : public wfpg::communicator {
- public:
-  /// `ranks` outlives this.
-  staged_communicator(const Exec& exec, wfpg::communicator& ranks) : exec_(exec), ranks_(ranks) {}
-
-  std::uint32_t rank() const override { return ranks_.rank(); }
-  std::uint32_t size() const override { return ranks_.size(); }
-  void all_reduce_sum(wfpg::array_view<std::uint32_t> values) override {
-    on_host(values, [&](auto host) { ranks_.all_reduce_sum(host); });
-  }
-  void all_reduce_sum(wfpg::array_view<std::uint64_t> values) override {
-    on_host(values, [&](auto host) { ranks_.all_reduce_sum(host); });
-  }
-  void all_reduce_max(wfpg::array_view<std::uint32_t> values) override {
-    on_host(values, [&](auto host) { ranks_.all_reduce_max(host); });
-  }
-  void all_reduce_max(wfpg::array_view<std::uint64_t> values) override {
-    on_host(values, [&](auto host) { ranks_.all_reduce_max(host); });
-  }
-  void broadcast(wfpg::array_view<unsigned char> bytes, std::uint32_t root) override {
-    on_host(bytes, [&](auto host) { ranks_.broadcast(host, root); });
-  }
-
- private:
-  template <class T, class Call>
-  void on_host(wfpg::array_view<T> values, const Call& call) {
-    std::vector<T> host(values.size());
-    exec_.copy_to_host(host.data(), values.data(), host.size() * sizeof(T));
-    call(wfpg::array_view<T>(host.data(), host.size()));
-    exec_.copy_from_host(values.data(), host.data(), host.size() * sizeof(T));
-  }
-
-  Exec exec_;
-  wfpg::communicator& ranks_;
-};
-
-/// Options whose ranks take arrays of a device's memory.
-template <class Exec>
-class device_options {
- public:
-  device_options(const Exec& exec, const render_options& options) : options_(options) {
-    if (options.ranks) options_.policy_ranks = &ranks_.emplace(exec, *options.ranks);
-  }
-  // Options refer to its ranks.
-  device_options(const device_options&) = delete;
-  device_options& operator=(const device_options&) = delete;
-
-  const render_options& get() const { return options_; }
-
- private:
-  render_options options_;
-  std::optional<staged_communicator<Exec>> ranks_;
-};
 
 }  // namespace render

@@ -1,4 +1,5 @@
 // The renderer on the policy exec::cuda: a GPU.
+#include "app/gpu_ranks.hpp"
 #include "app/render_impl.hpp"
 #include "casters/bvh_scene.hpp"
 #include "tracer/cuda_clock.hpp"
@@ -15,7 +16,7 @@ render_result render_on_cuda(const scene& scene, const render_options& options,
                      "--device cuda finds no GPU of this number; cudaSetDevice");
   wfpg::check_cuda(cudaFree(nullptr), "--device cuda finds no GPU that it can use; cudaFree");
   const wfpg::exec::cuda exec;
-  const device_options<wfpg::exec::cuda> own(exec, options);
+  const gpu_options own(exec, options);
   return render_on<bvh_scene<wfpg::exec::cuda>>(exec, scene, own.get(), progress);
 }
 

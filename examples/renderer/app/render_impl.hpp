@@ -91,7 +91,7 @@ inline tracer_settings tracer_settings_of(const render_options& options) {
           combination_of(options) == wfpg::sample_combination::inverse_variance,
           share_of(options),
           end_of_samples(options),
-          options.ranks};
+          options.policy_ranks};
 }
 
 /// What every guide is told.

@@ -1,4 +1,5 @@
 // The renderer on the policy exec::cuda with OptiX as its ray caster.
+#include "app/gpu_ranks.hpp"
 #include "app/render_impl.hpp"
 #include "casters/optix_caster.hpp"
 #include "tracer/cuda_clock.hpp"
@@ -39,7 +40,7 @@ render_result render_on_optix(const scene& scene, const render_options& options,
                      "--device optix finds no GPU of this number; cudaSetDevice");
   wfpg::check_cuda(cudaFree(nullptr), "--device optix finds no GPU that it can use; cudaFree");
   const wfpg::exec::cuda exec;
-  const device_options<wfpg::exec::cuda> own(exec, options);
+  const gpu_options own(exec, options);
   return render_on<optix_accelerated>(exec, scene, own.get(), progress);
 }
 

@@ -270,16 +270,8 @@ class device_scene {
         has_unbent_(may_pass_unbent(host.materials)) {
     check(host);
     emitted_luminances_ = wfpg::buffer<float, Exec>(exec, emitted_luminances(host));
-    std::vector<texture_span> spans;
-    std::vector<vec4> texels;
-    for (const texture& t : host.textures) {
-      spans.push_back({static_cast<std::uint32_t>(texels.size()), static_cast<std::uint32_t>(t.width),
-                       static_cast<std::uint32_t>(t.height), t.wrap_u, t.wrap_v});
-      texels.insert(texels.end(), t.texels.begin(), t.texels.end());
-    }
     if (!host.sky.texels.empty()) upload_sky(exec, host.sky);
-    textures_ = wfpg::buffer<texture_span, Exec>(exec, spans);
-    texels_ = wfpg::buffer<vec4, Exec>(exec, texels);
+    upload_textures(exec, host.textures);
   }
 
   scene_view view() const {
@@ -301,6 +293,22 @@ class device_scene {
   }
 
  private:
+  // Textures are copied one by one, since all of them together may be large.
+  void upload_textures(const Exec& exec, const std::vector<texture>& textures) {
+    std::vector<texture_span> spans;
+    std::size_t count = 0;
+    for (const texture& t : textures) {
+      spans.push_back({static_cast<std::uint32_t>(count), static_cast<std::uint32_t>(t.width),
+                       static_cast<std::uint32_t>(t.height), t.wrap_u, t.wrap_v});
+      count += t.texels.size();
+    }
+    textures_ = wfpg::buffer<texture_span, Exec>(exec, spans);
+    texels_ = wfpg::buffer<vec4, Exec>(exec, count);
+    for (std::size_t i = 0; i < textures.size(); ++i)
+      exec.copy_from_host(texels_.data() + spans[i].first, textures[i].texels.data(),
+                          textures[i].texels.size() * sizeof(vec4));
+  }
+
   void upload_sky(const Exec& exec, const environment_map& sky) {
     const std::vector<double> powers = texel_powers(sky);
     const auto total = static_cast<float>(std::accumulate(powers.begin(), powers.end(), 0.0));

@@ -25,14 +25,14 @@ struct exact_sum {
 
   /// Four parts of 32 bits, whose sums over ranks have room in 64.
   static constexpr std::size_t parts = 4;
-  void split(std::uint64_t* to) const {
+  WFPG_HD void split(std::uint64_t* to) const {
     to[0] = low & 0xffffffffu;
     to[1] = low >> 32;
     to[2] = high & 0xffffffffu;
     to[3] = high >> 32;
   }
   /// The number with these parts, one rank's or sums of several ranks'.
-  static double joined(const std::uint64_t* words) {
+  WFPG_HD static double joined(const std::uint64_t* words) {
     const std::uint64_t second = words[1] + (words[0] >> 32), third = words[2] + (second >> 32);
     const std::uint64_t low = second << 32 | (words[0] & 0xffffffffu);
     const std::uint64_t high = (words[3] + (third >> 32)) << 32 | (third & 0xffffffffu);

@@ -8,10 +8,10 @@
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/ranks/communicator.hpp>
 
+#include <thrust/reduce.h>
+
 #include <algorithm>
 #include <cstdint>
-#include <cstring>
-#include <numeric>
 #include <vector>
 
 namespace render {
@@ -43,21 +43,54 @@ struct add_exactly {
   }
 };
 
+/// Copies sums of pixels.
+struct copy_sums {
+  const glm::dvec3* from;
+  glm::dvec3* to;
+
+  WFPG_HD void operator()(std::size_t i) const { to[i] = from[i]; }
+};
+
+/// Writes the parts of the sums from `first` on, which ranks add up.
+struct split_exact_sums {
+  wfpg::array_view<const exact_sum> film;
+  std::uint64_t* words;  ///< exact_sum::parts a sum
+  std::size_t first;
+
+  WFPG_HD void operator()(std::size_t i) const { film[first + i].split(words + i * exact_sum::parts); }
+};
+
+/// Writes the numbers of the sums from `first` on, whose parts are those of all ranks.
+struct join_exact_sums {
+  const std::uint64_t* words;  ///< as above
+  double* sums;
+  std::size_t first;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    sums[first + i] = exact_sum::joined(words + i * exact_sum::parts);
+  }
+};
+
 /// The samples of a picture so far, in a policy's memory. A rank has the sums of its own pixels. Where waves
 /// have several samples, it has exact sums of its samples of all pixels. Pictures and states are those of all
 /// ranks, so all ranks must ask for them. They have the same bits for any number of ranks.
 template <class Exec>
 class path_film {
  public:
-  /// `ranks`: of the host's memory; null for one rank. It outlives the film.
+  /// `ranks`: of the policy's memory; null for one rank. It outlives the film.
   path_film(const Exec& exec, const wave_share& share, wfpg::communicator* ranks)
       : exec_(exec),
         share_(share),
         ranks_(ranks),
-        sums_(exec, std::vector<glm::dvec3>(is_exact() ? 0 : share.count, glm::dvec3(0.0))),
-        exact_(exec, std::vector<exact_sum>(is_exact() ? 3 * std::size_t(share.pixels) : 0)),
-        segments_(exec, std::vector<std::uint32_t>(share.count, 0)),
-        light_hits_(exec, std::vector<std::uint32_t>(share.count, 0)) {}
+        sums_(exec, is_exact() ? 0 : share.count),
+        exact_(exec, is_exact() ? 3 * std::size_t(share.pixels) : 0),
+        segments_(exec, share.count),
+        light_hits_(exec, share.count) {
+    clear(sums_);
+    clear(exact_);
+    clear(segments_);
+    clear(light_hits_);
+  }
   /// `pixels`: the number of them, which is that of paths.
   path_film(const Exec& exec, std::size_t pixels) : path_film(exec, wave_share::all_of(pixels), nullptr) {}
 
@@ -102,41 +135,48 @@ class path_film {
  private:
   bool is_exact() const { return share_.samples > 1; }
 
+  // Numbers of 0 have no bits.
+  template <class T>
+  void clear(const wfpg::buffer<T, Exec>& values) {
+    exec_.fill_bytes(values.data(), 0, values.bytes());
+  }
+
   std::uint64_t sum_of(const wfpg::buffer<std::uint32_t, Exec>& counts) const {
-    const std::vector<std::uint32_t> all = counts.to_host(exec_);
-    std::uint64_t sum = std::accumulate(all.begin(), all.end(), std::uint64_t(0));
-    if (ranks_) ranks_->all_reduce_sum(wfpg::array_view<std::uint64_t>(&sum, 1));
-    return sum;
+    const auto own =
+        ::thrust::reduce(exec_.thrust(), counts.data(), counts.data() + counts.size(), std::uint64_t(0));
+    if (!ranks_) return own;
+    const wfpg::buffer<std::uint64_t, Exec> sum(exec_, std::vector<std::uint64_t>{own});
+    ranks_->all_reduce_sum(sum.view());
+    return wfpg::read_element(exec_, sum.data());
   }
 
   /// The picture's sums, of all ranks.
   std::vector<glm::dvec3> sums_of_all() const {
-    if (is_exact()) return exact_sums_of_all();
-    std::vector<glm::dvec3> own = sums_.to_host(exec_);
-    if (!ranks_) return own;
-    // Bits of zeros add nothing to the bits of the rank that has the pixel.
-    std::vector<std::uint64_t> bits(3 * std::size_t(share_.pixels), 0);
-    std::memcpy(bits.data() + 3 * std::size_t(share_.first), own.data(), own.size() * sizeof(glm::dvec3));
-    ranks_->all_reduce_sum(wfpg::array_view<std::uint64_t>(bits.data(), bits.size()));
-    std::vector<glm::dvec3> all(share_.pixels);
-    std::memcpy(all.data(), bits.data(), bits.size() * sizeof(std::uint64_t));
-    return all;
+    if (!is_exact() && !ranks_) return sums_.to_host(exec_);
+    const wfpg::buffer<glm::dvec3, Exec> all(exec_, share_.pixels);
+    if (is_exact())
+      join_exactly(reinterpret_cast<double*>(all.data()));
+    else
+      join(all);
+    return all.to_host(exec_);
   }
 
-  std::vector<glm::dvec3> exact_sums_of_all() const {
-    const std::vector<exact_sum> own = exact_.to_host(exec_);
-    std::vector<glm::dvec3> all(share_.pixels);
-    constexpr std::size_t parts = exact_sum::parts, at_once = std::size_t(1) << 18;
-    std::vector<std::uint64_t> words;
-    for (std::size_t first = 0; first < own.size(); first += at_once) {
-      const std::size_t count = std::min(at_once, own.size() - first);
-      words.resize(count * parts);
-      for (std::size_t i = 0; i < count; ++i) own[first + i].split(&words[i * parts]);
-      if (ranks_) ranks_->all_reduce_sum(wfpg::array_view<std::uint64_t>(words.data(), words.size()));
-      for (std::size_t i = 0; i < count; ++i)
-        all[(first + i) / 3][static_cast<int>((first + i) % 3)] = exact_sum::joined(&words[i * parts]);
+  /// Sums of all pixels. Bits of zeros add nothing to the bits of the rank that has the pixel.
+  void join(const wfpg::buffer<glm::dvec3, Exec>& all) const {
+    exec_.fill_bytes(all.data(), 0, all.bytes());
+    exec_.for_each(sums_.size(), copy_sums{sums_.data(), all.data() + share_.first});
+    ranks_->all_reduce_sum({reinterpret_cast<std::uint64_t*>(all.data()), 3 * all.size()});
+  }
+
+  void join_exactly(double* all) const {
+    const std::size_t at_once = std::min(exact_.size(), std::size_t(1) << 22);
+    const wfpg::buffer<std::uint64_t, Exec> words(exec_, at_once * exact_sum::parts);
+    for (std::size_t first = 0; first < exact_.size(); first += at_once) {
+      const std::size_t count = std::min(at_once, exact_.size() - first);
+      exec_.for_each(count, split_exact_sums{exact_.view(), words.data(), first});
+      if (ranks_) ranks_->all_reduce_sum(words.view().subview(0, count * exact_sum::parts));
+      exec_.for_each(count, join_exact_sums{words.data(), all, first});
     }
-    return all;
   }
 
   Exec exec_;

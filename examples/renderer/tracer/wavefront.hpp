@@ -29,7 +29,7 @@ struct tracer_settings {
   bool weighs_by_gain = false;             ///< samples have the weights that the guider measures
   wave_share share = {};                   ///< this rank's part of a wave; of no paths: all of one sample
   std::uint32_t end = 0xffffffffu;         ///< waves have no samples from this one on
-  wfpg::communicator* ranks = nullptr;     ///< that render the picture together, of the host's memory
+  wfpg::communicator* ranks = nullptr;     ///< that render the picture together, of the policy's memory
 
   /// The samples of a wave that begins with this one.
   std::uint32_t samples_from(std::uint32_t sample) const { return std::min(part().samples, end - sample); }
