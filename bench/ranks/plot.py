@@ -136,15 +136,21 @@ def work(part):
 
 class Model:
     """Seconds of a sample on one rank of n: what is divided, what each rank does alone, packing, and reductions. The
-    first two follow from one rank and two, costs of reductions from two."""
+    first two fit the work of all measured numbers of ranks, with equal relative errors. Costs of packing and of
+    reductions are those between two ranks."""
 
     def __init__(self, runs):
-        two = runs["2"]
-        self.part = two["later"]
-        self.divided = 2 * (work(runs["1"]["later"]) - work(self.part))
-        self.alone = work(runs["1"]["later"]) - self.divided
-        # A pass of the bytes between two ranks; both of them are measured together.
-        self.costs = dict(two["reduction_seconds"])
+        self.part = runs["2"]["later"]
+        self.costs = runs["2"]["reduction_seconds"]
+        # Least squares of (divided / n + alone) / work - 1.
+        sums = [0.0] * 5
+        for n, run in runs.items():
+            if "later" in run:
+                u, v = 1 / int(n) / work(run["later"]), 1 / work(run["later"])
+                sums = [a + b for a, b in zip(sums, (u * u, u * v, v * v, u, v))]
+        uu, uv, vv, u, v = sums
+        self.alone = max((uu * v - uv * u) / (uu * vv - uv * uv), 0.0)
+        self.divided = (u - uv * self.alone) / uu
 
     def seconds(self, ranks, costs, samples=1):
         packing = self.part["packing"] if ranks > 1 else 0.0
@@ -203,7 +209,7 @@ def print_model(results):
             if "later" in run:
                 part = run["later"]
                 print(f"  {n}: {1e3 * part['all']:.1f} ms, model {1e3 * model.seconds(int(n), model.costs):.1f}; reductions "
-                      f"{1e3 * part['reducing']:.2f} ms, model {1e3 * reduction(int(n), model.part, model.costs):.2f}; "
+                      f"{1e3 * part['reducing']:.2f} ms, model {1e3 * reduction(int(n), part, model.costs):.2f}; "
                       f"packing {1e3 * part['packing']:.2f} ms")
 
 
