@@ -104,11 +104,11 @@ def summary(ranks, packing, first, last):
 
 
 def call_seconds(ranks):
-    """Seconds of a reduction of few bytes, and of each MiB more in large ones: medians."""
-    calls = [(group[0].bytes, min(c.reducing for c in group)) for samples in zip(*ranks) for group in zip(*samples)]
-    small = statistics.median(seconds for n, seconds in calls if n <= 64)
-    large = [(seconds - small) / n * 2**20 for n, seconds in calls if n >= 2**18]
-    return {"call": round(small, 8), "mib": round(statistics.median(large), 7) if large else None}
+    """Seconds of a reduction and of each MiB of it: least squares over all of them after warm-up, so that sums agree."""
+    calls = [(group[0].bytes / 2**20, min(c.reducing for c in group))
+             for samples in list(zip(*ranks))[WARM_UP:] for group in zip(*samples)]
+    line = statistics.linear_regression(*zip(*calls))
+    return {"call": round(line.intercept, 8), "mib": round(line.slope, 7)}
 
 
 def formatted(results):
@@ -130,8 +130,8 @@ def main(program, scene, size, processes, samples, results):
     name = os.path.splitext(os.path.basename(scene))[0]
     entry = {"mib": [round(sum(c.bytes for c in s) / 2**20, 3) for s in ranks[0]]}
     entry["warm_up"] = summary(ranks, packing, 1, min(WARM_UP, len(ranks[0])))
-    entry["reduction_seconds"] = call_seconds(ranks)
     if len(ranks[0]) > WARM_UP + 1:
+        entry["reduction_seconds"] = call_seconds(ranks)
         entry["later"] = summary(ranks, packing, WARM_UP, len(ranks[0]))
     everything.setdefault("processes", {}).setdefault(name, {}).setdefault(size, {})[processes] = entry
     with open(results, "w") as file:
