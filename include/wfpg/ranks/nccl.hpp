@@ -137,6 +137,7 @@ class nccl_communicator final : public communicator {
       for (const std::unique_ptr<nccl_communicator>& one : all) one->wait_to_join("ncclCommInitRankConfig");
       begin_calls_of(devices, all);
       for (const std::unique_ptr<nccl_communicator>& one : all) one->wait_to_join("ncclCommSplit");
+      meet_all(devices, all);
     } catch (...) {
       // Where one has not joined, NCCL may still write to the others.
       for (const std::unique_ptr<nccl_communicator>& one : all) one->abandon();
@@ -258,7 +259,28 @@ class nccl_communicator final : public communicator {
   /// Waits for all ranks.
   /// Throws rank_error.
   void meet() {
-    exchange({detail::rank_function::meeting, 0}, [] { return ncclSuccess; });
+    exchange(meeting, [] { return ncclSuccess; });
+  }
+  /// meet() of GPUs of this process, by one thread.
+  /// NCCL connects them here, since a call that connects waits for all.
+  /// Changes the current GPU.
+  static void meet_all(const std::vector<nccl_device<Exec>>& devices,
+                       const std::vector<std::unique_ptr<nccl_communicator>>& all) {
+    const auto on_each = [&](const auto& f) {
+      for (const std::unique_ptr<nccl_communicator>& one : all) {
+        detail::check_runtime(cudaSetDevice(devices[one->rank_].device), "cudaSetDevice");
+        f(*one);
+      }
+    };
+    on_each([](nccl_communicator& one) {
+      meeting.write(one.words_.host());
+      one.words_.send(one.exec_.stream());
+    });
+    detail::nccl_group group;
+    on_each([](nccl_communicator& one) { one.compare_words(meeting); });
+    group.end();
+    on_each([](nccl_communicator& one) { one.take_words(); });
+    on_each([](nccl_communicator& one) { one.require_same(meeting); });
   }
 
   /// Makes a call with all ranks, and waits for it.
@@ -271,7 +293,7 @@ class nccl_communicator final : public communicator {
     const char* const doing = detail::name_of(call.function);
     // The rank's own work comes first, so that the time limit is for the others alone.
     detail::check_runtime(cudaStreamSynchronize(exec_.stream()), "cudaStreamSynchronize");
-    begin_check(call, doing);
+    begin_check(call);
     // NCCL connects GPUs in the first calls of a size, and waits in them. All ranks must have come before.
     const bool is_connected = call.count == 0 || std::exchange(connected_[size_class(call)], true);
     if (!is_connected) require_same(call);
@@ -282,12 +304,20 @@ class nccl_communicator final : public communicator {
   }
 
   /// Puts on the stream what finds out whether all ranks make this call.
-  void begin_check(const detail::rank_call& call, const char* doing) {
+  void begin_check(const detail::rank_call& call) {
     call.write(words_.host());
     words_.send(exec_.stream());
+    compare_words(call);
+    take_words();
+  }
+  /// Puts on the stream the collective of begin_check().
+  void compare_words(const detail::rank_call& call) {
     require_begun(ncclAllReduce(words_.device(), words_.device(), detail::rank_call::word_count, ncclUint64,
                                 ncclMax, ranks_, exec_.stream()),
-                  doing);
+                  detail::name_of(call.function));
+  }
+  /// Puts on the stream what comes after it.
+  void take_words() {
     words_.take(exec_.stream());
     detail::check_runtime(cudaEventRecord(checked_.get(), exec_.stream()), "cudaEventRecord");
   }
@@ -360,6 +390,9 @@ class nccl_communicator final : public communicator {
 
   /// The policy on whose stream the collectives are.
   Exec exec_;
+  /// What meet() has ranks agree on.
+  static constexpr detail::rank_call meeting{detail::rank_function::meeting, 0};
+
   /// As given; ranks are not asked whether they have the same.
   nccl_options options_;
   std::uint32_t rank_ = 0, size_ = 0;

@@ -157,13 +157,28 @@ struct packed_sums_view {
   }
 };
 
-/// Kernel: one step of packed_sums_view, for block i.
-/// `step`: the member function, so that a loop of each step is a kernel of its own.
-template <void (packed_sums_view::*step)(std::size_t) const>
+/// The steps of packed_sums_view, in their order.
+enum class packed_step { count, measure_counts, put_counts, measure_sums, put_sums, take_sums };
+
+/// Kernel: one step of packed_sums_view, for block i. Each step is a kernel of its own.
+template <packed_step step>
 struct call_packed_step {
   packed_sums_view view;  ///< what the step is called of
   /// Calls the step for a block.
-  WFPG_HD void operator()(std::size_t block) const { (view.*step)(block); }
+  WFPG_HD void operator()(std::size_t block) const {
+    if constexpr (step == packed_step::count)
+      view.count(block);
+    else if constexpr (step == packed_step::measure_counts)
+      view.measure_counts(block);
+    else if constexpr (step == packed_step::put_counts)
+      view.put_counts(block);
+    else if constexpr (step == packed_step::measure_sums)
+      view.measure_sums(block);
+    else if constexpr (step == packed_step::put_sums)
+      view.put_sums(block);
+    else
+      view.take_sums(block);
+  }
 };
 
 /// Adds up the sums of all ranks.
@@ -201,28 +216,28 @@ class packed_sums {
     view.counts.ends = count_ends_.data();
     view.sums.ends = sum_ends_.data();
     // Totals decide how wide counts are.
-    run<&packed_sums_view::count>(exec, view);
+    run<packed_step::count>(exec, view);
     ranks.all_reduce_sum(totals_.view());
 
     // Counts decide what is sent of each key.
-    run<&packed_sums_view::measure_counts>(exec, view);
+    run<packed_step::measure_counts>(exec, view);
     const array_view<std::uint64_t> counts = fit(exec, counts_, count_ends_);
     view.counts.words = counts.data();
-    run<&packed_sums_view::put_counts>(exec, view);
+    run<packed_step::put_counts>(exec, view);
     ranks.all_reduce_sum(counts);
 
     // Where both are known, sums and floats are sent, and then unpacked.
-    run<&packed_sums_view::measure_sums>(exec, view);
+    run<packed_step::measure_sums>(exec, view);
     const array_view<std::uint64_t> sums = fit(exec, sums_, sum_ends_);
     view.sums.words = sums.data();
-    run<&packed_sums_view::put_sums>(exec, view);
+    run<packed_step::put_sums>(exec, view);
     ranks.all_reduce_sum(sums);
-    run<&packed_sums_view::take_sums>(exec, view);
+    run<packed_step::take_sums>(exec, view);
   }
 
  private:
   // Runs a step for all blocks. Steps before it are done, and those of other ranks as far as reductions say.
-  template <void (packed_sums_view::*step)(std::size_t) const>
+  template <packed_step step>
   void run(const Exec& exec, const packed_sums_view& view) {
     exec.for_each(totals_.size(), call_packed_step<step>{view});
   }
