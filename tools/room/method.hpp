@@ -1,0 +1,39 @@
+// What the program's methods share: their settings, and what is measured of them.
+#pragma once
+
+#include "places.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace room {
+
+/// How methods learn.
+struct settings {
+  std::uint32_t samples = 16;          ///< samples that train a method
+  std::size_t paths = 1u << 18;        ///< paths of a sample, each of one direction
+  std::uint32_t resolution = 24;       ///< F: cells along the side of a field
+  double budget_mib = 24.0;            ///< of wfpg's kept fields
+  float filter_alpha = 0.8f;           ///< of wfpg's fields, in cells
+  float floor = 0.01f;                 ///< of wfpg's fields and of exact cells, of the mean
+  std::size_t samples_a_leaf = 32000;  ///< of Open PGL
+};
+
+/// What a method has learnt of one arrangement.
+struct outcome {
+  variances at_places;
+  std::size_t unguided = 0;  ///< places that it does not guide
+  std::size_t bytes = 0;     ///< of what it learnt; 0: not known
+};
+
+/// Names of Open PGL's distributions, as arguments of the program.
+inline const std::vector<std::string> openpgl_names{"openpgl-pavmm", "openpgl-vmm", "openpgl-quadtree"};
+
+/// Trains a field of Open PGL and measures it. `name`: one of openpgl_names.
+/// Throws std::runtime_error in programs that were built without Open PGL.
+outcome measure_openpgl(const std::string& name, const settings& set, const wall_light& light,
+                        const std::vector<wall_point>& places);
+
+}  // namespace room
