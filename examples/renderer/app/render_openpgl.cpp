@@ -12,9 +12,8 @@ namespace render {
 namespace {
 
 /// Bounds of all vertices, slightly enlarged, since rounding moves hits.
-pgl_box3f bounds_of(const scene& scene) {
-  wfpg::bounds3 box;
-  for (const vec3& p : scene.positions) box = wfpg::bounds_union()(box, {p, p});
+pgl_box3f enlarged_bounds(const scene& scene) {
+  const wfpg::bounds3 box = bounds_of(scene);
   const vec3 more(1e-3f * glm::length(box.extent()));
   return {to_pgl(box.lower - more), to_pgl(box.upper + more)};
 }
@@ -28,7 +27,7 @@ openpgl_options openpgl_options_of(const scene& scene, const render_options& opt
   guided.paths = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
   guided.guided_depths = guided_depths(options);
   guided.max_depth = static_cast<std::size_t>(options.max_depth);
-  guided.bounds = bounds_of(scene);
+  guided.bounds = enlarged_bounds(scene);
   return guided;
 }
 
