@@ -1,5 +1,5 @@
 // wfpg-room: its integrals against closed forms, and what its methods learn.
-#include "exact_cells.hpp"
+#include "distributions.hpp"
 #include "support/policies.hpp"
 #include "wfpg_method.hpp"
 
@@ -75,20 +75,56 @@ TEST_CASE("room: spots bring their share of the irradiance", "[room]") {
   CHECK((a.share > 0.12f && a.share < 0.35f));
 }
 
-TEST_CASE("room: finer exact cells have less variance, and roots of mean squares the least", "[room]") {
-  const std::vector<wall_point> places = make_places(3);
+TEST_CASE("room: designs are densities, and better ones have less variance", "[room]") {
+  const std::vector<wall_point> places = make_places(2);
   arrangement a = make_arrangement(2);
   set_share(a, places);
+  const settings set;
+  const place_parts exact("exact", set, a.light, places);
+  const auto variance = [&](const char* design, bool roots) {
+    return mean_and_median(measure_design(design, roots, set, exact, a.light, places).at_places.alone).mean;
+  };
+  const double grid = variance("grid", false);
+  for (const char* const design : {"blocks", "quadtree", "caps"})
+    for (const bool roots : {false, true}) CHECK(variance(design, roots) < 0.9 * grid);
+  CHECK(variance("grid", true) < 0.6 * grid);
+  // The densities of all designs integrate to 1.
+  for (const bool roots : {false, true}) {
+    const caps_over_grid caps(8, exact.of(0), roots, 0.01);
+    const split_grid tree(design_of("quadtree", 24), exact.of(0), roots, 0.01);
+    double of_caps = 0.0, of_tree = 0.0;
+    constexpr int side = 512;
+    for (int i = 0; i < side * side; ++i) {
+      const vec2 uv = (vec2(static_cast<float>(i % side), static_cast<float>(i / side)) + 0.5f) / 512.0f;
+      of_caps += caps.pdf({wfpg::square_to_hemisphere(uv), uv, 0.0f, 0.0f}) * hemisphere / (side * side);
+      of_tree += tree.pdf(uv) * hemisphere / (side * side);
+    }
+    CHECK(of_caps == Approx(1.0).epsilon(0.02));
+    CHECK(of_tree == Approx(1.0).epsilon(0.01));
+  }
+}
+
+TEST_CASE("room: recorded paths and the cache hold the light", "[room]") {
+  const std::vector<wall_point> places = make_places(6);
+  wall_light light = even_light();
+  light.disks.push_back({point_on(1, {0.3f, 0.4f}), 0.1f, 200.0f});
   settings set;
-  double before = 1e30;
-  for (const std::uint32_t resolution : {6u, 12u, 24u}) {
-    set.resolution = resolution;
-    const mean_and_median means(measure_exact(cell_target::mean, set, a.light, places).at_places.alone);
-    const mean_and_median roots(
-        measure_exact(cell_target::root_of_mean_square, set, a.light, places).at_places.alone);
-    CHECK(means.mean < 0.7 * before);
-    CHECK(roots.mean < 0.7 * means.mean);
-    before = means.mean;
+  set.samples = 3;
+  set.paths = 60000;
+  set.resolution = 8;
+  set.budget_mib = 4.0;
+  for (const char* const source : {"recorded", "cache"}) {
+    const place_parts parts(source, set, light, places);
+    double all = 0.0, expected = 0.0;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      double found = 0.0;
+      for (const light_part& p : parts.of(i)) found += static_cast<double>(p.irradiance);
+      // Recorded light is a sum over the paths of a bin, of which there are about so many.
+      all += source == std::string("cache") ? found : found * 6.0 * 256.0 / (3.0 * 60000.0);
+      expected += irradiance(light, places[i]);
+    }
+    INFO(source);
+    CHECK(all / expected == Approx(1.0).epsilon(0.25));
   }
 }
 

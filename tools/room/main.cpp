@@ -1,6 +1,6 @@
 // wfpg-room: measures how well guides fit known light, in a room of which all is known. Exit code 0, or 2
 // with a message on failure.
-#include "exact_cells.hpp"
+#include "distributions.hpp"
 #include "method.hpp"
 #include "wfpg_method.hpp"
 
@@ -18,17 +18,7 @@ namespace {
 using json = nlohmann::json;
 
 outcome measure_wfpg(const settings& set, const wall_light& light, const std::vector<wall_point>& places) {
-  wfpg::kept_guide_options options;
-  options.kept.resolution = set.resolution;
-  options.kept.budget_bytes = static_cast<std::size_t>(set.budget_mib * 0x1p20);
-  options.field.filter_alpha = set.filter_alpha;
-  options.field.floor = set.floor;
-  options.max_paths = set.paths;
-  options.max_rays = std::max(set.paths, places.size());
-  options.max_depth = 2;
-  options.least_gain = 0.0f;          // never rests
-  options.deposits_per_leaf.reset();  // all paths are recorded
-  wfpg_method method(light, options);
+  wfpg_method method(light, wfpg_options(set, places.size()));
   for (std::uint32_t sample = 0; sample < set.samples; ++sample) method.train(sample);
   outcome result;
   result.at_places = method.measure_at(places, result.unguided);
@@ -37,11 +27,29 @@ outcome measure_wfpg(const settings& set, const wall_light& light, const std::ve
   return result;
 }
 
+std::string design_name(const std::string& source, const std::string& design, const std::string& target) {
+  return source + '-' + design + '-' + target;
+}
+
+/// Names of all methods.
+std::vector<std::string> method_names() {
+  std::vector<std::string> names{"cosine", "wfpg"};
+  names.insert(names.end(), openpgl_names.begin(), openpgl_names.end());
+  for (const char* const source : source_names)
+    for (const char* const design : design_names)
+      for (const char* const target : target_names) names.push_back(design_name(source, design, target));
+  return names;
+}
+
 outcome measure_method(const std::string& name, const settings& set, const wall_light& light,
                        const std::vector<wall_point>& places) {
   if (name == "wfpg") return measure_wfpg(set, light, places);
-  if (name == "exact") return measure_exact(cell_target::mean, set, light, places);
-  if (name == "exact-rms") return measure_exact(cell_target::root_of_mean_square, set, light, places);
+  for (const char* const source : source_names)
+    for (const char* const design : design_names)
+      for (const char* const target : target_names)
+        if (name == design_name(source, design, target))
+          return measure_design(design, target == std::string("rms"), set, {source, set, light, places},
+                                light, places);
   if (name != "cosine") return measure_openpgl(name, set, light, places);
   return {measure(light, places, [&](std::size_t i, vec3 direction) {
     const vec3 normal = normal_of(places[i].wall);
@@ -94,13 +102,12 @@ int run(int argc, char** argv) {
       "Measures how well guides fit known light. The table has the relative variance of one sample "
       "of irradiance, mean / median over places on the walls, as medians over arrangements."};
   settings set;
-  std::vector<std::string> methods{"cosine", "wfpg", "exact", "exact-rms"}, names = methods;
-  names.insert(names.end(), openpgl_names.begin(), openpgl_names.end());
+  std::vector<std::string> methods{"cosine", "wfpg", "exact-grid-mean", "exact-grid-rms"};
   std::uint32_t arrangements = 10;
   std::size_t place_count = 256;
   std::string json_file;
   app.add_option("--methods", methods, "methods to measure")
-      ->check(CLI::IsMember(names))
+      ->check(CLI::IsMember(method_names()))
       ->delimiter(',')
       ->capture_default_str();
   app.add_option("--arrangements", arrangements, "arrangements of lights, from seeds 1 to this")
@@ -115,8 +122,9 @@ int run(int argc, char** argv) {
   app.add_option("--paths", set.paths, "paths of a sample")
       ->check(CLI::Range(1, 1 << 28))
       ->capture_default_str();
-  app.add_option("--resolution", set.resolution, "cells along a field's side, of wfpg and exact cells")
-      ->check(CLI::Range(2, 128))
+  app.add_option("--resolution", set.resolution,
+                 "F: cells along a field's side, of wfpg; other designs have as many numbers")
+      ->check(CLI::Range(3, 128))
       ->capture_default_str();
   app.add_option("--budget", set.budget_mib, "MiB of wfpg's kept fields")
       ->check(CLI::Range(0.01, 4096.0))

@@ -2,7 +2,7 @@
 // It finds the radiance of the wall that it hits.
 #pragma once
 
-#include "places.hpp"
+#include "method.hpp"
 
 #include <wfpg/exec/omp.hpp>
 #include <wfpg/path_guider.hpp>
@@ -84,6 +84,21 @@ struct cube {
   }
 };
 
+/// Options of the guider of a method.
+inline wfpg::kept_guide_options wfpg_options(const settings& set, std::size_t places) {
+  wfpg::kept_guide_options options;
+  options.kept.resolution = set.resolution;
+  options.kept.budget_bytes = static_cast<std::size_t>(set.budget_mib * 0x1p20);
+  options.field.filter_alpha = set.filter_alpha;
+  options.field.floor = set.floor;
+  options.max_paths = set.paths;
+  options.max_rays = std::max(set.paths, places);
+  options.max_depth = 2;
+  options.least_gain = 0.0f;          // never rests
+  options.deposits_per_leaf.reset();  // all paths are recorded
+  return options;
+}
+
 /// A guider of the room, which learns from paths of its own.
 class wfpg_method {
  public:
@@ -125,6 +140,10 @@ class wfpg_method {
       return view.guides(ray) ? view.pdf(ray, direction) : lambert{normal}.pdf(normal, direction);
     });
   }
+  /// The directions of the last sample's paths.
+  const std::vector<wfpg::sampled_direction>& drawn() const { return drawn_; }
+  /// What the paths found, by voxel.
+  wfpg::exitance_cache_view cache() const { return guider_.guide().cache(); }
   /// The fields after training.
   wfpg::kept_field_statistics fields() const { return guider_.statistics().kept; }
 
