@@ -91,11 +91,9 @@ inline wfpg::kept_guide_options wfpg_options(const settings& set, std::size_t pl
   options.kept.budget_bytes = static_cast<std::size_t>(set.budget_mib * 0x1p20);
   options.field.filter_alpha = set.filter_alpha;
   options.field.floor = set.floor;
-  options.max_paths = set.paths;
   options.max_rays = std::max(set.paths, places);
-  options.max_depth = 2;
-  options.least_gain = 0.0f;          // never rests
-  options.deposits_per_leaf.reset();  // all paths are recorded
+  options.deposit_capacity = set.paths;  // deposits without the recorder
+  options.least_gain = 0.0f;             // never rests
   return options;
 }
 
@@ -103,7 +101,7 @@ inline wfpg::kept_guide_options wfpg_options(const settings& set, std::size_t pl
 class wfpg_method {
  public:
   wfpg_method(const wall_light& light, const wfpg::kept_guide_options& options)
-      : light_(light), guider_(exec_, cube().view(), options), drawn_(options.max_paths) {}
+      : light_(light), guider_(exec_, cube().view(), options), drawn_(options.deposit_capacity.value()) {}
 
   /// Makes and learns the paths of one sample.
   void train(std::uint64_t seed) {
@@ -112,17 +110,20 @@ class wfpg_method {
     guider_.begin_sample();
     guider_.sample_directions(wfpg::wave{0u, drawn_.size(), wave_surfaces{{}, numbers}, numbers},
                               wall_caster(), {drawn_.data(), drawn_.size()});
-    const auto recorder = guider_.recorder();
+    // The recorder would take walls for surfaces that reflect what paths find, and deposit that, too.
+    const wfpg::learnt_radiance_view learnt = guider_.guide().learnt();
     for (std::uint32_t path = 0; path < paths; ++path) {
       const wall_point from = numbers.origin(path);
-      const vec3 normal = normal_of(from.wall), direction = drawn_[path].direction;
-      if (!(drawn_[path].pdf > 0.0f) || !(glm::dot(direction, normal) > 0.0f)) continue;
-      const wall_point at = hit_from(from, direction);
-      const float throughput = lambert{normal}.eval(normal, direction) / drawn_[path].pdf;
-      recorder.vertex(path, 0, from.position, normal, 1.0f);
-      recorder.scatter(path, 0, drawn_[path]);
-      recorder.vertex(path, 1, at.position, -direction, throughput);
-      recorder.emission(path, 1, throughput * light_.radiance(at));
+      const vec3 normal = normal_of(from.wall);
+      const wfpg::sampled_direction& next = drawn_[path];
+      if (!(next.pdf > 0.0f) || !(glm::dot(next.direction, normal) > 0.0f)) continue;
+      const wall_point at = hit_from(from, next.direction);
+      const float radiance = light_.radiance(at);
+      cache().deposit(at.position, -next.direction, radiance);
+      if (next.field == wfpg::no_field) continue;
+      learnt.deposit(next.field, next.direction, radiance);
+      learnt.weigh(next.field, radiance * lambert{normal}.eval(normal, next.direction) / next.pdf,
+                   next.share);
     }
     guider_.end_sample();
   }
