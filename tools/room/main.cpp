@@ -90,6 +90,13 @@ std::string command_line(int argc, char** argv) {
   return line;
 }
 
+/// Writes what is measured so far, so that a run that ends early keeps it.
+void write(const std::string& path, const json& all) {
+  std::ofstream file(path);
+  file << all.dump(1) << '\n';
+  if (!file.flush()) throw std::runtime_error("--json: cannot write " + path);
+}
+
 void print_row(const std::string& name, const json& row) {
   std::printf("| %s | %.3g / %.3g | %.3g / %.3g | %.3g |\n", name.c_str(), row["half"]["mean"].get<double>(),
               row["half"]["median"].get<double>(), row["alone"]["mean"].get<double>(),
@@ -138,7 +145,7 @@ int run(int argc, char** argv) {
   app.add_option("--samples-per-leaf", set.samples_a_leaf, "of Open PGL")
       ->check(CLI::Range(1, 1 << 30))
       ->capture_default_str();
-  app.add_option("--json", json_file, "file that gets all numbers");
+  app.add_option("--json", json_file, "file that gets all numbers, after each method");
   CLI11_PARSE(app, argc, argv);
 
   json all{{"command", command_line(argc, argv)}, {"methods", json::object()}};
@@ -158,11 +165,8 @@ int run(int argc, char** argv) {
     std::fprintf(stderr, "\r%60s\r", "");
     all["methods"][name] = summary(outcomes);
     print_row(name, all["methods"][name]);
+    if (!json_file.empty()) write(json_file, all);
   }
-  if (json_file.empty()) return 0;
-  std::ofstream file(json_file);
-  file << all.dump(1) << '\n';
-  if (!file.flush()) throw std::runtime_error("--json: cannot write " + json_file);
   return 0;
 }
 
