@@ -7,9 +7,14 @@
 //
 // Source: NCCL's user guide, "Creating a communicator with options" and "Fault tolerance".
 // Cost: two collectives a call, one of 32 bytes that checks that ranks agree.
+// Both are on the stream before the host waits, but for the first call of a size.
 // The host waits for each call, since a kernel that waits for a lost rank never ends.
+//
 // Ranks join by a communicator that does not block, so that one that does not come is an error.
-// Calls are those of a second one, which blocks: NCCL begins a thread for each call of one that does not.
+// Calls are those of a second one, which blocks.
+// NCCL begins a thread for each call of one that does not, which takes longer than most calls.
+// docs/ranks.md has the times of both.
+//
 // Memory: NCCL's own, and 32 bytes on the device and on the host.
 #pragma once
 
@@ -226,7 +231,8 @@ class nccl_communicator final : public communicator {
     }
     group.end();
   }
-  /// begin_calls() of all of them.
+  /// begin_calls() of all of them, as a group, so that none waits for those after it.
+  /// Precondition: all of them have joined.
   /// Changes the current GPU.
   static void begin_calls_of(const std::vector<nccl_device<Exec>>& devices,
                              const std::vector<std::unique_ptr<nccl_communicator>>& all) {
@@ -247,6 +253,8 @@ class nccl_communicator final : public communicator {
   }
 
   /// Reduces values in place, in device memory.
+  /// `function`, `type` and `operation` say one thing in three ways: for the check, and for NCCL.
+  /// Throws rank_error.
   template <class T>
   void reduce(detail::rank_function function, array_view<T> values, ncclDataType_t type,
               ncclRedOp_t operation) {
@@ -256,13 +264,15 @@ class nccl_communicator final : public communicator {
     });
   }
 
-  /// Waits for all ranks.
-  /// Throws rank_error.
+  /// Waits for all ranks, and exchanges no values.
+  /// NCCL connects the GPUs in it, where it is the first call.
+  /// Throws rank_error where one does not come.
   void meet() {
     exchange(meeting, [] { return ncclSuccess; });
   }
   /// meet() of GPUs of this process, by one thread.
   /// NCCL connects them here, since a call that connects waits for all.
+  /// Later calls are made by threads, any of which may be late.
   /// Changes the current GPU.
   static void meet_all(const std::vector<nccl_device<Exec>>& devices,
                        const std::vector<std::unique_ptr<nccl_communicator>>& all) {
@@ -272,6 +282,8 @@ class nccl_communicator final : public communicator {
         f(*one);
       }
     };
+    // Collectives are a group, since the first of them would wait for the others.
+    // Copies are not: in a group, only NCCL's calls come at its end.
     on_each([](nccl_communicator& one) {
       meeting.write(one.words_.host());
       one.words_.send(one.exec_.stream());
@@ -304,6 +316,7 @@ class nccl_communicator final : public communicator {
   }
 
   /// Puts on the stream what finds out whether all ranks make this call.
+  /// Words go to the device, are compared there, and come back before checked_.
   void begin_check(const detail::rank_call& call) {
     call.write(words_.host());
     words_.send(exec_.stream());
@@ -311,18 +324,20 @@ class nccl_communicator final : public communicator {
     take_words();
   }
   /// Puts on the stream the collective of begin_check().
+  /// Precondition: the words were sent.
   void compare_words(const detail::rank_call& call) {
     require_begun(ncclAllReduce(words_.device(), words_.device(), detail::rank_call::word_count, ncclUint64,
                                 ncclMax, ranks_, exec_.stream()),
                   detail::name_of(call.function));
   }
-  /// Puts on the stream what comes after it.
+  /// Puts on the stream what comes after compare_words(): the copy to the host, and the event.
   void take_words() {
     words_.take(exec_.stream());
     detail::check_runtime(cudaEventRecord(checked_.get(), exec_.stream()), "cudaEventRecord");
   }
 
   /// Waits until the check is done.
+  /// What the call itself has on the stream may still run.
   /// Throws rank_error unless all ranks make this call.
   void require_same(const detail::rank_call& call) {
     wait_for(checked_, detail::name_of(call.function));
@@ -333,7 +348,9 @@ class nccl_communicator final : public communicator {
     call.require_same(words_.host(), rank_);
   }
 
-  /// Calls of a class use the same connections of GPUs: their numbers of values have the same highest bit.
+  /// Returns which calls use the connections that this one does.
+  /// NCCL chooses its algorithm by function and size. Numbers of values of a class have one highest bit.
+  /// The result is below the size of connected_.
   static std::size_t size_class(const detail::rank_call& call) {
     std::size_t bits = 0;
     while (bits < 63 && call.count >> (bits + 1) > 0) ++bits;
@@ -341,6 +358,7 @@ class nccl_communicator final : public communicator {
   }
 
   /// Waits until an event of the stream has come, and collectives before it.
+  /// Throws rank_error where they take longer than the time limit.
   void wait_for(const detail::cuda_event& event, const char* doing) {
     wait(ranks_, doing, [&] {
       const cudaError_t code = cudaEventQuery(event.get());
@@ -380,7 +398,8 @@ class nccl_communicator final : public communicator {
     }
   }
 
-  /// Ends NCCL's kernels on the stream.
+  /// Ends NCCL's kernels on the stream, if any wait there.
+  /// Frees both communicators.
   /// Later calls see that there is no communicator.
   /// Does nothing where there is none.
   void abandon() {
@@ -399,12 +418,15 @@ class nccl_communicator final : public communicator {
   /// Whether join_devices() made all ranks, so that one thread may destroy them.
   bool is_of_one_thread_ = false;
   /// Exceptions in flight when this was made.
+  /// More of them in the destructor mean that the rank gives up.
   int exceptions_ = std::uncaught_exceptions();
   /// What ranks compare before each exchange.
   detail::rank_words words_;
   /// Come after the check and after the call on the stream.
+  /// Both are recorded anew in each call.
   detail::cuda_event checked_, done_;
   /// By size_class(): whether there was such a call.
+  /// Equal on all ranks, since they make equal calls.
   std::array<bool, 64 * 6> connected_ = {};
   /// Does not block, and has no calls.
   /// It must live as long as ranks_ of any rank.

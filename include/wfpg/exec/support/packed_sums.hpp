@@ -43,6 +43,7 @@ struct packed_words {
 };
 
 /// Sums by key, their blocks, and what is sent of them.
+/// Trivially copyable; not the owner of the arrays.
 /// The functions are steps, in their order: a loop over all blocks calls each of them once.
 /// One thread takes a block, so that words need no atomics.
 struct packed_sums_view {
@@ -67,7 +68,8 @@ struct packed_sums_view {
     return 64u / static_cast<std::uint32_t>(bits_of(totals[block]));
   }
 
-  /// Counts the values of a block's keys on this rank. Ranks then add the totals up.
+  /// Counts the values of a block's keys on this rank.
+  /// Ranks then add the totals up.
   WFPG_HD void count(std::size_t block) const {
     std::uint32_t total = 0;
     for (std::uint32_t k = 0; k < size(block); ++k) total += pending[block * keys_a_block + k].count;
@@ -158,9 +160,13 @@ struct packed_sums_view {
 };
 
 /// The steps of packed_sums_view, in their order.
+/// Each names the function that it calls.
+/// Between them, ranks add up totals, counts and sums.
 enum class packed_step { count, measure_counts, put_counts, measure_sums, put_sums, take_sums };
 
-/// Kernel: one step of packed_sums_view, for block i. Each step is a kernel of its own.
+/// Kernel: one step of packed_sums_view, for block i.
+/// Each step is a kernel of its own, so that none carries the registers of the others.
+/// The step is an enumerator: nvcc takes no pointers to member functions here.
 template <packed_step step>
 struct call_packed_step {
   packed_sums_view view;  ///< what the step is called of
@@ -236,12 +242,14 @@ class packed_sums {
   }
 
  private:
-  // Runs a step for all blocks. Steps before it are done, and those of other ranks as far as reductions say.
+  // Runs a step for all blocks.
+  // Steps before it are done, and those of other ranks as far as reductions say.
   template <packed_step step>
   void run(const Exec& exec, const packed_sums_view& view) {
     exec.for_each(totals_.size(), call_packed_step<step>{view});
   }
-  // Makes room for the words of all blocks, whose numbers become ends. Returns the words.
+  // Makes room for the words of all blocks.
+  // Their numbers become ends. Returns the words.
   array_view<std::uint64_t> fit(const Exec& exec, buffer<std::uint64_t, Exec>& words,
                                 buffer<std::uint64_t, Exec>& ends) {
     // The host reads the last end, since it allocates and tells the communicator how much is sent.
