@@ -100,8 +100,8 @@ def draw_how(path):
 
 
 def draw_traffic(results, path):
-    """MiB of each sample. The number of ranks does not matter, so that of the most samples is drawn."""
-    plots = [(scene, size, max(runs.values(), key=lambda run: len(run["mib"]))["mib"])
+    """MiB of each sample. All numbers of ranks above 1 send as much, so that of the most samples is drawn."""
+    plots = [(scene, size, max((run["mib"] for n, run in runs.items() if int(n) > 1), key=len))
              for scene, sizes in results["processes"].items() for size, runs in sizes.items() if "x" in size]
     sizes = sorted({size for _, size, _ in plots}, key=lambda size: -int(size.split("x")[0]))
     parts = []
@@ -134,6 +134,18 @@ def work(part):
     return part["all"] - part["reducing"] - part["packing"]
 
 
+def fit(seconds):
+    """The seconds that ranks divide and those of each rank alone, from seconds by number of ranks. Least squares of
+    (divided / n + alone) / seconds - 1."""
+    sums = [0.0] * 5
+    for n, measured in seconds.items():
+        u, v = 1 / n / measured, 1 / measured
+        sums = [a + b for a, b in zip(sums, (u * u, u * v, v * v, u, v))]
+    uu, uv, vv, u, v = sums
+    alone = max((uu * v - uv * u) / (uu * vv - uv * uv), 0.0)
+    return (u - uv * alone) / uu, alone
+
+
 class Model:
     """Seconds of a sample on one rank of n: what is divided, what each rank does alone, packing, and reductions. The
     first two fit the work of all measured numbers of ranks, with equal relative errors. Costs of packing and of
@@ -142,15 +154,7 @@ class Model:
     def __init__(self, runs):
         self.part = runs["2"]["later"]
         self.costs = runs["2"]["reduction_seconds"]
-        # Least squares of (divided / n + alone) / work - 1.
-        sums = [0.0] * 5
-        for n, run in runs.items():
-            if "later" in run:
-                u, v = 1 / int(n) / work(run["later"]), 1 / work(run["later"])
-                sums = [a + b for a, b in zip(sums, (u * u, u * v, v * v, u, v))]
-        uu, uv, vv, u, v = sums
-        self.alone = max((uu * v - uv * u) / (uu * vv - uv * uv), 0.0)
-        self.divided = (u - uv * self.alone) / uu
+        self.divided, self.alone = fit({int(n): work(run["later"]) for n, run in runs.items() if "later" in run})
 
     def seconds(self, ranks, costs, samples=1):
         packing = self.part["packing"] if ranks > 1 else 0.0
@@ -162,6 +166,15 @@ def models(results):
         for size, runs in sizes.items():
             if "1" in runs and "2" in runs and "later" in runs["1"] and "later" in runs["2"]:
                 yield scene, size, runs, Model(runs)
+
+
+def gpu_series(results):
+    """Scene, split and mean seconds by number of GPUs."""
+    for scene, splits in results.get("scenes", {}).items():
+        for split in ("samples", "tiles"):
+            runs = {int(n): sum(s) / len(s) for n, s in sorted(splits.get(split, {}).items(), key=lambda item: int(item[0]))}
+            if len(runs) > 1:
+                yield scene, split, runs
 
 
 def draw_scaling(results, path):
@@ -186,15 +199,11 @@ def draw_scaling(results, path):
         cost.curve([(n, 1.0e3 * reduction(n, model.part, NETWORK)) for n in ranks[1:]], colour, "stroke-dasharray='2 3'")
         speed.label(66, 56 + 16 * i, f"{scene} {size.replace('x', ' × ')}", colour)
         i += 1
-    for scene, splits in results.get("scenes", {}).items():
-        for split in ("tiles", "samples"):
-            runs = {int(n): sum(s) / len(s) for n, s in splits.get(split, {}).items()}
-            if len(runs) < 2:
-                continue
-            colour = COLOURS[i % len(COLOURS)]
-            speed.dots([(n, runs[min(runs)] / seconds) for n, seconds in sorted(runs.items())], colour, False)
-            speed.label(66, 56 + 16 * i, f"{scene}, GPUs, {split}", colour)
-            i += 1
+    for scene, split, runs in gpu_series(results):
+        colour = COLOURS[i % len(COLOURS)]
+        speed.dots([(n, runs[1] / seconds) for n, seconds in runs.items()], colour, False)
+        speed.label(66, 56 + 16 * i, f"{scene}, GPUs, {split}", colour)
+        i += 1
     cost.label(478, 56, "dots: measured; lines: model, this machine", "#555")
     cost.label(478, 72, "dotted: model, 5 µs and 100 Gbit/s", "#555")
     speed.parts.append(text(58, 362, f"lines: model, 5 µs and 100 Gbit/s; dashed: {WAVE} samples a wave", "fill='#555' font-size='12'"))
@@ -211,6 +220,11 @@ def print_model(results):
                 print(f"  {n}: {1e3 * part['all']:.1f} ms, model {1e3 * model.seconds(int(n), model.costs):.1f}; reductions "
                       f"{1e3 * part['reducing']:.2f} ms, model {1e3 * reduction(int(n), part, model.costs):.2f}; "
                       f"packing {1e3 * part['packing']:.2f} ms")
+    for scene, split, runs in gpu_series(results):
+        divided, alone = fit(runs)
+        print(f"{scene}, GPUs, {split}: {divided:.2f} s divided, {alone:.2f} s alone")
+        for n, seconds in runs.items():
+            print(f"  {n}: {seconds:.2f} s, model {divided / n + alone:.2f}; {runs[1] / seconds:.2f} times as fast as one")
 
 
 def main(source, folder):
