@@ -21,7 +21,7 @@ if(WFPG_NCCL_INCLUDE_DIR AND EXISTS "${WFPG_NCCL_INCLUDE_DIR}/nccl.h")
   string(REGEX REPLACE "[^0-9]+([0-9]+)[^0-9]+([0-9]+)[^0-9]+([0-9]+).*" "\\1.\\2.\\3" WfpgNccl_VERSION
                        "${wfpg_nccl_lines}")
 endif()
-# Versions from 2.14 have the functions that are used. Those before 2.18 are not tested.
+# ncclCommSplit came with 2.18.
 if(WfpgNccl_VERSION VERSION_LESS 2.18)
   set(WFPG_NCCL_INCLUDE_DIR WFPG_NCCL_INCLUDE_DIR-NOTFOUND)
 endif()

@@ -59,7 +59,7 @@ class counting_communicator final : public wfpg::communicator {
   wfpg::communicator& to_;
 };
 
-/// What take() returns for each key.
+/// A key's result of take().
 struct taken_sum {
   double sum;
   std::uint32_t count;

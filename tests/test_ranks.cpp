@@ -364,7 +364,7 @@ TEST_CASE("any number of ranks learns the same grid", "[ranks]") {
     run.options.update = update;
     const finding found = check_any_number<one_policy>(run);
     CHECK(found.file.find_first_not_of('\0') != std::string::npos);
-    // So few keys that each has many values on every rank.
+    // There are few keys, so that each has many values on every rank.
     rank_run<wfpg::sarsa_grid_options> dense = run;
     dense.options.resolution = 1;
     dense.options.direction_resolution = 4;

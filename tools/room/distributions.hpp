@@ -1,5 +1,5 @@
 // Distributions over a hemisphere that are made of parts of light: a grid, grids with finer blocks, a
-// quadtree, and caps over a grid. All have about as many numbers as a grid of F² cells. The probability of
+// quadtree, and caps over a grid. All have at most as many numbers as a grid of F² cells. The probability of
 // a region is in proportion to its irradiance, or to the root of its integral of (L cos)², which has the
 // least variance.
 //
@@ -166,14 +166,15 @@ class caps_over_grid {
 
 /// Names of the designs.
 inline constexpr std::array<const char*, 4> design_names{"grid", "blocks", "quadtree", "caps"};
-/// What probabilities are in proportion to: a region's light, or the root of its mean square.
+/// Probabilities are in proportion to one of them: a region's light, or the root of its mean square.
 inline constexpr std::array<const char*, 2> target_names{"mean", "rms"};
 
 /// The design of a name, in the numbers of F² cells. Caps use a grid of the returned base.
 inline split_grid::design design_of(const std::string& name, int resolution) {
   const int cells = resolution * resolution;
   if (name == "blocks") return {2 * resolution / 3, 4, 8 * resolution / 3, cells};
-  if (name == "quadtree") return {resolution / 3, 2, 256, cells};
+  // No finer, so that each cell has a direction of the sums over the background.
+  if (name == "quadtree") return {resolution / 3, 2, 128, cells};
   if (name == "caps") return {2 * resolution / 3, 1, resolution, cells};
   return {resolution, 1, resolution, cells};
 }

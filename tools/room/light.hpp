@@ -9,6 +9,7 @@
 #include <wfpg/base/types.hpp>
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -87,7 +88,7 @@ struct wall_light {
   }
 };
 
-/// What an arrangement has of spots, before their radiance is set.
+/// The lights of a seed, and how much its spots are to bring.
 struct arrangement {
   wall_light light;
   std::size_t first_spot = 0;  ///< disks from here on are spots
@@ -121,7 +122,11 @@ inline arrangement make_arrangement(std::uint32_t seed) {
       if (is_free) return light.disks.push_back({centre, radius, radiance});
     }
   };
-  for (int broad = 0; broad < 3; ++broad) add(0.06f * std::pow(5.0f, next().x), 1.0f + 5.0f * next().x);
+  for (int broad = 0; broad < 3; ++broad) {
+    // One after the other, since compilers may evaluate arguments in any order.
+    const float radiance = 1.0f + 5.0f * next().x, radius = 0.06f * std::pow(5.0f, next().x);
+    add(radius, radiance);
+  }
   result.first_spot = light.disks.size();
   // A typical place sees a spot at a distance of 0.8, and at a cosine of 0.8.
   for (int spot = 0; spot < 3; ++spot)

@@ -149,6 +149,7 @@ int run(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
 
   json all{{"command", command_line(argc, argv)}, {"methods", json::object()}};
+  if (!json_file.empty()) write(json_file, all);  // before minutes of work
   const std::vector<wall_point> places = make_places(place_count);
   std::vector<arrangement> lights;
   for (std::uint32_t seed = 1; seed <= arrangements; ++seed) {

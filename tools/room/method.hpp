@@ -1,4 +1,4 @@
-// What the program's methods share: their settings, and what is measured of them.
+// Shared by the program's methods: their settings, and the measures of what they learnt.
 #pragma once
 
 #include "places.hpp"
@@ -21,7 +21,7 @@ struct settings {
   std::size_t samples_a_leaf = 32000;  ///< of Open PGL
 };
 
-/// What a method has learnt of one arrangement.
+/// Measures of a method that has learnt one arrangement.
 struct outcome {
   variances at_places;
   std::size_t unguided = 0;  ///< places that it does not guide

@@ -1,4 +1,4 @@
-// Open PGL in the analytic room, with the paths and random numbers of wfpg's method. Its first sample draws
+// Open PGL in the analytic room, with the origins and random numbers of wfpg's paths. Its first sample draws
 // from the cosine, and all others half and half from its field and the cosine.
 #pragma once
 

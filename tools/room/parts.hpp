@@ -1,6 +1,6 @@
 // The light of places in parts, of which distributions are made. It comes from one of three sources: the
-// exact light, paths that fields learnt from, or the exitance cache that the same paths filled. So a
-// distribution's own error is told from what it could know.
+// exact light, paths that fields learnt from, or the exitance cache that the same paths filled. This
+// tells a distribution's own error from what it could know.
 //
 // Memory: 28 bytes a part; 57,600 parts a place for exact light, and all paths for recorded light.
 #pragma once

@@ -2,8 +2,8 @@
 // L cos / p for a direction of density p. Its relative variance is
 //   integral of (L cos)² / p over the hemisphere, over E², minus 1.
 //
-// The background is summed over cells of equal solid angle, and each disk over parts of equal area. So the
-// edges of lights need no fine grid.
+// The background is summed over cells of equal solid angle, and each disk over parts of equal area. Edges of
+// lights need no fine grid then.
 //
 // Cost: 57,600 directions a place, and 200 to 3,200 a disk.
 #pragma once
@@ -108,7 +108,7 @@ struct variances {
 };
 
 /// Measures a guide. `density(place, direction)`: of the guide alone, per steradian.
-/// Where it is 0 everywhere the place has no guide, and the cosine takes its part.
+/// It must be above 0 where light comes from; for a place without a guide it is the cosine's.
 template <class Density>
 variances measure(const wall_light& light, const std::vector<wall_point>& places, const Density& density) {
   variances result;

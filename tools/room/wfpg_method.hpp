@@ -7,6 +7,8 @@
 #include <wfpg/exec/omp.hpp>
 #include <wfpg/path_guider.hpp>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -143,7 +145,7 @@ class wfpg_method {
   }
   /// The directions of the last sample's paths.
   const std::vector<wfpg::sampled_direction>& drawn() const { return drawn_; }
-  /// What the paths found, by voxel.
+  /// The light that the paths found, by voxel.
   wfpg::exitance_cache_view cache() const { return guider_.guide().cache(); }
   /// The fields after training.
   wfpg::kept_field_statistics fields() const { return guider_.statistics().kept; }

@@ -5,14 +5,52 @@
 #include <algorithm>
 #include <cstring>
 #include <utility>
+#include <vector>
 
 namespace render {
 namespace {
 
+// Ranks that copy arrays to the host's memory, sum there, and copy them back.
+class staged_communicator final : public wfpg::communicator {
+ public:
+  /// `ranks`: of the host's memory. They outlive this.
+  staged_communicator(const wfpg::exec::cuda& exec, wfpg::communicator& ranks) : exec_(exec), ranks_(ranks) {}
+
+  std::uint32_t rank() const override { return ranks_.rank(); }
+  std::uint32_t size() const override { return ranks_.size(); }
+  void all_reduce_sum(wfpg::array_view<std::uint32_t> values) override {
+    on_host(values, [&](auto host) { ranks_.all_reduce_sum(host); });
+  }
+  void all_reduce_sum(wfpg::array_view<std::uint64_t> values) override {
+    on_host(values, [&](auto host) { ranks_.all_reduce_sum(host); });
+  }
+  void all_reduce_max(wfpg::array_view<std::uint32_t> values) override {
+    on_host(values, [&](auto host) { ranks_.all_reduce_max(host); });
+  }
+  void all_reduce_max(wfpg::array_view<std::uint64_t> values) override {
+    on_host(values, [&](auto host) { ranks_.all_reduce_max(host); });
+  }
+  void broadcast(wfpg::array_view<unsigned char> bytes, std::uint32_t root) override {
+    on_host(bytes, [&](auto host) { ranks_.broadcast(host, root); });
+  }
+
+ private:
+  template <class T, class Call>
+  void on_host(wfpg::array_view<T> values, const Call& call) {
+    std::vector<T> host(values.size());
+    exec_.copy_to_host(host.data(), values.data(), host.size() * sizeof(T));
+    call(wfpg::array_view<T>(host.data(), host.size()));
+    exec_.copy_from_host(values.data(), host.data(), host.size() * sizeof(T));
+  }
+
+  wfpg::exec::cuda exec_;
+  wfpg::communicator& ranks_;
+};
+
 using gpu_name = std::pair<std::uint64_t, std::uint64_t>;
 
-/// Whether the current GPU is this rank's alone.
-bool has_own_gpu(wfpg::communicator& ranks) {
+/// Whether all ranks have different GPUs.
+bool have_own_gpus(wfpg::communicator& ranks) {
   int device = 0;
   cudaDeviceProp properties = {};
   wfpg::check_cuda(cudaGetDevice(&device), "cudaGetDevice");
@@ -32,7 +70,7 @@ std::unique_ptr<wfpg::communicator> join(const wfpg::exec::cuda& exec, wfpg::com
                                          double seconds) {
   if (ranks.size() == 1) return std::make_unique<wfpg::single_rank>();
   std::unique_ptr<wfpg::communicator> joined;
-  if (has_own_gpu(ranks)) joined = join_by_nccl(exec, ranks, seconds);
+  if (have_own_gpus(ranks)) joined = join_by_nccl(exec, ranks, seconds);
   if (!joined) joined = std::make_unique<staged_communicator>(exec, ranks);
   return joined;
 }

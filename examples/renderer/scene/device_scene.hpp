@@ -302,6 +302,7 @@ class device_scene {
                        static_cast<std::uint32_t>(t.height), t.wrap_u, t.wrap_v});
       count += t.texels.size();
     }
+    wfpg::require(count <= 0xffffffffu, "the number of all texels", count, "less than 2^32");
     textures_ = wfpg::buffer<texture_span, Exec>(exec, spans);
     texels_ = wfpg::buffer<vec4, Exec>(exec, count);
     for (std::size_t i = 0; i < textures.size(); ++i)

@@ -135,7 +135,7 @@ class path_film {
  private:
   bool is_exact() const { return share_.samples > 1; }
 
-  // Numbers of 0 have no bits.
+  // All bits of 0 are 0.
   template <class T>
   void clear(const wfpg::buffer<T, Exec>& values) {
     exec_.fill_bytes(values.data(), 0, values.bytes());
@@ -169,7 +169,7 @@ class path_film {
   }
 
   void join_exactly(double* all) const {
-    const std::size_t at_once = std::min(exact_.size(), std::size_t(1) << 22);
+    const std::size_t at_once = std::min(exact_.size(), std::size_t(1) << 18);
     const wfpg::buffer<std::uint64_t, Exec> words(exec_, at_once * exact_sum::parts);
     for (std::size_t first = 0; first < exact_.size(); first += at_once) {
       const std::size_t count = std::min(at_once, exact_.size() - first);

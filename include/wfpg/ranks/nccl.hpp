@@ -2,18 +2,18 @@
 // GPUs may lie in one machine or in many, in one process or in many.
 // Values stay in device memory.
 // NCCL gives each rank a GPU of its own; for ranks that share a GPU there is ranks/threads.hpp.
-// It asks for NCCL 2.18 or later: 2.14 has the same functions, but is not tested.
+// It asks for NCCL 2.18 or later.
 // The CMake target wfpg::nccl brings its header and library.
 //
 // Source: NCCL's user guide, "Creating a communicator with options" and "Fault tolerance".
 // Cost: two collectives a call, one of 32 bytes that checks that ranks agree.
-// Both are on the stream before the host waits, but for the first call of a size.
-// The host waits for each call, since a kernel that waits for a lost rank never ends.
+// The host waits for each of them, since a kernel that waits for a lost rank never ends.
 //
 // Ranks join by a communicator that does not block, so that one that does not come is an error.
 // Calls are those of a second one, which blocks.
 // NCCL begins a thread for each call of one that does not, which takes longer than most calls.
 // docs/ranks.md has the times of both.
+// NCCL_COMM_BLOCKING in the environment overrules it: with 1, ranks that join have no time limit.
 //
 // Memory: NCCL's own, and 32 bytes on the device and on the host.
 #pragma once
@@ -26,7 +26,6 @@
 #include <cuda_runtime_api.h>
 #include <nccl.h>
 
-#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -82,7 +81,7 @@ inline ncclUniqueId make_nccl_id() {
 ///   wfpg::nccl_communicator<wfpg::exec::cuda> ranks(exec, rank, size, id);
 ///
 /// After rank_error, further calls throw at once.
-/// What NCCL had begun is aborted, so that the stream can be used.
+/// NCCL's work on the stream is aborted, so that the stream can be used.
 /// The guider's own arrays may then hold sums of some ranks.
 ///
 /// One thread at a time may call one rank's communicator.
@@ -92,6 +91,7 @@ class nccl_communicator final : public communicator {
  public:
   /// Joins ranks 0 to size - 1, which all must make one with the same `id`.
   /// Throws rank_error where a rank does not come within the time limit.
+  /// NCCL may wait longer for one that ends between joining and its first call.
   /// Throws std::invalid_argument where `rank` is not less than `size`, or for options out of range.
   nccl_communicator(const Exec& exec, std::uint32_t rank, std::uint32_t size, const ncclUniqueId& id,
                     const nccl_options& options = {})
@@ -202,7 +202,7 @@ class nccl_communicator final : public communicator {
   void begin(const ncclUniqueId& id) {
     ncclConfig_t config = NCCL_CONFIG_INITIALIZER;
     config.blocking = 0;
-    require_begun(
+    require_taken(
         ncclCommInitRankConfig(&joined_, static_cast<int>(size_), id, static_cast<int>(rank_), &config),
         "ncclCommInitRankConfig");
   }
@@ -211,7 +211,7 @@ class nccl_communicator final : public communicator {
   void begin_calls() {
     ncclConfig_t config = NCCL_CONFIG_INITIALIZER;
     config.blocking = 1;
-    require_begun(ncclCommSplit(joined_, 0, static_cast<int>(rank_), &ranks_, &config), "ncclCommSplit");
+    require_taken(ncclCommSplit(joined_, 0, static_cast<int>(rank_), &ranks_, &config), "ncclCommSplit");
   }
 
   /// Begins to join GPUs of this process, and adds their communicators to `all`.
@@ -244,10 +244,16 @@ class nccl_communicator final : public communicator {
     group.end();
   }
 
-  /// Throws rank_error where NCCL has not taken a call.
+  /// Throws rank_error where NCCL has not taken a call of ranks_.
   /// The communicator is then of no more use.
-  /// `begun`: what the call returned.
+  /// Waits where NCCL has yet to put it on the stream, as NCCL_COMM_BLOCKING=0 in the environment has it do.
+  /// `begun`: the call's result.
   void require_begun(ncclResult_t begun, const char* doing) {
+    require_taken(begun, doing);
+    if (begun == ncclInProgress) wait(ranks_, doing, [] { return true; });
+  }
+  /// As above, without waiting.
+  void require_taken(ncclResult_t begun, const char* doing) {
     if (begun != ncclSuccess && begun != ncclInProgress) abandon();
     detail::check_nccl(begun, doing);
   }
@@ -288,10 +294,14 @@ class nccl_communicator final : public communicator {
       meeting.write(one.words_.host());
       one.words_.send(one.exec_.stream());
     });
+    const char* const doing = detail::name_of(meeting.function);
     detail::nccl_group group;
-    on_each([](nccl_communicator& one) { one.compare_words(meeting); });
+    for (const std::unique_ptr<nccl_communicator>& one : all) one->require_taken(one->compare_words(), doing);
     group.end();
-    on_each([](nccl_communicator& one) { one.take_words(); });
+    on_each([doing](nccl_communicator& one) {
+      one.wait(one.ranks_, doing, [] { return true; });  // until it is on the stream
+      one.words_.take(one.exec_.stream());
+    });
     on_each([](nccl_communicator& one) { one.require_same(meeting); });
   }
 
@@ -305,63 +315,42 @@ class nccl_communicator final : public communicator {
     const char* const doing = detail::name_of(call.function);
     // The rank's own work comes first, so that the time limit is for the others alone.
     detail::check_runtime(cudaStreamSynchronize(exec_.stream()), "cudaStreamSynchronize");
-    begin_check(call);
-    // NCCL connects GPUs in the first calls of a size, and waits in them. All ranks must have come before.
-    const bool is_connected = call.count == 0 || std::exchange(connected_[size_class(call)], true);
-    if (!is_connected) require_same(call);
-    if (call.count > 0) require_begun(begin(), doing);
-    detail::check_runtime(cudaEventRecord(done_.get(), exec_.stream()), "cudaEventRecord");
-    if (is_connected) require_same(call);
-    wait_for(done_, doing);
-  }
-
-  /// Puts on the stream what finds out whether all ranks make this call.
-  /// Words go to the device, are compared there, and come back before checked_.
-  void begin_check(const detail::rank_call& call) {
     call.write(words_.host());
     words_.send(exec_.stream());
-    compare_words(call);
-    take_words();
-  }
-  /// Puts on the stream the collective of begin_check().
-  /// Precondition: the words were sent.
-  void compare_words(const detail::rank_call& call) {
-    require_begun(ncclAllReduce(words_.device(), words_.device(), detail::rank_call::word_count, ncclUint64,
-                                ncclMax, ranks_, exec_.stream()),
-                  detail::name_of(call.function));
-  }
-  /// Puts on the stream what comes after compare_words(): the copy to the host, and the event.
-  void take_words() {
+    require_begun(compare_words(), doing);
     words_.take(exec_.stream());
-    detail::check_runtime(cudaEventRecord(checked_.get(), exec_.stream()), "cudaEventRecord");
+    require_same(call);
+    // All ranks have come. NCCL connects them in the first calls of a size, and would wait in them.
+    if (call.count == 0) return;
+    require_begun(begin(), doing);
+    wait_for_stream(doing);
   }
 
-  /// Waits until the check is done.
-  /// What the call itself has on the stream may still run.
+  /// Puts on the stream the collective of the words that ranks compare: their maxima.
+  /// Returns NCCL's result.
+  /// Precondition: the words were sent.
+  ncclResult_t compare_words() {
+    return ncclAllReduce(words_.device(), words_.device(), detail::rank_call::word_count, ncclUint64, ncclMax,
+                         ranks_, exec_.stream());
+  }
+
+  /// Waits until the words of all ranks have come to the host.
+  /// Precondition: their collective and the copy back are on the stream.
   /// Throws rank_error unless all ranks make this call.
   void require_same(const detail::rank_call& call) {
-    wait_for(checked_, detail::name_of(call.function));
+    wait_for_stream(detail::name_of(call.function));
     if (call.agrees(words_.host())) return;
     // Ranks are no longer in step, so that later calls must fail, too.
-    // What the call has on the stream may wait without end.
     abandon();
     call.require_same(words_.host(), rank_);
   }
 
-  /// Returns which calls use the connections that this one does.
-  /// NCCL chooses its algorithm by function and size. Numbers of values of a class have one highest bit.
-  /// The result is below the size of connected_.
-  static std::size_t size_class(const detail::rank_call& call) {
-    std::size_t bits = 0;
-    while (bits < 63 && call.count >> (bits + 1) > 0) ++bits;
-    return 64 * static_cast<std::size_t>(call.function) + bits;
-  }
-
-  /// Waits until an event of the stream has come, and collectives before it.
+  /// Waits until all that is on the stream is done, collectives among it.
   /// Throws rank_error where they take longer than the time limit.
-  void wait_for(const detail::cuda_event& event, const char* doing) {
+  void wait_for_stream(const char* doing) {
+    detail::check_runtime(cudaEventRecord(done_.get(), exec_.stream()), "cudaEventRecord");
     wait(ranks_, doing, [&] {
-      const cudaError_t code = cudaEventQuery(event.get());
+      const cudaError_t code = cudaEventQuery(done_.get());
       if (code != cudaErrorNotReady) detail::check_runtime(code, doing);
       return code == cudaSuccess;
     });
@@ -405,11 +394,13 @@ class nccl_communicator final : public communicator {
   void abandon() {
     if (ranks_) ncclCommAbort(std::exchange(ranks_, nullptr));
     if (joined_) ncclCommAbort(std::exchange(joined_, nullptr));
+    // joined_ may have been about to write it.
+    if (ranks_) ncclCommAbort(std::exchange(ranks_, nullptr));
   }
 
   /// The policy on whose stream the collectives are.
   Exec exec_;
-  /// What meet() has ranks agree on.
+  /// The call that ranks make in meet().
   static constexpr detail::rank_call meeting{detail::rank_function::meeting, 0};
 
   /// As given; ranks are not asked whether they have the same.
@@ -420,16 +411,12 @@ class nccl_communicator final : public communicator {
   /// Exceptions in flight when this was made.
   /// More of them in the destructor mean that the rank gives up.
   int exceptions_ = std::uncaught_exceptions();
-  /// What ranks compare before each exchange.
+  /// The words that ranks compare before each exchange.
   detail::rank_words words_;
-  /// Come after the check and after the call on the stream.
-  /// Both are recorded anew in each call.
-  detail::cuda_event checked_, done_;
-  /// By size_class(): whether there was such a call.
-  /// Equal on all ranks, since they make equal calls.
-  std::array<bool, 64 * 6> connected_ = {};
+  /// Comes after all that is on the stream; recorded anew for each wait.
+  detail::cuda_event done_;
   /// Does not block, and has no calls.
-  /// It must live as long as ranks_ of any rank.
+  /// It must live as long as any rank makes calls: those of ranks_ hang without it.
   /// Null after a failure.
   ncclComm_t joined_ = nullptr;
   /// Of all calls.

@@ -2,13 +2,13 @@
 // 64 keys form a block, and all ranks first learn how many values each block has.
 // Blocks without values then send nothing.
 // A block's number of values bounds the count of each of its keys.
-// So counts have as many bits as that number, and their sums over ranks do not run over.
+// Counts have as many bits as that number, so that their sums over ranks do not run over.
 // All ranks know from the counts what each key needs.
 // A key with one value sends a float, and one with more sends a sum of 64 bits.
 // All lengths follow from the values of all ranks.
-// So traffic is equal for any number of ranks above 1, and however their values are divided.
+// Traffic is therefore equal for any number of ranks above 1, and however their values are divided.
 // Source: wfpg's own.
-// Cost: O(keys / 64), and O(1) a key of blocks with values.
+// Cost: reads 16 bytes a key once, and O(1) a key of blocks with values.
 // Traffic: 4 bytes a block, and 4 or 8 bytes for each key with values.
 // Counts take 1 to 32 bits a key in blocks with values; 8 values in 64 keys take 4.
 // Memory: as much as is sent, and 20 bytes a block.

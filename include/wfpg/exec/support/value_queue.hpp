@@ -226,7 +226,7 @@ class value_queue {
         units_(exec, largest_.size()),
         queued_(exec, 1),
         all_queued_(exec, ranks ? 1 : 0),
-        packed_(exec, ranks ? pending_.size() : 0) {
+        packed_(exec, ranks && ranks->size() > 1 ? pending_.size() : 0) {
     view_.queue_ = queue_.data();
     view_.pending_ = pending_.data();
     view_.largest_ = largest_.data();
@@ -256,7 +256,7 @@ class value_queue {
     empty(exec);
   }
   /// Adds the queued values to their keys' sums, for take(), and empties the queue.
-  /// O(values + keys / 512).
+  /// O(values + keys / 512), and with several ranks O(values + keys).
   /// May be called again where it failed.
   /// With ranks, all of them call it. It waits for the work before, and throws rank_error, and
   /// std::invalid_argument above 2³¹ values.

@@ -1,4 +1,4 @@
-// Calls of NCCL and of CUDA's runtime as exceptions. Owners of a CUDA event, of device memory and of a group
+// Calls of NCCL and of CUDA's runtime as exceptions. Owners of a CUDA event, of memory and of a group
 // of NCCL's calls. A keeper of the current device. Cost: one comparison a call. Memory: that which they own.
 #pragma once
 

@@ -42,16 +42,25 @@ struct told_bins {
     return low < begins[rank + 1] && key(low) == wanted;
   }
 
-  // Writes an entry.
+  // Writes an entry: two words of the origin share one of 8 bytes.
   WFPG_HD static void put(std::uint64_t* to, std::uint32_t key, std::uint32_t size, std::uint64_t candidate,
                           const field_origin& from) {
     to[0] = std::uint64_t(size) << 32 | key;
     to[1] = candidate;
-    packed_origin::put(reinterpret_cast<std::uint32_t*>(to + 2), from);
+    std::uint32_t packed[2 * (words - 2)] = {};
+    packed_origin::put(packed, from);
+    for (std::uint32_t i = 2; i < words; ++i)
+      to[i] = std::uint64_t(packed[2 * i - 3]) << 32 | packed[2 * i - 4];
   }
   // Origin in an entry, with a seed for the cones.
   WFPG_HD field_origin origin(std::size_t i, std::uint32_t seed) const {
-    return packed_origin::get(reinterpret_cast<const std::uint32_t*>(entries + words * i + 2), seed);
+    const std::uint64_t* const from = entries + words * i;
+    std::uint32_t packed[2 * (words - 2)] = {};
+    for (std::uint32_t k = 2; k < words; ++k) {
+      packed[2 * k - 4] = static_cast<std::uint32_t>(from[k]);
+      packed[2 * k - 3] = static_cast<std::uint32_t>(from[k] >> 32);
+    }
+    return packed_origin::get(packed, seed);
   }
 };
 
