@@ -160,3 +160,40 @@ TEST_CASE("ranks send few bytes a value", "[packed_sums]") {
   // Many values of a key are one sum.
   CHECK(check_ranks(scattered_values(20000)) < of_each + 10 * keys);
 }
+
+TEST_CASE("blocks of as many values as there may be fill lanes of 32 bits", "[packed_sums]") {
+  using wfpg::detail::pending_values;
+  constexpr std::size_t few = 64 + 3;  // a whole block, and a part of one
+  constexpr std::uint32_t ranks = 4, most = 1u << 31;
+  // Each rank has a part of all counts; the last value of a block is one rank's.
+  std::vector<pending_values> all(few);
+  all[0] = {0x123456789abcdef0u, most - 2};
+  all[1] = {0xffffffull << 20, 1};
+  all[63] = {0xabcdefull, 1};
+  all[65] = {~0ull >> 1, 2 * ranks};
+  std::vector<std::vector<pending_values>> found(ranks);
+  const std::vector<std::string> errors = run_ranks<one_policy>(ranks, limit, [&](wfpg::communicator& joins) {
+    const std::uint32_t rank = joins.rank();
+    const auto part = [rank](auto whole) {
+      const auto share = static_cast<decltype(whole)>(whole / ranks);
+      return static_cast<decltype(whole)>(rank == 0 ? whole - (ranks - 1) * share : share);
+    };
+    std::vector<pending_values> own(few);
+    for (std::size_t key : {std::size_t(0), std::size_t(65)})
+      own[key] = {part(all[key].sum), part(all[key].count)};
+    if (rank == 2) own[1] = all[1];
+    if (rank == 3) own[63] = all[63];
+    const one_policy exec;
+    const wfpg::buffer<pending_values, one_policy> pending(exec, own);
+    wfpg::detail::packed_sums<one_policy> packed(exec, few);
+    packed.reduce(exec, joins, pending.view());
+    found[rank] = pending.to_host(exec);
+  });
+  CHECK(errors == std::vector<std::string>(ranks));
+  for (const std::vector<pending_values>& of_rank : found)
+    for (std::size_t key = 0; key < few; ++key) {
+      CAPTURE(key);
+      CHECK(of_rank[key].sum == all[key].sum);
+      CHECK(of_rank[key].count == all[key].count);
+    }
+}
