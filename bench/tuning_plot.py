@@ -7,18 +7,12 @@ import json
 import math
 import sys
 
+from svg import document, line, text
+
 COLUMNS = 3
 LEFT, TOP, RIGHT, BOTTOM = 70, 62, 16, 30  # of all plots
 WIDTH, HEIGHT, GAP_X, GAP_Y = 220, 130, 22, 62  # of a plot
 COLOURS = ("#d95f02", "#1b6ca8")
-
-
-def text(x, y, content, attributes=""):
-    return f"<text x='{x:.1f}' y='{y:.1f}' {attributes}>{content}</text>"
-
-
-def line(x0, y0, x1, y1, attributes):
-    return f"<line x1='{x0:.1f}' y1='{y0:.1f}' x2='{x1:.1f}' y2='{y1:.1f}' {attributes}/>"
 
 
 class ErrorAxis:
@@ -83,14 +77,13 @@ def draw(results):
     rows = math.ceil(len(results["options"]) / COLUMNS)
     width = LEFT + COLUMNS * WIDTH + (COLUMNS - 1) * GAP_X + RIGHT
     height = TOP + rows * HEIGHT + (rows - 1) * GAP_Y + BOTTOM
-    parts = [f"<svg xmlns='http://www.w3.org/2000/svg' width='{width}' height='{height}' font-family='sans-serif' "
-             "font-size='13'>", "<rect width='100%' height='100%' fill='white'/>", *draw_legend(results)]
+    parts = draw_legend(results)
     for i, (option, points) in enumerate(results["options"].items()):
         left, top = LEFT + i % COLUMNS * (WIDTH + GAP_X), TOP + i // COLUMNS * (HEIGHT + GAP_Y)
         parts += draw_plot(option, points, results, axis, left, top, i % COLUMNS == 0)
     parts.append(text(0, 0, "MSE after c / (1 + c)",
                       f"text-anchor='middle' transform='translate(14 {(TOP + height - BOTTOM) / 2}) rotate(-90)'"))
-    return "\n".join([*parts, "</svg>", ""])
+    return document(width, height, parts)
 
 
 def main(source, out):

@@ -50,9 +50,7 @@ TEST_CASE("room: irradiance is that of closed forms", "[room]") {
 TEST_CASE("room: variances are those of closed forms", "[room]") {
   const std::vector<wall_point> places = make_places(12);
   const variances uniform = measure(even_light(), places, [](std::size_t, vec3) { return 0.5f / wfpg::pi; });
-  const variances cosine = measure(even_light(), places, [&](std::size_t i, vec3 direction) {
-    return glm::dot(direction, normal_of(places[i].wall)) / wfpg::pi;
-  });
+  const variances cosine = measure_cosine(even_light(), places);
   for (std::size_t i = 0; i < places.size(); ++i) {
     CHECK(uniform.alone[i] == Approx(1.0 / 3.0).epsilon(1e-3));
     CHECK(std::abs(cosine.alone[i]) < 1e-3);
@@ -155,9 +153,7 @@ TEST_CASE("room: kept fields learn the light, alike in each run", "[room]") {
   set.paths = 4000;
   wfpg::kept_guide_options options = wfpg_options(set, places.size());
   options.octree_resolution = 16;
-  const variances cosine = measure(light, places, [&](std::size_t i, vec3 direction) {
-    return glm::dot(direction, normal_of(places[i].wall)) / wfpg::pi;
-  });
+  const variances cosine = measure_cosine(light, places);
   std::vector<double> first;
   for (int run = 0; run < 2; ++run) {
     wfpg_method method(light, options);

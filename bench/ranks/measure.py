@@ -6,8 +6,9 @@ usage: bench/ranks/measure.py PROGRAM SCENE SIZE PROCESSES SAMPLES RESULTS.json
 PROGRAM is wfpg-render with MPI, built with -DCMAKE_CXX_FLAGS="-g1 -fno-omit-frame-pointer", so that perf finds kernels.
 Processes have one thread each, on the cores in turn, and share tiles. Seconds are CPU seconds of a process, so that
 others on the machine, and more processes than cores, hardly change them. Those of waiting for other processes are left
-out: mpi_calls.cpp lets processes meet before each reduction, and of its seconds those of the fastest count. Needs mpirun, mpicxx and perf. Results of other scenes,
-sizes and numbers of processes in RESULTS.json stay.
+out: mpi_calls.cpp lets processes meet before each reduction, and of its seconds those of the fastest count.
+
+Needs mpirun, mpicxx and perf. Results of other scenes, sizes and numbers of processes in RESULTS.json stay.
 
 Bytes are those of arrays, each counted once, whatever MPI does with them.
 """

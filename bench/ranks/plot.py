@@ -11,20 +11,17 @@ import math
 import os
 import sys
 
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+
+from svg import document, line, text
+
 COLOURS = ("#d95f02", "#1b6ca8", "#2a9d5c", "#8e44ad", "#b8860b", "#555555")
 WARM_UP = 32
-FULL = "1920x1080"
 MOST_RANKS = 1024
 NETWORK = {"call": 5.0e-6, "mib": 2**20 / 12.5e9}  # seconds, of an assumed network of 100 Gbit/s
 WAVE = 24  # samples that end together, by default
-
-
-def text(x, y, content, attributes=""):
-    return f"<text x='{x:.1f}' y='{y:.1f}' {attributes}>{content}</text>"
-
-
-def line(x0, y0, x1, y1, attributes):
-    return f"<line x1='{x0:.1f}' y1='{y0:.1f}' x2='{x1:.1f}' y2='{y1:.1f}' {attributes}/>"
+ARROW_TIP = ("<defs><marker id='tip' viewBox='0 0 8 8' refX='7' refY='4' markerWidth='8' markerHeight='8' orient='auto'>"
+             "<path d='M0 0 L8 4 L0 8 z' fill='#555'/></marker></defs>")
 
 
 def box(x, y, width, height, fill, *lines):
@@ -37,11 +34,7 @@ def box(x, y, width, height, fill, *lines):
 
 def write(path, width, height, parts):
     with open(path, "w") as file:
-        file.write("\n".join([
-            f"<svg xmlns='http://www.w3.org/2000/svg' width='{width}' height='{height}' font-family='sans-serif' "
-            "font-size='13'>", "<rect width='100%' height='100%' fill='white'/>",
-            "<defs><marker id='tip' viewBox='0 0 8 8' refX='7' refY='4' markerWidth='8' markerHeight='8' orient='auto'>"
-            "<path d='M0 0 L8 4 L0 8 z' fill='#555'/></marker></defs>", *parts, "</svg>", ""]))
+        file.write(document(width, height, [ARROW_TIP, *parts]))
 
 
 class Plot:

@@ -51,10 +51,7 @@ outcome measure_method(const std::string& name, const settings& set, const wall_
           return measure_design(design, target == std::string("rms"), set, {source, set, light, places},
                                 light, places);
   if (name != "cosine") return measure_openpgl(name, set, light, places);
-  return {measure(light, places, [&](std::size_t i, vec3 direction) {
-    const vec3 normal = normal_of(places[i].wall);
-    return lambert{normal}.pdf(normal, direction);
-  })};
+  return {measure_cosine(light, places)};
 }
 
 double median(std::vector<double> values) {

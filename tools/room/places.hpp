@@ -129,4 +129,11 @@ variances measure(const wall_light& light, const std::vector<wall_point>& places
   return result;
 }
 
+/// Measures the cosine alone.
+inline variances measure_cosine(const wall_light& light, const std::vector<wall_point>& places) {
+  return measure(light, places, [&](std::size_t i, vec3 direction) {
+    return glm::dot(direction, normal_of(places[i].wall)) / wfpg::pi;
+  });
+}
+
 }  // namespace room

@@ -8,6 +8,7 @@
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/ranks/communicator.hpp>
 
+#include <thrust/copy.h>
 #include <thrust/reduce.h>
 
 #include <algorithm>
@@ -41,14 +42,6 @@ struct add_exactly {
         film[3 * pixel + static_cast<std::size_t>(c)].add(weight * static_cast<double>(radiance[path][c]));
     }
   }
-};
-
-/// Copies sums of pixels.
-struct copy_sums {
-  const glm::dvec3* from;
-  glm::dvec3* to;
-
-  WFPG_HD void operator()(std::size_t i) const { to[i] = from[i]; }
 };
 
 /// Writes the parts of the sums from `first` on, which ranks add up.
@@ -164,7 +157,7 @@ class path_film {
   /// Sums of all pixels. Bits of zeros add nothing to the bits of the rank that has the pixel.
   void join(const wfpg::buffer<glm::dvec3, Exec>& all) const {
     exec_.fill_bytes(all.data(), 0, all.bytes());
-    exec_.for_each(sums_.size(), copy_sums{sums_.data(), all.data() + share_.first});
+    ::thrust::copy_n(exec_.thrust(), sums_.data(), sums_.size(), all.data() + share_.first);
     ranks_->all_reduce_sum({reinterpret_cast<std::uint64_t*>(all.data()), 3 * all.size()});
   }
 
