@@ -131,6 +131,50 @@ WFPG_TEST_CASE("field store: samples that only count rays do not change bin size
   CHECK(box.state().pressure == wfpg::field_store_state().pressure);
 }
 
+/// Surfaces that give a ray's path alone, too.
+struct surfaces_of_paths {
+  stored_surfaces stored;
+  wfpg::recorded_runs asked;
+  WFPG_HD test_surface operator()(std::uint32_t ray) const {
+    test_surface s = stored(ray);
+    s.path = path(ray);
+    s.active = asked.includes(s.path);
+    return s;
+  }
+  WFPG_HD std::uint32_t path(std::uint32_t ray) const { return ray % 7 == 0 ? wfpg::no_path : 2 * ray; }
+};
+/// Surfaces without a function for paths.
+struct surfaces_alone {
+  surfaces_of_paths of_paths;
+  WFPG_HD test_surface operator()(std::uint32_t ray) const { return of_paths(ray); }
+};
+
+WFPG_TEST_CASE("rays of other paths need no surface where a host gives paths", "[field_store]") {
+  const Exec exec;
+  const auto surfaces = wall_surfaces(600, 1);
+  const wfpg::buffer<test_surface, Exec> stored(exec, surfaces);
+  const wfpg::recorded_runs some{1, 5, 1};
+  const surfaces_of_paths of_paths{{const_view<test_surface>(stored)}, some};
+  const wfpg::wave_rays<surfaces_of_paths> rays{of_paths, wfpg::guiding_mode::oriented, some, 1000};
+  const wfpg::wave_rays<surfaces_alone> others{{of_paths}, wfpg::guiding_mode::oriented, some, 1000};
+  const auto found = evaluate(exec, surfaces.size(), rays),
+             expected = evaluate(exec, surfaces.size(), others);
+  const auto numbers = evaluate(exec, surfaces.size(), [=] WFPG_HD(std::size_t i) { return rays.number(i); });
+  std::size_t active = 0;
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    INFO("ray " << i);
+    CHECK(found[i].active == expected[i].active);
+    CHECK(numbers[i] == 1000 + (i % 7 == 0 ? i : 2 * i));
+    if (!found[i].active) continue;
+    ++active;
+    CHECK(found[i].position == expected[i].position);
+    CHECK(found[i].orientation == expected[i].orientation);
+    CHECK(found[i].paths == expected[i].paths);
+  }
+  CHECK(active > 600 / 7 + 50);
+  CHECK(active < 400);
+}
+
 WFPG_TEST_CASE("field store: fields that may see moved geometry are cast again, others refreshed",
                "[field_store]") {
   kept_box<Exec> box(slots_of(4, 100));

@@ -420,4 +420,39 @@ WFPG_TEST_CASE("an octree of a mesh covers its surface", "[sparse_voxel_octree]"
   CHECK(std::count(found.begin(), found.end(), invalid_node) == 0);
 }
 
+/// Whether the node nearest to a point is an ancestor of its leaf, or holds it.
+struct nearest_nodes_agree {
+  octree_view tree;
+  std::uint32_t level;
+  WFPG_HD bool operator()(vec3 p) const {
+    const wfpg::node_id node = tree.nearest_node(p, level), leaf = tree.leaf_at(p);
+    if (leaf != invalid_node) return node == tree.ancestor(leaf, level);
+    if (node != invalid_node) return tree.level_of(node) == level;
+    return tree.nearest_leaf(p) == invalid_node;
+  }
+};
+
+WFPG_TEST_CASE("the node of a level nearest to a point is that of its leaf", "[sparse_voxel_octree]") {
+  const Exec exec;
+  auto fragments = voxelized(exec, sphere_mesh(20, {5, 6, 7}, 2.0f), 64);
+  const wfpg::sparse_voxel_octree<Exec> tree(exec, fragments);
+  random_numbers random(9);
+  std::vector<vec3> points{vec3(NAN), vec3(1e30f), vec3(-1e30f)};
+  for (int i = 0; i < 3000; ++i)
+    points.push_back(vec3(5, 6, 7) + (1.8f + 0.4f * random.unit()) * random.direction());
+  for (std::uint32_t level = 0; level <= tree.view().depth(); ++level) {
+    const auto agree = evaluate(exec, points, nearest_nodes_agree{tree.view(), level});
+    INFO("level " << level);
+    CHECK(std::count(agree.begin(), agree.end(), false) == 0);
+  }
+  // Empty voxels beside the surface have a node above.
+  const octree_view view = tree.view();
+  const auto leaves = evaluate(exec, points, [=] WFPG_HD(vec3 p) { return view.nearest_leaf(p); });
+  const auto nodes = evaluate(exec, points, [=] WFPG_HD(vec3 p) { return view.nearest_node(p, 3); });
+  const auto none_of = [](const std::vector<wfpg::node_id>& found) {
+    return std::count(found.begin(), found.end(), invalid_node);
+  };
+  CHECK(none_of(nodes) + 100 < none_of(leaves));
+}
+
 }  // namespace

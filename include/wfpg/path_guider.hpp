@@ -163,13 +163,11 @@ class path_guider {
       return no_path_recorder{};
   }
   /// Returns the view that chooses lights for next-event estimation, valid for the current sample. A
-  /// light_guide_view, or no_light_choices for a guide that does not choose lights. Choices are by weight
-  /// alone where they rest with the guide, since they gain little: rest_constants::light_gain.
+  /// light_guide_view, or no_light_choices for a guide that does not choose lights. The view is empty where
+  /// choices rest with the guide, since they gain little: rest_constants::light_gain.
   auto lights() const {
-    if constexpr (Guide::measures_gain)
-      return lights_rest_now_ ? guide_.resting_lights() : guide_.lights();
-    else
-      return guide_.lights();
+    const auto view = guide_.lights();
+    return lights_rest_now_ ? decltype(guide_.lights()){} : view;
   }
 
   /// The guide, to look at what it learnt.

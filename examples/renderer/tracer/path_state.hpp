@@ -121,8 +121,12 @@ struct queued_surfaces {
     result.active = queue.holds(slot);
     if (!result.active) return result;
     result = vertices[queue[slot]].surface();
-    result.path = static_cast<std::uint32_t>(queue[slot]);
+    result.path = path(slot);
     return result;
+  }
+  /// Slots beyond the queue belong to no path.
+  WFPG_HD std::uint32_t path(std::uint32_t slot) const {
+    return queue.holds(slot) ? static_cast<std::uint32_t>(queue[slot]) : wfpg::no_path;
   }
 };
 

@@ -1,12 +1,14 @@
 // The rays of a host's wave as the spatial binner reads them: position, orientation, and whether they need a
-// bin. They are the input of Algorithm 2 (paper, section 3.4). Cost: one surface a ray, read in the kernel
-// that bins it; no memory.
+// bin. They are the input of Algorithm 2 (paper, section 3.4).
+// Cost: one surface a ray, read in the kernel that bins it; no memory. Rays of paths that the guide takes no
+// part in cost one look-up of their path instead, where the host's functor has path().
 #pragma once
 
 #include <wfpg/base/math.hpp>
 #include <wfpg/bins/spatial_binner.hpp>
 #include <wfpg/host/bsdf.hpp>
 #include <wfpg/host/recorded_runs.hpp>
+#include <wfpg/host/wave.hpp>
 
 namespace wfpg {
 
@@ -27,14 +29,20 @@ struct wave_rays {
   WFPG_HD std::uint32_t number(std::size_t i) const {
     const auto ray = static_cast<std::uint32_t>(i);
     if (first_path == no_path) return ray;
-    const std::uint32_t path = surfaces(ray).path;
+    const std::uint32_t path = path_of(ray);
     return first_path + (path == no_path ? ray : path);
   }
-  /// Describes ray i. In oriented mode, surfaces that reflect are split by the shading normal on the outgoing
-  /// side, and surfaces that transmit share one orientation.
+  /// Describes ray i. It is not active where its path takes no part in guiding, or its surface is not active.
+  /// In oriented mode, surfaces that reflect are split by the shading normal on the outgoing side. Surfaces
+  /// that transmit share one orientation.
   WFPG_HD ray_to_bin operator()(std::size_t i) const {
-    const auto s = surfaces(static_cast<std::uint32_t>(i));
+    const auto ray = static_cast<std::uint32_t>(i);
     ray_to_bin result;
+    // While the guide probes, most rays are of other paths. Reading a surface may take as long as finding its
+    // field.
+    if constexpr (gives_paths_v<Surfaces>)
+      if (!guided_paths.includes(surfaces.path(ray))) return result;
+    const auto s = surfaces(ray);
     result.active = s.active && !s.bsdf.is_delta() && guided_paths.includes(s.path);
     result.paths = s.path == no_path ? 1u : 1u << guided_paths.log2_divisor();
     if (!result.active) return result;
@@ -44,6 +52,16 @@ struct wave_rays {
       result.orientation = s.bsdf.transmits() ? static_cast<std::uint32_t>(orientation_transmits)
                                               : dominant_axis(facing_normal(s));
     return result;
+  }
+
+ private:
+  /// Path of a ray, or no_path where the host does not tell it.
+  /// Reads as little of the surface as the host allows.
+  WFPG_HD std::uint32_t path_of(std::uint32_t ray) const {
+    if constexpr (gives_paths_v<Surfaces>)
+      return surfaces.path(ray);
+    else
+      return surfaces(ray).path;
   }
 };
 

@@ -16,6 +16,7 @@ namespace wfpg {
 /// Rays [0, ray_count) that have hit something and need a next direction.
 /// Inactive rays may lie among them.
 ///   Surfaces  surface<Bsdf> operator()(std::uint32_t ray) const;
+///             std::uint32_t path(std::uint32_t ray) const;   optional: surface::path, where that is cheaper
 ///   Random    vec2 operator()(std::uint32_t ray, std::uint32_t dimension) const;   in [0,1)², dimensions 0
 ///   and 1
 template <class Surfaces, class Random>
@@ -58,6 +59,13 @@ struct is_surfaces : std::false_type {};
 template <class S>
 struct is_surfaces<S, std::void_t<bsdf_of_t<S>>> : std::true_type {};
 
+/// Detects surfaces that give a ray's path without its surface.
+template <class S, class = void>
+struct gives_paths : std::false_type {};
+template <class S>
+struct gives_paths<S, std::void_t<decltype(std::uint32_t(std::declval<const S&>().path(std::uint32_t(0))))>>
+    : std::true_type {};
+
 /// Detects a functor that gives two random numbers for a ray and a dimension.
 template <class R, class = void>
 struct is_random : std::false_type {};
@@ -70,6 +78,10 @@ struct is_random<R, std::void_t<decltype(vec2(std::declval<const R&>()(std::uint
 /// True where S(ray) returns a wfpg::surface.
 template <class S>
 inline constexpr bool is_surfaces_v = detail::is_surfaces<S>::value;
+/// True where S has std::uint32_t path(ray): surface::path, also of rays that are not active.
+/// While the guide probes, it spares the surfaces of paths that the guide takes no part in.
+template <class S>
+inline constexpr bool gives_paths_v = detail::gives_paths<S>::value;
 /// True where R(ray, dimension) converts to a vec2.
 template <class R>
 inline constexpr bool is_random_v = detail::is_random<R>::value;

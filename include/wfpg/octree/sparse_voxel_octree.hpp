@@ -120,6 +120,16 @@ class sparse_voxel_octree_view {
     }
     return node;
   }
+  /// Node of a level, at most depth(), that holds a world-space point. Where there is none, it is the ancestor
+  /// of nearest_leaf(), or invalid_node. O(level): most empty voxels beside a surface have a node on the
+  /// levels above.
+  WFPG_HD node_id nearest_node(vec3 p, std::uint32_t level) const {
+    uvec3 voxel;
+    const node_id here = grid_.voxel_of(p, voxel) ? node_at(voxel, level) : invalid_node;
+    if (here != invalid_node) return here;
+    const node_id leaf = nearest_leaf(p);
+    return leaf == invalid_node ? invalid_node : ancestor(leaf, level);
+  }
   /// Leaf that holds a world-space point. It is invalid_node for points in empty voxels, outside the cube, or
   /// not finite. O(depth).
   WFPG_HD node_id leaf_at(vec3 p) const {

@@ -126,20 +126,21 @@ class value_queue_view {
   }
   /// Chooses the unit of a group's sums, from the values in the queue.
   /// Sums that it has already are of a sum() that failed, or were never taken: they are forgotten.
+  /// Before its first values its sums may be anything.
   /// A group without values keeps its unit and its sums.
   /// One thread a group.
   WFPG_HD void set_unit(std::size_t group) const { set_unit(group, min(*queued_, capacity_)); }
   /// Chooses a group's unit for n values, which may be those of all ranks.
   WFPG_HD void set_unit(std::size_t group, std::uint32_t n) const {
     if (largest_[group] == 0) return;
-    if (units_[group] != 0) forget(group);
+    if (units_[group] != cleared) forget(group);
     units_[group] = exact_sum(largest_[group] - 1, n).code();
   }
   /// Whether one of n > 0 keys may have a sum that is not taken. O(n / 512).
   /// Groups are asked: values of neighbouring keys count, too.
   WFPG_HD bool has_values(std::size_t first, std::size_t n) const {
     for (std::size_t g = group_of(first); g <= group_of(first + n - 1); ++g)
-      if (units_[g] != 0) return true;
+      if (has_unit(g)) return true;
     return false;
   }
   /// Returns how many values a key has received, and forgets them.
@@ -149,18 +150,25 @@ class value_queue_view {
   /// One thread takes a key.
   WFPG_HD std::uint32_t take(std::size_t key, double& sum) const {
     const std::size_t group = group_of(key);
-    if (units_[group] == 0) return 0;
+    if (!has_unit(group)) return 0;
     const pending_values from = pending_[key];
     if (from.count == 0) return 0;
     sum = unit_of(group).value(from.sum);
     pending_[key] = {};
     return from.count;
   }
+  /// Says that a group's sums were taken.
+  /// Those of a group that never had values stay unknown.
+  WFPG_HD void end_takes(std::size_t group) const {
+    if (has_unit(group)) units_[group] = cleared;
+  }
 
  private:
   template <class Exec>
   friend class value_queue;
   static constexpr std::uint64_t dropped = 0xffffffffull;  // an entry that is no key's
+  // In place of a unit: all sums are 0. Less than this: they may be anything. An exact_sum::code() is more.
+  static constexpr std::uint32_t cleared = 1;
 
   /// The groups of a million keys then lie in a processor's first cache.
   static constexpr std::uint32_t keys_a_group = 512;
@@ -169,6 +177,8 @@ class value_queue_view {
 
   /// Returns the group that a key belongs to.
   WFPG_HD static std::size_t group_of(std::size_t key) { return key / keys_a_group; }
+  /// Whether a group has sums, or had them before they were taken.
+  WFPG_HD bool has_unit(std::size_t group) const { return units_[group] > cleared; }
   /// Returns the unit of a group that has sums.
   WFPG_HD exact_sum unit_of(std::size_t group) const { return exact_sum(units_[group]); }
   /// Forgets a group's sums.
@@ -186,7 +196,7 @@ class value_queue_view {
   std::uint64_t* queue_ = nullptr;  // bits of the value above, the key below
   pending_values* pending_ = nullptr;
   std::uint32_t* largest_ = nullptr;  // a group: bits of the largest value in the queue, plus 1; or 0
-  std::uint32_t* units_ = nullptr;    // a group: exact_sum::code() of its sums; 0: it has none
+  std::uint32_t* units_ = nullptr;  // a group: exact_sum::code() of its sums; `cleared` or less: it has none
   std::size_t keys_ = 0;
   std::uint32_t* queued_ = nullptr;
   std::uint32_t capacity_ = 0;
@@ -197,6 +207,12 @@ class value_queue_view {
 struct set_group_unit {
   value_queue_view queue;
   WFPG_HD void operator()(std::size_t i) const { queue.set_unit(i); }
+};
+
+/// Functor that says that the sums of group i were taken.
+struct end_takes_of_group {
+  value_queue_view queue;
+  WFPG_HD void operator()(std::size_t i) const { queue.end_takes(i); }
 };
 
 /// Functor that adds entry i to its key's sum.
@@ -248,10 +264,12 @@ class value_queue {
            all_queued_.bytes() + packed_.bytes();
   }
 
-  /// Forgets all values, those that are summed and not yet taken included. O(keys).
+  /// Forgets all values, those that are summed and not yet taken included. O(keys / 512), with ranks O(keys).
   /// The memory stays.
   void clear(const Exec& exec) {
-    exec.fill_bytes(pending_.data(), 0, pending_.bytes());
+    // A group's sums are cleared before its first values: most memory is then never touched. Those that ranks
+    // send are read without asking.
+    if (ranks_) exec.fill_bytes(pending_.data(), 0, pending_.bytes());
     exec.fill_bytes(units_.data(), 0, units_.bytes());
     empty(exec);
   }
@@ -268,7 +286,7 @@ class value_queue {
     empty(exec);
   }
   /// Says that all sums were taken. Groups then have none. O(keys / 512).
-  void end_takes(const Exec& exec) { exec.fill_bytes(units_.data(), 0, units_.bytes()); }
+  void end_takes(const Exec& exec) { exec.for_each(units_.size(), end_takes_of_group{view_}); }
 
  private:
   /// Adds the values of all ranks to their keys' sums.

@@ -65,11 +65,7 @@ class field_pool {
         hits_(exec, slots * cells_a_field()),
         learnt_(exec, max_values > 0 ? hits_.size() : 0),
         fractions_(exec, std::vector<field_fractions>(max_values > 0 ? slots : 0)),
-        queue_(exec, learnt_.size() > 0 ? max_values : 0, learnt_.size(), ranks) {
-    exec.fill_bytes(words_.data(), 0, words_.bytes());  // files are written from copies of whole buffers
-    exec.fill_bytes(hits_.data(), 0, hits_.bytes());
-    forget_means(exec);
-  }
+        queue_(exec, learnt_.size() > 0 ? max_values : 0, learnt_.size(), ranks) {}
 
   std::uint32_t resolution() const { return resolution_; }
   std::uint32_t cells_a_field() const { return resolution_ * resolution_; }
