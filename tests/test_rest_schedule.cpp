@@ -150,13 +150,33 @@ TEST_CASE("rest: a guide rests between comparisons, and only where its gain is k
   CHECK(!by_chance.is_known());
 }
 
-TEST_CASE("rest: where unguided paths are very noisy, a gain of about 1 is enough to go on", "[rest]") {
-  const auto noisy_gain_of = [](double value) {
-    guiding_gain gain = calm_gain_of(value);
-    gain.typical_unguided *= 1000.0;
-    gain.typical_guided *= 1000.0;
-    return gain;
+/// As calm_gain_of(), with a variance of `noise` times the square of the mean.
+guiding_gain noisy_gain_of(double value, double noise) {
+  guiding_gain gain = calm_gain_of(value);
+  gain.typical_guided = gain.typical_guided * noise / gain.typical_unguided;
+  gain.typical_unguided = noise;
+  gain.unguided_mean = gain.guided_mean = 1.0;
+  return gain;
+}
+
+TEST_CASE("rest: in noise less is asked for than of typical paths, but no less than guiding costs",
+          "[rest]") {
+  const auto taken_part = [](float least_gain, double gain) {
+    rest_schedule schedule(least_gain, 1);
+    schedule.decide(4, noisy_gain_of(gain, 10.0));
+    return schedule.resting() ? 0 : schedule.probes(5) ? 1 : 2;
   };
+  for (const auto& [least_gain, enough] : std::vector<std::pair<float, double>>{
+           {1.1f, 0.95}, {1.25f, 0.95}, {1.5f, 1.2}, {1.7f, 1.4}, {2.5f, 1.4}}) {
+    INFO("least gain " << least_gain);
+    CHECK(taken_part(least_gain, enough + 0.01) == 2);
+    CHECK(taken_part(least_gain, enough - 0.01) == 1);
+    CHECK(taken_part(least_gain, enough - 0.06) == 0);
+  }
+}
+
+TEST_CASE("rest: where few paths find light, a gain of about 1 is enough to go on", "[rest]") {
+  const auto noisy_gain_of = [](double value) { return ::noisy_gain_of(value, 60.0); };
   for (const std::uint32_t sample : {4u, 32u}) {
     rest_schedule calm(2.0f, 1), noisy(2.0f, 1), unsure(2.0f, 1), worse(2.0f, 1);
     calm.decide(sample, calm_gain_of(1.2));

@@ -33,11 +33,16 @@ struct rest_constants {
   /// Variance of typical unguided paths, over the square of the mean, above which bright paths decide. They
   /// hold most of what there is to gain, and a few thousand do not measure it.
   static constexpr double much_noise = 2.0;
-  /// Gain that lets a guide take part in all paths there, in place of least_gain. Bright paths gain more than
-  /// typical ones.
-  static constexpr float gain_in_noise = 0.95f;
-  /// Gain below which a guide rests there.
-  static constexpr float loss_in_noise = 0.9f;
+  /// Gain that lets a guide take part in all paths there: so much less than least_gain, from least_in_noise
+  /// to most_in_noise. Bright paths gain more than typical ones.
+  static constexpr float hidden_in_noise = 0.3f;
+  static constexpr float least_in_noise = 0.95f;  ///< the least gain that is asked for in noise
+  static constexpr float most_in_noise = 1.4f;    ///< the most: guides still learn
+  /// Variance over the square of the mean above which no more than least_in_noise is asked for. So few paths
+  /// find light that a few thousand do not measure a gain.
+  static constexpr double little_light = 50.0;
+  /// A guide rests in noise where its gain is so much less than what lets it take part.
+  static constexpr float slack_in_noise = 0.05f;
   /// Most samples between two comparisons, a power of two: what the camera sees may change.
   static constexpr std::uint32_t longest_rest = 512;
   /// least_gain of policies whose blocks have several warps. On an H200 a guided vertex takes 1.3 times an
@@ -117,18 +122,27 @@ class rest_schedule {
         static_cast<float>(age_of(sample)) / static_cast<float>(rest_constants::settled_samples);
     return 1.0f + (least_gain_ - 1.0f) * min(part, 1.0f);
   }
+  /// Gain in noise that lets the guide take part in all paths. `relative_variance`: that of typical unguided
+  /// paths, over the square of the mean.
+  float enough_in_noise(double relative_variance) const {
+    if (relative_variance > rest_constants::little_light) return rest_constants::least_in_noise;
+    return clamp(least_gain_ - rest_constants::hidden_in_noise, rest_constants::least_in_noise,
+                 rest_constants::most_in_noise);
+  }
   /// Takes what was measured in a sample, which decides from the next one on. The guide takes part in all
   /// paths where the gain is not known, or at least least_gain. It rests where the gain is less than
   /// threshold(). Between them it takes part in as many as before, and in few where it rested. Noisy paths
-  /// have limits of their own, gain_in_noise and loss_in_noise. Nothing is decided before the first
-  /// comparison. Precondition: compares(sample).
+  /// have limits of their own: enough_in_noise(), and slack_in_noise below it. Nothing is decided before the
+  /// first comparison. Precondition: compares(sample).
   void decide(std::uint32_t sample, const guiding_gain& measured) {
     if (age_of(sample) < rest_constants::first_comparison) return;
     weight_ = weight_of(measured);
     const double gain = measured.typical_value(), mean = measured.unguided_mean;
-    const bool is_noisy = measured.typical_unguided > rest_constants::much_noise * mean * mean;
-    const float least = is_noisy ? rest_constants::loss_in_noise : threshold(sample),
-                enough = is_noisy ? rest_constants::gain_in_noise : least_gain_;
+    const double noise = measured.typical_unguided / (mean * mean);
+    const bool is_noisy = noise > rest_constants::much_noise;
+    const float in_noise = enough_in_noise(noise),
+                least = is_noisy ? in_noise - rest_constants::slack_in_noise : threshold(sample),
+                enough = is_noisy ? in_noise : least_gain_;
     if (!measured.is_known() || gain >= enough)
       takes_part_ = part::in_all;
     else if (gain < least)
