@@ -1,7 +1,6 @@
 // render(): refused options, reports, checkpoints, and guided pictures compared with path tracing.
 #include "app/option_names.hpp"
 #include "app/render.hpp"
-#include "casters/embree_caster.hpp"
 #include "scene/builtin_scenes.hpp"
 #include "scene/device_scene.hpp"
 #include "support/catch.hpp"
@@ -65,8 +64,7 @@ TEST_CASE("policies other than TBB refuse methods that need TBB", "[renderer]") 
   const scene square = square_of({});
   render_options options;
   options.method = sampling_method::openpgl_vmm;
-  CHECK_THROWS_AS(render_on<embree_scene>(wfpg::exec::seq(), square, completed(square, options), {}),
-                  std::invalid_argument);
+  CHECK_THROWS_AS(render_on_seq(square, completed(square, options), {}), std::invalid_argument);
 }
 
 TEST_CASE("invalid scenes and options are refused by name", "[renderer]") {

@@ -4,22 +4,11 @@
 #include "app/option_names.hpp"
 #include "app/rank_threads.hpp"
 #include "app/ranks.hpp"
-#include "casters/embree_caster.hpp"
 
 #include <wfpg/base/error.hpp>
 #include <wfpg/base/math.hpp>
-#include <wfpg/exec/omp.hpp>
-#include <wfpg/exec/seq.hpp>
-#include <wfpg/exec/tbb.hpp>
 
 namespace render {
-
-extern template render_result render_on<embree_scene>(const wfpg::exec::seq&, const scene&,
-                                                      const render_options&, const progress_callback&);
-extern template render_result render_on<embree_scene>(const wfpg::exec::omp&, const scene&,
-                                                      const render_options&, const progress_callback&);
-extern template render_result render_on<embree_scene>(const wfpg::exec::tbb&, const scene&,
-                                                      const render_options&, const progress_callback&);
 
 namespace {
 
@@ -91,15 +80,15 @@ render_result render_completed(const scene& scene, const render_options& options
   if (is_openpgl(options.method)) return render_with_openpgl(scene, options, progress);
   switch (options.where) {
     case device::omp:
-      return render_on<embree_scene>(wfpg::exec::omp(), scene, options, progress);
+      return render_on_omp(scene, options, progress);
     case device::seq:
-      return render_on<embree_scene>(wfpg::exec::seq(), scene, options, progress);
+      return render_on_seq(scene, options, progress);
     case device::cuda:
       return render_on_cuda(scene, options, progress);
     case device::optix:
       return render_on_optix(scene, options, progress);
     default:
-      return render_on<embree_scene>(wfpg::exec::tbb(), scene, options, progress);
+      return render_on_tbb(scene, options, progress);
   }
 }
 

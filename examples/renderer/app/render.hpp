@@ -248,12 +248,21 @@ render_options completed(const scene& scene, render_options options);
 /// begin with is not one, or not this rendering's. `progress` may be empty.
 render_result render(const scene& scene, const render_options& options, const progress_callback& progress);
 
-/// The same on a policy, whatever options.where says, with the ray caster of an Accelerated, which is made
-/// from the policy, the scene and its arrays there; instantiated in render_seq.cpp, render_omp.cpp and
-/// render_tbb.cpp. Throws std::invalid_argument for Open PGL's methods.
+/// Renders on a policy, whatever options.where says, with the ray caster of an Accelerated, which is made
+/// from the policy, the scene and its arrays there. render_impl.hpp defines it. Throws std::invalid_argument
+/// for Open PGL's methods.
 template <class Accelerated, class Exec>
 render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
                         const progress_callback& progress);
+
+/// Renders on CPUs with Embree: by TBB, by OpenMP, and on one thread. The last two throw std::runtime_error
+/// where this was built for TBB alone.
+render_result render_on_tbb(const scene& scene, const render_options& options,
+                            const progress_callback& progress);
+render_result render_on_omp(const scene& scene, const render_options& options,
+                            const progress_callback& progress);
+render_result render_on_seq(const scene& scene, const render_options& options,
+                            const progress_callback& progress);
 
 /// The same on a GPU, with rays cast by the renderer's own hierarchy or by OptiX. Throws std::runtime_error
 /// where there is none, or where this was built without.

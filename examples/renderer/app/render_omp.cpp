@@ -6,7 +6,9 @@
 
 namespace render {
 
-template render_result render_on<embree_scene>(const wfpg::exec::omp&, const scene&, const render_options&,
-                                               const progress_callback&);
+render_result render_on_omp(const scene& scene, const render_options& options,
+                            const progress_callback& progress) {
+  return render_on<embree_scene>(wfpg::exec::omp(), scene, options, progress);
+}
 
 }  // namespace render

@@ -6,7 +6,9 @@
 
 namespace render {
 
-template render_result render_on<embree_scene>(const wfpg::exec::seq&, const scene&, const render_options&,
-                                               const progress_callback&);
+render_result render_on_seq(const scene& scene, const render_options& options,
+                            const progress_callback& progress) {
+  return render_on<embree_scene>(wfpg::exec::seq(), scene, options, progress);
+}
 
 }  // namespace render

@@ -6,7 +6,9 @@
 
 namespace render {
 
-template render_result render_on<embree_scene>(const wfpg::exec::tbb&, const scene&, const render_options&,
-                                               const progress_callback&);
+render_result render_on_tbb(const scene& scene, const render_options& options,
+                            const progress_callback& progress) {
+  return render_on<embree_scene>(wfpg::exec::tbb(), scene, options, progress);
+}
 
 }  // namespace render
