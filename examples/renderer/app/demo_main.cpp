@@ -1,6 +1,6 @@
-// wfpg-demo: compares path tracing with guiding by transient fields, by kept fields and by their products
-// with BSDFs. All have equal samples and a reference. The output is pictures, a table, and plots of error
-// over time. Open PGL takes part on CPUs if it is installed.
+// wfpg-demo: shows what guiding gains behind a door, products with glossy BSDFs, vcm in caustics, and paths
+// from both ends in fog. Each is beside path tracing, with equal samples. The output is pictures, a table,
+// and plots of error over time. Open PGL takes part on CPUs if it is installed.
 #include "app/image_io.hpp"
 #include "app/metrics.hpp"
 #include "app/output_files.hpp"
@@ -28,7 +28,8 @@ using render::render_options;
 using render::render_result;
 using render::sampling_method;
 
-constexpr int samples = 64;  // of the compared pictures
+constexpr int samples = 64;             // of the compared pictures
+constexpr int reference_samples = 192;  // of both halves
 
 /// Size and zoom of pictures on a device.
 struct demo_device {
@@ -40,39 +41,65 @@ struct demo_device {
 constexpr demo_device demo_devices[] = {{"cpu", render::device::cpu, 128, 3},
                                         {"cuda", render::device::cuda, 512, 1}};
 
-struct demo_scene {
-  const char* name;
-  bool nee;
-  float exposure;    // of the PNGs
-  int reference_pt;  // samples of the reference's two halves, chosen to take about equal time
-  int reference_wfpg;
-};
-constexpr demo_scene demo_scenes[] = {{"cornell-enclosed", false, 1.0f, 1024, 384},
-                                      {"ajar", true, 1.0f, 1024, 384},
-                                      {"glossy-room", false, 1.0f, 1024, 384}};
-
 struct demo_method {
   const char* name;
   sampling_method method;
-  render::fields lifetime = render::fields::kept;
   std::uint32_t samples_per_leaf = 32000;  // Open PGL's own default
+  float radius = wfpg::bidirectional_options().surface_radius;
 };
-constexpr demo_method demo_methods[] = {{"pt", sampling_method::pt},
-                                        {"transient", sampling_method::wfpg, render::fields::transient},
-                                        {"wfpg", sampling_method::wfpg},
-                                        {"wfpg-product", sampling_method::wfpg_product}};
-// Pictures of few samples need leaves smaller than the default: 1000 for equal time, 250 for equal samples.
-constexpr demo_method openpgl_methods[] = {
-    {"openpgl-vmm-1000", sampling_method::openpgl_vmm, render::fields::kept, 1000},
-    {"openpgl-vmm-250", sampling_method::openpgl_vmm, render::fields::kept, 250},
-    {"openpgl-dqt-250", sampling_method::openpgl_dqt, render::fields::kept, 250}};
 
-std::vector<demo_method> methods_on(const demo_device& on) {
-  std::vector<demo_method> methods(std::begin(demo_methods), std::end(demo_methods));
-  if (render::has_openpgl() && on.where == render::device::cpu)
+/// A scene, and the methods that it compares with its first one.
+struct demo_scene {
+  const char* name;
+  const char* shows;
+  bool nee;  // next-event estimation
+  demo_method reference;
+  std::vector<demo_method> methods;
+  bool has_openpgl;  // whether Open PGL's methods can render it
+};
+
+const std::vector<demo_scene>& demo_scenes() {
+  static const demo_method pt{"pt", sampling_method::pt}, vpt{"vpt", sampling_method::vpt},
+      wfpg{"wfpg", sampling_method::wfpg}, product{"wfpg-product", sampling_method::wfpg_product},
+      bpt{"bpt", sampling_method::bpt}, vcm{"vcm", sampling_method::vcm}, upbp{"upbp", sampling_method::upbp};
+  // Its bias is a tenth of vcm's: it falls as the square of the radius.
+  static const demo_method small_vcm{"vcm", sampling_method::vcm, 32000, 0.001f};
+  static const std::vector<demo_scene> all{
+      {"cornell-enclosed", "guiding", false, wfpg, {pt, wfpg}, true},
+      {"ajar", "guiding", true, wfpg, {pt, wfpg}, true},
+      {"glossy-room", "products", false, wfpg, {pt, wfpg, product}, true},
+      {"caustic-pool", "vcm", true, small_vcm, {pt, wfpg, vcm}, false},
+      {"fog-spot", "fog", true, bpt, {vpt, bpt, upbp}, false}};
+  return all;
+}
+
+// Pictures of few samples need leaves smaller than the default: 1000 for equal time, 250 for equal samples.
+constexpr demo_method openpgl_methods[] = {{"openpgl-vmm-1000", sampling_method::openpgl_vmm, 1000},
+                                           {"openpgl-vmm-250", sampling_method::openpgl_vmm, 250},
+                                           {"openpgl-dqt-250", sampling_method::openpgl_dqt, 250}};
+
+std::vector<demo_method> methods_on(const demo_device& on, const demo_scene& demo) {
+  std::vector<demo_method> methods = demo.methods;
+  if (demo.has_openpgl && render::has_openpgl() && on.where == render::device::cpu)
     methods.insert(methods.end(), std::begin(openpgl_methods), std::end(openpgl_methods));
   return methods;
 }
+
+/// Counts pictures, so that each is announced with its number.
+class announcer {
+ public:
+  explicit announcer(const demo_device& on) {
+    for (const demo_scene& demo : demo_scenes()) count_ += 2 + methods_on(on, demo).size();
+  }
+
+  void begin(const char* scene, const std::string& what, int spp) {
+    std::fprintf(stderr, "picture %zu of %zu: %s, %s, %d samples a pixel\n", ++begun_, count_, scene,
+                 what.c_str(), spp);
+  }
+
+ private:
+  std::size_t begun_ = 0, count_ = 0;
+};
 
 struct method_result {
   const char* method;
@@ -80,9 +107,12 @@ struct method_result {
   image_error error;  // with the reference's own noise subtracted
 };
 
-render_result render_once(const demo_scene& demo, const demo_device& on, const char* what,
-                          render_options options) {
-  std::fprintf(stderr, "%s, %s, %d samples\n", demo.name, what, options.spp);
+render_result render_once(const demo_scene& demo, const demo_device& on, const std::string& what,
+                          const demo_method& method, render_options options, announcer& announced) {
+  announced.begin(demo.name, what, options.spp);
+  options.method = method.method;
+  options.samples_per_leaf = method.samples_per_leaf;
+  options.light.surface_radius = method.radius;
   options.nee = demo.nee;
   options.width = options.height = on.size;
   options.where = on.where;
@@ -98,17 +128,17 @@ struct reference {
   image_error noise;
 };
 
-// Half by path tracing and half guided, so that neither method is favoured.
-reference make_reference(const demo_scene& demo, const demo_device& on) {
+// Two halves of other seeds than the methods' tell how noisy it is.
+reference make_reference(const demo_scene& demo, const demo_device& on, announcer& announced) {
   render_options options;
-  options.method = sampling_method::pt;
-  options.spp = demo.reference_pt;
-  options.seed = 1001;
-  const image half_a = render_once(demo, on, "reference, first half", options).picture;
-  options.method = sampling_method::wfpg;
-  options.spp = demo.reference_wfpg;
-  options.seed = 1002;
-  const image half_b = render_once(demo, on, "reference, second half", options).picture;
+  options.spp = reference_samples / 2;
+  const auto half = [&](std::uint64_t seed) {
+    options.seed = seed;
+    return render_once(demo, on, std::string("reference by ") + demo.reference.name, demo.reference, options,
+                       announced)
+        .picture;
+  };
+  const image half_a = half(1001), half_b = half(1002);
   reference result{half_a, render::noise_of_halves(half_a, half_b)};
   for (std::size_t i = 0; i < result.picture.pixels.size(); ++i)
     result.picture.pixels[i] = 0.5f * (half_a.pixels[i] + half_b.pixels[i]);
@@ -124,14 +154,11 @@ image_error without_noise(image_error error, const image_error& noise) {
 }
 
 method_result run_method(const demo_scene& demo, const demo_device& on, const demo_method& method,
-                         const reference& truth) {
+                         const reference& truth, announcer& announced) {
   render_options options;
-  options.method = method.method;
-  options.lifetime = method.lifetime;
-  options.samples_per_leaf = method.samples_per_leaf;
   options.spp = samples;
   options.checkpoints = render::checkpoint_times::powers_of_two;
-  method_result result{method.name, render_once(demo, on, method.name, options), {}};
+  method_result result{method.name, render_once(demo, on, method.name, method, options, announced), {}};
   result.error = without_noise(render::compare(result.rendering.picture, truth.picture), truth.noise);
   return result;
 }
@@ -147,97 +174,91 @@ render::curve error_over_time(const method_result& result, const reference& trut
   return curve;
 }
 
-double bins_of(const render::render_report& report) {
-  double bins = 0.0;
-  for (const render::bin_report& depth : report.bins) bins += depth.count;
-  return bins;
-}
-
 double seconds_of(const method_result& result) {
   return result.rendering.checkpoints.back().seconds;
 }
 
-nlohmann::ordered_json row(const method_result& result, const image_error& pt, double pt_seconds) {
+nlohmann::ordered_json row(const method_result& result, const method_result& first) {
   const render::render_report& report = result.rendering.report;
+  const double gain = first.error.mse_reinhard / result.error.mse_reinhard;
+  const double time = seconds_of(result) / seconds_of(first);
   return {{"method", result.method},
           {"spp", report.spp},
+          {"seconds", seconds_of(result)},
           {"mse_reinhard", result.error.mse_reinhard},
-          {"ratio_to_pt", pt.mse_reinhard / result.error.mse_reinhard},
+          {"gain_equal_samples", gain},
+          {"gain_equal_time", gain / time},
           {"relmse_trimmed", result.error.relmse_trimmed},
-          {"relmse_trimmed_ratio_to_pt", pt.relmse_trimmed / result.error.relmse_trimmed},
-          {"equal_time_ratio_to_pt",
-           pt_seconds * pt.mse_reinhard / (seconds_of(result) * result.error.mse_reinhard)},
+          {"relmse_trimmed_gain_equal_samples", first.error.relmse_trimmed / result.error.relmse_trimmed},
           {"persistent_bytes", report.persistent_bytes},
           {"transient_bytes", report.transient_bytes},
-          {"seconds", seconds_of(result)},
-          {"bins_a_sample", bins_of(report)},
-          {"cones_per_segment", report.cones_per_segment}};
-}
-
-void print_row(const char* scene, const nlohmann::ordered_json& row) {
-  std::printf("%-17s %-16s %4d  %10.3e %6.2f  %10.3e %6.2f  %8.2f %8.2f  %7.1f %6.2f  %6.0f  %6.2f\n", scene,
-              row["method"].get<std::string>().c_str(), row["spp"].get<int>(),
-              row["mse_reinhard"].get<double>(), row["ratio_to_pt"].get<double>(),
-              row["relmse_trimmed"].get<double>(), row["relmse_trimmed_ratio_to_pt"].get<double>(),
-              row["persistent_bytes"].get<double>() / 1048576.0,
-              row["transient_bytes"].get<double>() / 1048576.0, row["seconds"].get<double>(),
-              row["equal_time_ratio_to_pt"].get<double>(), row["bins_a_sample"].get<double>(),
-              row["cones_per_segment"].get<double>());
+          {"light_vertex_bytes", report.light_vertex_bytes}};
 }
 
 nlohmann::ordered_json run_scene(const demo_scene& demo, const demo_device& on,
-                                 const std::filesystem::path& directory) {
+                                 const std::filesystem::path& directory, announcer& announced) {
   const auto path = [&](const std::string& what) { return (directory / (demo.name + what)).string(); };
-  const reference truth = make_reference(demo, on);
+  const reference truth = make_reference(demo, on, announced);
   render::write_exr(path("-reference.exr"), truth.picture);
   std::vector<image> strip;
-  image_error pt;
-  double pt_seconds = 0.0;
+  std::vector<method_result> results;
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   render::plot plot{demo.name, "seconds", "mean squared error after c / (1 + c)", {}};
-  for (const demo_method& method : methods_on(on)) {
-    const method_result result = run_method(demo, on, method, truth);
-    if (method.method == sampling_method::pt) {
-      pt = result.error;
-      pt_seconds = seconds_of(result);
-    }
+  for (const demo_method& method : methods_on(on, demo)) {
+    results.push_back(run_method(demo, on, method, truth, announced));
+    const method_result& result = results.back();
     render::write_exr(path(std::string("-") + method.name + ".exr"), result.rendering.picture);
     strip.push_back(render::enlarged(result.rendering.picture, on.shown_at));
-    rows.push_back(row(result, pt, pt_seconds));
+    rows.push_back(row(result, results.front()));
     plot.curves.push_back(error_over_time(result, truth));
   }
   strip.push_back(render::enlarged(truth.picture, on.shown_at));
-  render::write_png(path(".png"), render::side_by_side(strip, 4), demo.exposure);
+  render::write_png(path(".png"), render::side_by_side(strip, 4));
   render::write_svg(path("-error.svg"), plot);
   return {{"scene", demo.name},
+          {"shows", demo.shows},
           {"nee", demo.nee},
           {"device", on.name},
           {"size", on.size},
+          {"reference_method", demo.reference.name},
+          {"reference_samples", reference_samples},
           {"reference_noise_mse_reinhard", truth.noise.mse_reinhard},
           {"methods", rows}};
 }
 
+std::string table_of(const nlohmann::ordered_json& summary) {
+  char line[256];
+  std::snprintf(line, sizeof line, "%-9s %-17s %-16s %8s %10s %13s %10s\n", "shows", "scene", "method",
+                "seconds", "error", "equal samples", "equal time");
+  std::string table = line;
+  for (const auto& scene : summary) {
+    for (const auto& method : scene["methods"]) {
+      std::snprintf(line, sizeof line, "%-9s %-17s %-16s %8.1f %10.2e %13.2f %10.2f\n",
+                    scene["shows"].get<std::string>().c_str(), scene["scene"].get<std::string>().c_str(),
+                    method["method"].get<std::string>().c_str(), method["seconds"].get<double>(),
+                    method["mse_reinhard"].get<double>(), method["gain_equal_samples"].get<double>(),
+                    method["gain_equal_time"].get<double>());
+      table += line;
+    }
+  }
+  return table + "\nAll pictures have " + std::to_string(samples) + " samples a pixel, and references " +
+         std::to_string(reference_samples) +
+         ".\nerror: MSE after c / (1 + c), without the reference's own noise.\n"
+         "equal samples: the gain, the error of the scene's first method over this one's.\n"
+         "equal time: the gain, times the first method's seconds over this one's.\n";
+}
+
 void run(const std::filesystem::path& directory, const demo_device& on) {
   render::prepare_folder("DIRECTORY", directory);
+  announcer announced(on);
   nlohmann::ordered_json summary = nlohmann::ordered_json::array();
-  for (const demo_scene& demo : demo_scenes) summary.push_back(run_scene(demo, on, directory));
-
-  std::printf("\n%-17s %-16s %4s  %10s %6s  %10s %6s  %8s %8s  %7s %6s  %6s  %6s\n", "scene", "method", "spp",
-              "error", "ratio", "relmse", "ratio", "held MiB", "temp MiB", "seconds", "equal", "bins",
-              "cones");
-  for (const auto& scene : summary)
-    for (const auto& method : scene["methods"]) print_row(scene["scene"].get<std::string>().c_str(), method);
-  std::string shown;
-  for (const demo_method& method : methods_on(on)) shown += std::string(method.name) + ", ";
-  std::printf(
-      "\nerror: MSE after c / (1 + c); relmse: relative MSE without the worst 0.1%% of pixels; both less "
-      "the\n"
-      "reference's own noise. ratio: error of pt / error; equal: the same at equal time. held, temp: memory\n"
-      "for guiding, across samples and while one is in flight. bins: a sample, all depths, whose fields\n"
-      "were made. cones: a path segment. Pictures, left to right %sreference,\n"
-      "and plots of error over time: %s\n",
-      shown.c_str(), directory.string().c_str());
+  for (const demo_scene& demo : demo_scenes()) summary.push_back(run_scene(demo, on, directory, announced));
+  const std::string table = table_of(summary);
+  render::write_file((directory / "table.txt").string(), table);
   render::write_file((directory / "summary.json").string(), summary.dump(2) + '\n');
+  std::printf(
+      "\n%s\nEach PNG shows a scene by its methods in the table's order, and the reference. All files: %s\n",
+      table.c_str(), directory.string().c_str());
 }
 
 }  // namespace
