@@ -1,0 +1,99 @@
+"""What blocks are generated from: result files, and functions by name that make a table or the figure of a sentence.
+
+A function takes the results and the words that follow its name in the marker. It returns the rows of a table, the first of
+them its head, or a text for a figure within a sentence.
+"""
+import json
+import pathlib
+import re
+import sys
+from typing import Any, Callable, Dict, List, Optional, Union
+
+from provenance import RESULTS, provenance
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "bench"))
+
+Rows = List[List[str]]
+Block = Callable[..., Union[Rows, str]]
+BLOCKS: Dict[str, Block] = {}
+
+
+class Results:
+    """Reads result files, and remembers which of them a block is made from."""
+
+    def __init__(self, root: pathlib.Path) -> None:
+        self.root = root
+        self.read: List[str] = []
+        self._texts: Dict[str, str] = {}
+        self._values: Dict[str, Any] = {}
+
+    def text(self, name: str) -> str:
+        """The text of a file of bench/results."""
+        if name not in self._texts:
+            self._texts[name] = (self.root / RESULTS / name).read_text(encoding="utf-8")
+        if name not in self.read:
+            self.read.append(name)
+        return self._texts[name]
+
+    def json(self, name: str, *keys: Union[str, int]) -> Any:
+        """A value of a JSON file, by the keys that lead to it."""
+        text = self.text(name)
+        if name not in self._values:
+            self._values[name] = json.loads(text)
+        value = self._values[name]
+        for key in keys:
+            if isinstance(value, dict) and key not in value:
+                raise KeyError(f"{name} has no {'/'.join(map(str, keys))}")
+            value = value[key]
+        return value
+
+    def found(self, name: str, pattern: str) -> "re.Match[str]":
+        """The one match of a pattern in a text file; lines are matched singly."""
+        matches = list(re.finditer(pattern, self.text(name), re.MULTILINE))
+        if len(matches) != 1:
+            raise ValueError(f"{name} has {len(matches)} of {pattern}, one is wanted")
+        return matches[0]
+
+
+def block(function: Block) -> Block:
+    """Registers a function. Underscores of its name are hyphens in markers."""
+    BLOCKS[function.__name__.replace("_", "-")] = function
+    return function
+
+
+def three(value: Optional[float], least_decimals: int = 0) -> str:
+    """A number with three digits that matter: 0.94, 9.43, 10.7, 125. Empty for None."""
+    if value is None:
+        return ""
+    for decimals, limit in ((2, 9.995), (1, 99.95)):
+        if abs(value) < limit:
+            return f"{value:.{max(decimals, least_decimals)}f}"
+    return f"{value:.{least_decimals}f}"
+
+
+def table(rows: Rows) -> str:
+    """A table of Markdown."""
+    head = ["| " + " | ".join(rows[0]) + " |", "| " + "--- | " * (len(rows[0]) - 1) + "--- |"]
+    return "\n".join(head + ["| " + " | ".join(row) + " |" for row in rows[1:]]).replace("|  |", "| |").replace("|  |", "| |")
+
+
+def source(root: pathlib.Path, name: str, page: str) -> str:
+    """A file's commit and date, with a link to the list of results."""
+    entry = provenance(root, name)
+    link = "results.md" if page.startswith("docs/") else "docs/results.md"
+    before = "before " if entry["commit_is"] == "log" else ""
+    return f"[{name}]({link}), {before}commit {entry['commit']}, {entry['date']}"
+
+
+def generate(results: Results, name: str, page: str) -> str:
+    """The text of a block of a page. A table ends with the files that it is made from."""
+    word, *arguments = name.split()
+    if word not in BLOCKS:
+        raise KeyError(f"there is no block {word}")
+    results.read = []
+    made = BLOCKS[word](results, *arguments)
+    if isinstance(made, str):
+        return made
+    sources = "; ".join(source(results.root, file, page) for file in results.read)
+    return f"{table(made)}\n\n*{sources}.*"

@@ -1,0 +1,89 @@
+"""Where results come from: command, commit, machine and date of each file of bench/results, and whether it is stale.
+
+bench/results/index.json has what the files do not say themselves. `commit_is` tells how a commit is known: "measured" at
+it, as the file or its program said, or "log": the file came with that commit, so that it was measured shortly before.
+"""
+import json
+import pathlib
+import re
+import subprocess
+from typing import Any, Dict, List, Optional
+
+RESULTS = "bench/results"
+INDEX = f"{RESULTS}/index.json"
+# What results depend on. The results themselves, and this program, do not change what is measured.
+SOURCES = ("include", "examples", "bench", "tools", f":!{RESULTS}", ":!tools/publish")
+
+Entry = Dict[str, Any]
+
+
+def read_index(root: pathlib.Path) -> Dict[str, Entry]:
+    """The index by name of file; empty where there is none."""
+    path = root / INDEX
+    return json.loads(path.read_text()) if path.exists() else {}
+
+
+def write_index(root: pathlib.Path, index: Dict[str, Entry]) -> None:
+    """Writes the index in the order of names."""
+    text = json.dumps(dict(sorted(index.items())), indent=1, ensure_ascii=False)
+    (root / INDEX).write_text(text + "\n")
+
+
+def result_files(root: pathlib.Path) -> List[str]:
+    """Names of all result files, without the index."""
+    return sorted(p.name for p in (root / RESULTS).iterdir() if p.name != "index.json")
+
+
+def _machine(value: Any, gpu: str) -> str:
+    """One line for a machine of a result file: a text, or the fields that wfpg-quality writes."""
+    if isinstance(value, dict):
+        parts = [value.get("processor", ""), f"{value['threads']} threads" if "threads" in value else "",
+                 f"g++ {value['compiler']}" if re.match(r"\d", value.get("compiler", "")) else value.get("compiler", ""),
+                 value.get("gpu_and_driver", "")]
+        return ", ".join(p for p in parts if p)
+    return value or gpu
+
+
+def provenance(root: pathlib.Path, name: str) -> Entry:
+    """commit, commit_is, date, machine and commands of a result file: what it says, and else what the index says."""
+    entry = dict(read_index(root).get(name, {}))
+    if name.endswith(".json"):
+        found = json.loads((root / RESULTS / name).read_text())
+        command = found.get("command") or found.get("render")
+        if command:
+            entry.setdefault("command", command)
+        machine = _machine(found.get("machine"), found.get("gpu_and_driver", ""))
+        if machine:
+            entry.setdefault("machine", machine)
+    else:
+        commands = re.findall(r"^ {4}((?:wfpg-|g\+\+ |ncu |build/|test_)\S*.*)$", (root / RESULTS / name).read_text(), re.MULTILINE)
+        entry.setdefault("command", commands)
+    command = entry.get("command", [])
+    entry["command"] = [command] if isinstance(command, str) else list(command)
+    return entry
+
+
+def _git(root: pathlib.Path, *arguments: str) -> Optional[subprocess.CompletedProcess]:
+    """Runs git; None where there is no git."""
+    try:
+        return subprocess.run(["git", "-C", str(root), *arguments], capture_output=True, text=True, check=False)
+    except OSError:
+        return None
+
+
+def head(root: pathlib.Path) -> Optional[str]:
+    """The short hash of the commit that is checked out; None without a history."""
+    done = _git(root, "rev-parse", "--short=7", "HEAD")
+    return done.stdout.strip() if done and done.returncode == 0 else None
+
+
+def is_dirty(root: pathlib.Path) -> bool:
+    """Whether sources differ from the commit that is checked out."""
+    done = _git(root, "status", "--porcelain", "--", *SOURCES)
+    return bool(done and done.stdout.strip())
+
+
+def is_stale(root: pathlib.Path, commit: str) -> Optional[bool]:
+    """Whether sources changed since `commit`; None where that commit is not known, as in a shallow clone."""
+    done = _git(root, "diff", "--quiet", commit, "--", *SOURCES)
+    return {0: False, 1: True}.get(done.returncode) if done else None

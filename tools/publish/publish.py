@@ -1,0 +1,140 @@
+#!/usr/bin/env python3
+"""Keeps the figures of README.md and docs/ equal to the files of bench/results.
+
+usage: tools/publish/publish.py --check [ROOT]     fails where a block differs from its file, or a figure has no block
+       tools/publish/publish.py --write [ROOT]     generates all blocks anew
+       tools/publish/publish.py --planted [ROOT]   plants faults in copies of pages, and fails where one is not found
+
+ROOT is the repository (default: this one). pages.py says what a block is, and exceptions.ini which figures are no results.
+"""
+import argparse
+import pathlib
+import sys
+from typing import Dict, List, Set
+
+import quality_blocks  # registers its blocks
+import results_blocks  # registers its blocks
+from blocks import ROOT, Results, generate
+from pages import BLOCK, INLINE, Exempt, differing, faults_of_markers, outside, read_exceptions, rewrite
+from provenance import is_stale, provenance, read_index, result_files
+
+EXCEPTIONS = pathlib.Path(__file__).resolve().parent / "exceptions.ini"
+# Pages that still have figures without blocks.
+NOT_YET = ("ablations", "algorithm", "bidirectional", "guides", "host", "hosts", "packages", "performance", "ranks", "renderer",
+           "tuning")
+
+
+def page_names(root: pathlib.Path) -> List[str]:
+    """The pages that are checked: README.md and docs/*.md."""
+    pages = sorted(p for p in (root / "docs").glob("*.md") if p.stem not in NOT_YET)
+    return ["README.md", *(f"docs/{p.name}" for p in pages)]
+
+
+def check_page(results: Results, page: str, text: str, exceptions: List[Exempt], used: Set[Exempt]) -> List[str]:
+    """Faults of one page, as lines."""
+    def make(name: str, of_page: str) -> str:
+        return generate(results, name, of_page)
+    found = [*differing(text, page, make).items(), *faults_of_markers(text),
+             *((line, f"{figure} stands outside a block") for line, figure in outside(text, page, exceptions, used))]
+    return [f"{page}:{line}: {what}" for line, what in sorted(found)]
+
+
+def check_index(root: pathlib.Path) -> List[str]:
+    """Result files without commit or date, and entries without a file."""
+    index, files = read_index(root), result_files(root)
+    found = [f"bench/results/index.json has no {name}" for name in files if name not in index]
+    found += [f"bench/results/index.json has {name}, and there is no such file" for name in index if name not in files]
+    found += [f"bench/results/index.json: {name} has no {key}" for name in files if name in index
+              for key in ("commit", "commit_is", "date", "command", "machine") if not provenance(root, name).get(key)]
+    return found
+
+
+def report_stale(root: pathlib.Path) -> None:
+    """Prints which results were measured before sources changed. That is no fault."""
+    states: Dict[str, List[str]] = {"stale": [], "current": [], "unknown": []}
+    by_commit: Dict[str, str] = {}
+    for name, entry in read_index(root).items():
+        commit = entry.get("commit", "")
+        if commit not in by_commit:
+            by_commit[commit] = {True: "stale", False: "current", None: "unknown"}[is_stale(root, commit)]
+        states[by_commit[commit]].append(f"{name} ({commit})")
+    print(f"{len(states['current'])} results are current, {len(states['stale'])} are stale: include/, examples/, bench/ or "
+          f"tools/ changed since their commit; of {len(states['unknown'])} it is unknown")
+    for state in ("current", "stale", "unknown"):
+        for name in states[state]:
+            print(f"  {state}: {name}")
+
+
+def check(root: pathlib.Path) -> List[str]:
+    """All faults of the pages and of the index."""
+    results, exceptions, used = Results(root), read_exceptions(EXCEPTIONS), set()  # type: ignore[var-annotated]
+    found = check_index(root)
+    for page in page_names(root):
+        found += check_page(results, page, (root / page).read_text(encoding="utf-8"), exceptions, used)
+    found += [f"exceptions.ini: [{e.kind}] {e.pattern.pattern} covers nothing in {e.pages}" for e in exceptions
+              if e not in used]
+    return found
+
+
+def write(root: pathlib.Path) -> None:
+    """Generates the blocks of all pages."""
+    results = Results(root)
+    for page in page_names(root):
+        text = (root / page).read_text(encoding="utf-8")
+        new = rewrite(text, page, lambda name, of_page: generate(results, name, of_page))
+        if new != text:
+            (root / page).write_text(new, encoding="utf-8")
+            print(f"{page}: written")
+
+
+def planted(root: pathlib.Path) -> List[str]:
+    """Faults that are planted in a copy of each page's text and not found."""
+    exceptions, missed = read_exceptions(EXCEPTIONS), []
+    page = "docs/quality.md"
+    text = (root / page).read_text(encoding="utf-8")
+    table, figure = BLOCK.search(text), INLINE.search(text)
+    assert table and figure
+    at = next(i for i in range(table.start(3), table.end(3)) if text[i].isdigit())
+    faults = {
+        "a changed figure in a table": text[:at] + str((int(text[at]) + 1) % 10) + text[at + 1:],
+        "a changed figure in a sentence": text[:figure.start(3)] + "1" + text[figure.start(3):],
+        "a block that does not exist": text.replace(table[1], "<!-- publish: no-such-block -->\n", 1),
+        "a key that does not exist": text.replace(figure[1], "<!-- p: records-time no-such-scene -->", 1),
+        "a block that does not end": text.replace("<!-- /publish -->", "", 1),
+        "a figure at the beginning of a line": text + f"\n{figure[0]}\n",
+        "a gain outside a block": text + "\nThis gains 2.57 in all scenes.\n",
+        "a factor outside a block": text + "\nIt is 32 times faster.\n",
+        "a time outside a block": text + "\nA sample takes 12 ms.\n",
+        "bytes outside a block": text + "\nFields take 13 MiB.\n",
+        "an error outside a block": text + "\nMeans differ by 3%.\n",
+        "a table outside a block": text + "\n| scene | gain |\n| --- | --- |\n| ajar | 32 |\n",
+    }
+    for name, changed in faults.items():
+        before = len(check_page(Results(root), page, text, exceptions, set()))
+        if len(check_page(Results(root), page, changed, exceptions, set())) <= before:
+            missed.append(f"not found: {name}")
+    return missed
+
+
+def main() -> int:
+    """Runs the program, and returns its exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--check", action="store_true", help="fail where a page differs from its results")
+    what.add_argument("--write", action="store_true", help="generate all blocks anew")
+    what.add_argument("--planted", action="store_true", help="fail where a planted fault is not found")
+    parser.add_argument("root", nargs="?", type=pathlib.Path, default=ROOT, help="the repository (default: this one)")
+    given = parser.parse_args()
+    if given.write:
+        write(given.root)
+        return 0
+    faults = planted(given.root) if given.planted else check(given.root)
+    for fault in faults:
+        print(fault, file=sys.stderr)
+    if given.check:
+        report_stale(given.root)
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

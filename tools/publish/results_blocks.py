@@ -1,0 +1,24 @@
+"""The list of all result files, docs/results.md."""
+from blocks import Results, block, table
+from provenance import provenance, result_files
+
+
+@block
+def results_list(results: Results) -> str:
+    """Each file of bench/results with its commit, date and machine."""
+    rows = [["file", "commit", "date", "machine"]]
+    for name in result_files(results.root):
+        entry = provenance(results.root, name)
+        before = "before " if entry["commit_is"] == "log" else ""
+        rows.append([f"`{name}`", before + entry["commit"], entry["date"], entry["machine"]])
+    return table(rows)
+
+
+@block
+def results_commands(results: Results) -> str:
+    """The commands that wrote each file, or wrote what it was made from."""
+    parts = []
+    for name in result_files(results.root):
+        commands = [line.strip() for command in provenance(results.root, name)["command"] for line in command.split("\n")]
+        parts.append("\n".join([f"    # {name}", *(f"    {line}" for line in commands)]))
+    return "\n" + "\n\n".join(parts) + "\n"
