@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints results as a table of docs/packages.md, docs/performance.md or docs/quality.md.
+"""Prints results as a table. tools/publish makes those of the pages, with its help.
 
 usage: bench/table.py bench/results/NAME.json [...]
 
@@ -30,14 +30,20 @@ MEASURES = ("mse_reinhard", "relmse_robust")
 STAGES = ("trace", "sort", "lights", "directions", "shade", "update")
 
 
-def print_stages(benchmarks):
-    print("| stage | floor | floor, ms | measured, ms | ratio |")
-    print("| --- | --- | --- | --- | --- |")
+def print_table(rows):
+    """Prints rows of text, the head first."""
+    for row in [rows[0], ["---"] * len(rows[0]), *rows[1:]]:
+        print(f"| {' | '.join(row)} |")
+
+
+def stage_rows(benchmarks):
+    rows = [["stage", "floor", "floor, ms", "measured, ms", "ratio"]]
     for b in benchmarks:
         stage, *arguments = b["name"].split("/iterations")[0].split("/")
         name = f"`{stage}` {', '.join(a.replace(':', ' ') for a in arguments)}".strip()
         floor = b.get("label", FLOORS[stage])  # if the floor is another
-        print(f"| {name} | {floor} | {b['floor_ms']:.3g} | {b['median_ms']:.3g} | {b['ratio']:.2f} |")
+        rows.append([name, floor, f"{b['floor_ms']:.3g}", f"{b['median_ms']:.3g}", f"{b['ratio']:#.3g}"])
+    return rows
 
 
 def ratio(value):
@@ -132,21 +138,21 @@ def print_gains(scenes):
         print(f"| {method} |", " | ".join(cells), "|")
 
 
-def print_compilers(compilers):
-    print("| compiler | source | seconds | ratio to Thrust and GLM | MiB at most | program, KiB |")
-    print("| --- | --- | --- | --- | --- | --- |")
+def compiler_rows(compilers):
+    rows = [["compiler", "source", "seconds", "ratio to Thrust and GLM", "MiB at most", "program, KiB"]]
     for compiler, sources in compilers.items():
         name = re.sub(r" \(.*?\)|^Debian | version", "", compiler)
         for source, m in sources.items():
-            print(f"| {name} | {source} | {m['seconds']:.2f} | {m['ratio']:.2f} | {m['mebibytes']:.0f} "
-                  f"| {m['program_bytes'] / 1024:.0f} |")
+            rows.append([name, source, f"{m['seconds']:.2f}", f"{m['ratio']:.2f}", f"{m['mebibytes']:.0f}",
+                         f"{m['program_bytes'] / 1024:.0f}"])
+    return rows
 
 
 def main(paths):
     results = [json.load(open(path)) for path in paths]
     first = results[0]
     if "benchmarks" in first:
-        print_stages(first["benchmarks"])
+        print_table(stage_rows(first["benchmarks"]))
     elif "baseline" in first:
         groups = {}
         for result in results:
@@ -156,7 +162,7 @@ def main(paths):
             print_gains(scenes)
             print()
     elif "compilers" in first:
-        print_compilers(first["compilers"])
+        print_table(compiler_rows(first["compilers"]))
     elif "settled_samples" in first:
         print_sample_times(first["settled_samples"])
     elif "reference_seconds" in first:

@@ -12,6 +12,7 @@ import pathlib
 import sys
 from typing import Dict, List, Set
 
+import performance_blocks  # registers its blocks
 import quality_blocks  # registers its blocks
 import results_blocks  # registers its blocks
 from blocks import ROOT, Results, generate
@@ -20,8 +21,7 @@ from provenance import is_stale, provenance, read_index, result_files
 
 EXCEPTIONS = pathlib.Path(__file__).resolve().parent / "exceptions.ini"
 # Pages that still have figures without blocks.
-NOT_YET = ("ablations", "algorithm", "bidirectional", "guides", "host", "hosts", "packages", "performance", "ranks", "renderer",
-           "tuning")
+NOT_YET = ("ablations", "algorithm", "bidirectional", "guides", "host", "hosts", "ranks", "renderer", "tuning")
 
 
 def page_names(root: pathlib.Path) -> List[str]:
