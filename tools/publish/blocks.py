@@ -9,7 +9,7 @@ import re
 import sys
 from typing import Any, Callable, Dict, List, Optional, Union
 
-from provenance import RESULTS, provenance
+from provenance import RESULTS, provenance, read_index
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "bench"))
@@ -25,20 +25,22 @@ class Results:
     def __init__(self, root: pathlib.Path) -> None:
         self.root = root
         self.read: List[str] = []
+        self.index = read_index(root)
         self._texts: Dict[str, str] = {}
         self._values: Dict[str, Any] = {}
 
-    def text(self, name: str) -> str:
-        """The text of a file of bench/results."""
+    def text(self, name: str, part: str = "") -> str:
+        """The text of a file of bench/results. A part with a commit of its own is remembered as such."""
         if name not in self._texts:
             self._texts[name] = (self.root / RESULTS / name).read_text(encoding="utf-8")
-        if name not in self.read:
-            self.read.append(name)
+        entry = f"{name}#{part}" if f"{name}#{part}" in self.index else name
+        if entry not in self.read:
+            self.read.append(entry)
         return self._texts[name]
 
     def json(self, name: str, *keys: Union[str, int]) -> Any:
         """A value of a JSON file, by the keys that lead to it."""
-        text = self.text(name)
+        text = self.text(name, str(keys[0]) if keys else "")
         if name not in self._values:
             self._values[name] = json.loads(text)
         value = self._values[name]
@@ -83,7 +85,7 @@ def source(root: pathlib.Path, name: str, page: str) -> str:
     entry = provenance(root, name)
     link = "results.md" if page.startswith("docs/") else "docs/results.md"
     before = "before " if entry["commit_is"] == "log" else ""
-    return f"[{name}]({link}), {before}commit {entry['commit']}, {entry['date']}"
+    return f"[{name.split('#')[0]}]({link}), {before}commit {entry['commit']}, {entry['date']}"
 
 
 def generate(results: Results, name: str, page: str) -> str:

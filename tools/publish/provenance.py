@@ -2,6 +2,7 @@
 
 bench/results/index.json has what the files do not say themselves. `commit_is` tells how a commit is known: "measured" at
 it, as the file or its program said, or "log": the file came with that commit, so that it was measured shortly before.
+Where a part of a JSON file has another commit, the index has an entry FILE#KEY for it, too.
 """
 import json
 import pathlib
@@ -47,7 +48,10 @@ def _machine(value: Any, gpu: str) -> str:
 def provenance(root: pathlib.Path, name: str) -> Entry:
     """commit, commit_is, date, machine and commands of a result file: what it says, and else what the index says."""
     entry = dict(read_index(root).get(name, {}))
-    if name.endswith(".json"):
+    if "#" in name:
+        command = json.loads((root / RESULTS / name.split("#")[0]).read_text())[name.split("#")[1] + "_command"]
+        entry.setdefault("command", command)
+    elif name.endswith(".json"):
         found = json.loads((root / RESULTS / name).read_text())
         command = found.get("command") or found.get("render")
         if command:

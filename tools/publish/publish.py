@@ -14,6 +14,7 @@ from typing import Dict, List, Set
 
 import performance_blocks  # registers its blocks
 import quality_blocks  # registers its blocks
+import ranks_blocks  # registers its blocks
 import results_blocks  # registers its blocks
 from blocks import ROOT, Results, generate
 from pages import BLOCK, INLINE, Exempt, differing, faults_of_markers, outside, read_exceptions, rewrite
@@ -21,7 +22,7 @@ from provenance import is_stale, provenance, read_index, result_files
 
 EXCEPTIONS = pathlib.Path(__file__).resolve().parent / "exceptions.ini"
 # Pages that still have figures without blocks.
-NOT_YET = ("ablations", "algorithm", "bidirectional", "guides", "host", "hosts", "ranks", "renderer", "tuning")
+NOT_YET = ("ablations", "algorithm", "bidirectional", "guides", "host", "hosts", "renderer", "tuning")
 
 
 def page_names(root: pathlib.Path) -> List[str]:
@@ -43,8 +44,9 @@ def check_index(root: pathlib.Path) -> List[str]:
     """Result files without commit or date, and entries without a file."""
     index, files = read_index(root), result_files(root)
     found = [f"bench/results/index.json has no {name}" for name in files if name not in index]
-    found += [f"bench/results/index.json has {name}, and there is no such file" for name in index if name not in files]
-    found += [f"bench/results/index.json: {name} has no {key}" for name in files if name in index
+    gone = [name for name in index if name.split("#")[0] not in files]
+    found += [f"bench/results/index.json has {name}, and there is no such file" for name in gone]
+    found += [f"bench/results/index.json: {name} has no {key}" for name in index if name not in gone
               for key in ("commit", "commit_is", "date", "command", "machine") if not provenance(root, name).get(key)]
     return found
 
