@@ -10,14 +10,15 @@ import pathlib
 import re
 from typing import Callable, Dict, List, NamedTuple, Set, Tuple
 
-BLOCK = re.compile(r"(<!-- publish: (.+?) -->\n)(.*?)(<!-- /publish -->)", re.DOTALL)
-INLINE = re.compile(r"(<!-- p: ([^>]+?) -->)(.*?)(<!-- /p -->)", re.DOTALL)
+BLOCK = re.compile(r"^(?P<begin>(?P<indent> *)<!-- publish: (?P<name>.+?) -->\n)(?P<body>.*?)(?P<end> *<!-- /publish -->)",
+                   re.DOTALL | re.MULTILINE)
+INLINE = re.compile(r"(?P<begin><!-- p: (?P<name>[^>]+?) -->)(?P<body>.*?)(?P<end><!-- /p -->)", re.DOTALL)
 COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 NUMBER = r"\d[\d,]*(?:\.\d+)?"
 UNITS = r"(?:[mµn]?s|seconds?|minutes?|hours?|[KMGT]i?B(?:/s)?|%|per cent|times|-?fold)"
 # A number with a unit of gain, error, time or bytes, a factor, a decimal number, or a cell of a table that is a number.
 FIGURE = re.compile(rf"(?<![\w.#/-]){NUMBER}[ -]?{UNITS}(?!\w)|(?<![\w.#/-]){NUMBER}x(?!\w)|factor of {NUMBER}"
-                    rf"|(?<![\w.#/-])\d+\.\d+(?![\w]|\.\d)|(?<=\| )[-±]?{NUMBER}(?= \|)")
+                    rf"|(?<![\w.#/-])\d+\.\d+(?:e-?\d+)?(?![\w]|\.\d)|(?<=\| )[-±]?{NUMBER}(?= \|)")
 
 Generate = Callable[[str, str], str]  # text of a block from its name and page
 
@@ -38,19 +39,23 @@ def read_exceptions(path: pathlib.Path) -> List[Exempt]:
         section = ini[kind]
         if not section.get("reason"):
             raise ValueError(f"{path.name}: [{kind}] has no reason")
-        found += [Exempt(kind, section["pages"], re.compile(line)) for line in section["patterns"].split("\n") if line]
+        found += [Exempt(kind, section["pages"], re.compile(line, re.MULTILINE)) for line in section["patterns"].split("\n") if line]
     return found
 
 
-def rewrite(text: str, page: str, generate: Generate) -> str:
-    """The page with all its blocks generated anew. Line breaks within a figure's sentence stay."""
-    def block(match: "re.Match[str]") -> str:
-        return match[1] + generate(match[2], page) + "\n" + match[4]
+def _body(match: "re.Match[str]", page: str, generate: Generate) -> str:
+    """What is to stand in a block. Line breaks within a figure's sentence stay, and tables are indented like their markers."""
+    new = generate(match["name"], page)
+    if match.re is INLINE:
+        return match["body"] if new.split() == match["body"].split() else new
+    return "".join(f"{match['indent']}{line}".rstrip() + "\n" for line in new.split("\n"))
 
-    def inline(match: "re.Match[str]") -> str:
-        new = generate(match[2], page)
-        return match[0] if new.split() == match[3].split() else match[1] + new + match[4]
-    return INLINE.sub(inline, BLOCK.sub(block, text))
+
+def rewrite(text: str, page: str, generate: Generate) -> str:
+    """The page with all its blocks generated anew."""
+    for pattern in (BLOCK, INLINE):
+        text = pattern.sub(lambda match: match["begin"] + _body(match, page, generate) + match["end"], text)
+    return text
 
 
 def _blank(match: "re.Match[str]") -> str:
@@ -100,11 +105,10 @@ def differing(text: str, page: str, generate: Generate) -> Dict[int, str]:
         for match in pattern.finditer(text):
             line = text.count("\n", 0, match.start()) + 1
             try:
-                new = generate(match[2], page)
-            except (KeyError, IndexError, ValueError, OSError) as error:
-                found[line] = f"{match[2]}: {error if str(error) else type(error).__name__}"
+                body = _body(match, page, generate)
+            except (KeyError, IndexError, ValueError, OSError, TypeError, StopIteration) as error:
+                found[line] = f"{match['name']}: {error if str(error) else type(error).__name__}"
                 continue
-            same = new.split() == match[3].split() if pattern is INLINE else new + "\n" == match[3]
-            if not same:
-                found[line] = f"{match[2]} is not what --write generates"
+            if body != match["body"]:
+                found[line] = f"{match['name']} is not what --write generates"
     return found

@@ -1,0 +1,116 @@
+"""Tables and figures of docs/algorithm.md, docs/guides.md, docs/host.md and docs/hosts.md."""
+from typing import Any, Dict, List
+
+from blocks import Results, Rows, block, three
+from quality_blocks import short, summary
+
+CONES, SOURCES, REST = "quality-cones.json", "octree-sources.json", "rest.json"
+
+
+@block
+def cones(results: Results) -> Rows:
+    """Gains of three ways for a cone to find light, and in brackets their time over path tracing's."""
+    names = {"kept-scene": ("kept", "`scene`"), "kept-march": ("kept", "`march`"), "kept-trace": ("kept", "`trace`"),
+             "kept-trace-all": ("kept, `recast` 1", "`trace`"), "transient-scene": ("transient", "`scene`"),
+             "transient-march": ("transient", "`march`"), "transient-trace": ("transient", "`trace`")}
+    scenes = results.json(CONES, "scenes")
+    rows = [["fields", "cones", *map(short, scenes)]]
+    for method, name in names.items():
+        cells = []
+        for scene in scenes:
+            m, pt = summary(scene, method), summary(scene, "pt")
+            cells.append(f"{three(m['errors']['mse_reinhard']['ratio'])} ({m['seconds']['mean'] / pt['seconds']['mean']:.1f})")
+        rows.append([*name, *cells])
+    return rows
+
+
+def relative_errors(results: Results, file: str) -> List[float]:
+    """Standard errors of gains over the gains, path tracing's left out."""
+    found = [m["errors"]["mse_reinhard"] for s in results.json(file, "scenes") for m in s["summary"][0]["methods"]
+             if m["method"] != "pt"]
+    return [e["ratio_standard_error"] / e["ratio"] for e in found]
+
+
+def per_cent(values: List[float]) -> str:
+    """Least and most of values, in per cent."""
+    return f"{100 * min(values):.0f} to {100 * max(values):.0f}%"
+
+
+@block
+def cones_errors(results: Results) -> str:
+    """Standard errors of the gains of cones."""
+    return per_cent(relative_errors(results, CONES))
+
+
+@block
+def cones_all(results: Results) -> str:
+    """What casting all cones in each refresh gains."""
+    scenes = results.json(CONES, "scenes")
+    gain = [[summary(s, m)["errors"]["mse_reinhard"]["ratio"] for m in ("kept-trace-all", "kept-trace")] for s in scenes]
+    return per_cent([a / b - 1 for a, b in gain])
+
+
+@block
+def sources(results: Results) -> Rows:
+    """Gains of octrees of triangles, of the caster's hits and of the first sample's."""
+    rows = [["scene", "triangles", "caster", "first sample", "first sample / triangles"]]
+    for scene in results.json(SOURCES, "scenes"):
+        gains = [summary(scene, m)["errors"]["mse_reinhard"]["ratio"] for m in ("triangles", "caster", "samples")]
+        rows.append([short(scene), *map(three, gains), three(gains[2] / gains[0])])
+    return rows
+
+
+@block
+def sources_alike(results: Results) -> str:
+    """Gains of first samples' octrees over those of triangles'."""
+    scenes = results.json(SOURCES, "scenes")
+    gain = [[summary(s, m)["errors"]["mse_reinhard"]["ratio"] for m in ("samples", "triangles")] for s in scenes]
+    return per_cent([a / b for a, b in gain])
+
+
+@block
+def sources_errors(results: Results) -> str:
+    """Standard errors of those gains."""
+    return per_cent(relative_errors(results, SOURCES))
+
+
+@block
+def kernels_gain(results: Results, scene: str) -> str:
+    """The gain of luminance in the example with kernels of its own."""
+    return results.found("kernels-gains.txt", rf"^{scene} +[\d.]+ +([\d.]+)$")[1]
+
+
+@block
+def sarsa_bias(results: Results) -> Rows:
+    """What SARSA grids know of a furnace."""
+    rows = [line.strip("| ").split(" | ") for line in results.text("sarsa-bias.txt").split("\n") if line.startswith("|")]
+    chosen = [[row[i] for i in (0, 1, 2, 3, 5, 7, 8)] for row in rows]
+    return [["update", "`learning_rate`", "`step`", "8 samples", "32", "128", "256"], *chosen[1:]]
+
+
+def at_equal_time(results: Results, device: str, *samples: str) -> Dict[str, List[float]]:
+    """Gains at equal time of each scene on `cpu` or `gpu`."""
+    found: Dict[str, Any] = results.json(REST, device, "scenes")
+    return {scene: [of[n]["equal_time"] for n in samples] for scene, of in found.items()}
+
+
+@block
+def rests_gpu(results: Results) -> str:
+    """How many scenes gain on a GPU, and how much at least and at most."""
+    found = at_equal_time(results, "gpu", "16", "64")
+    gains = [g for g in found.values() if min(g) > 1.1]
+    return (f"{len(gains)} of {len(found)} scenes gain {min(map(min, gains)):.1f} to {max(map(max, gains)):.0f} times at equal "
+            "time")
+
+
+@block
+def rests_gpu_loss(results: Results) -> str:
+    """The most that a scene loses on a GPU."""
+    return f"{100 * (1 - min(map(min, at_equal_time(results, 'gpu', '16', '64').values()))):.0f}%"
+
+
+@block
+def rests_cpu_loss(results: Results, samples: str) -> str:
+    """What guiding costs on a CPU where it does not pay, without veach-mis."""
+    losses = [1 - g[0] for s, g in at_equal_time(results, "cpu", samples).items() if g[0] < 1.0 and s != "veach-mis.glb"]
+    return f"{100 * min(losses):.0f} to {100 * max(losses):.0f}%"
