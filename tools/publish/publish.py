@@ -12,6 +12,7 @@ import pathlib
 import sys
 from typing import Dict, List, Set
 
+import bidirectional_blocks  # registers its blocks
 import host_blocks  # registers its blocks
 import option_blocks  # registers its blocks
 import performance_blocks  # registers its blocks
@@ -23,14 +24,10 @@ from pages import BLOCK, INLINE, Exempt, differing, faults_of_markers, outside, 
 from provenance import is_stale, provenance, read_index, result_files
 
 EXCEPTIONS = pathlib.Path(__file__).resolve().parent / "exceptions.ini"
-# Pages that still have figures without blocks.
-NOT_YET = ("bidirectional",)
-
 
 def page_names(root: pathlib.Path) -> List[str]:
     """The pages that are checked: README.md and docs/*.md."""
-    pages = sorted(p for p in (root / "docs").glob("*.md") if p.stem not in NOT_YET)
-    return ["README.md", *(f"docs/{p.name}" for p in pages)]
+    return ["README.md", *sorted(f"docs/{p.name}" for p in (root / "docs").glob("*.md"))]
 
 
 def check_page(results: Results, page: str, text: str, exceptions: List[Exempt], used: Set[Exempt]) -> List[str]:
