@@ -10,7 +10,7 @@ half the difference between the references, which is their own noise.
 import sys
 import tempfile
 
-from gpu_programs import Programs, write_results
+from programs import Programs, write_results
 
 SCENES = {"cornell-enclosed": "off", "ajar": "on"}  # and next-event estimation
 METHODS = {

@@ -10,7 +10,7 @@ import statistics
 import sys
 import tempfile
 
-from gpu_programs import Programs, write_results
+from programs import Programs, write_results
 
 SCENES = ("ajar",)
 METHODS = {"pt": ["--method", "pt"], "wfpg": []}

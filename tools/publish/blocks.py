@@ -12,7 +12,7 @@ from typing import Any, Callable, Dict, List, Optional, Union
 from provenance import RESULTS, provenance, read_index
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "bench"))
+sys.path.append(str(ROOT / "bench"))
 
 Rows = List[List[str]]
 Block = Callable[..., Union[Rows, str]]

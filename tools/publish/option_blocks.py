@@ -28,7 +28,7 @@ def room(results: Results) -> Rows:
 @block
 def room_more(results: Results, method: str) -> str:
     """Variance half and half after four times the samples."""
-    return variance(results.json(ROOM, "with_64_samples", "methods", method, "half"))
+    return variance(results.json("room-64.json", "methods", method, "half"))
 
 
 @block

@@ -49,8 +49,8 @@ def provenance(root: pathlib.Path, name: str) -> Entry:
     """commit, commit_is, date, machine and commands of a result file: what it says, and else what the index says."""
     entry = dict(read_index(root).get(name, {}))
     if "#" in name:
-        command = json.loads((root / RESULTS / name.split("#")[0]).read_text())[name.split("#")[1] + "_command"]
-        entry.setdefault("command", command)
+        file, part = name.split("#")
+        entry.setdefault("command", json.loads((root / RESULTS / file).read_text()).get(f"{part}_command", []))
     elif name.endswith(".json"):
         found = json.loads((root / RESULTS / name).read_text())
         command = found.get("command") or found.get("render")

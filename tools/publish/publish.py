@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
-"""Keeps the figures of README.md and docs/ equal to the files of bench/results.
+"""Keeps the figures of README.md and docs/ equal to the files of bench/results, and measures these files.
 
-usage: tools/publish/publish.py --check [ROOT]     fails where a block differs from its file, or a figure has no block
-       tools/publish/publish.py --write [ROOT]     generates all blocks anew
-       tools/publish/publish.py --planted [ROOT]   plants faults in copies of pages, and fails where one is not found
+usage: tools/publish/publish.py --check             fails where a block differs from its file, or a figure has no block
+       tools/publish/publish.py --write             generates all blocks anew
+       tools/publish/publish.py --list              prints all series, and whether they are current
+       tools/publish/publish.py --measure [NAME...] measures all series or those, passing over current ones; then --write
+       tools/publish/publish.py --planted           plants faults in copies of pages, and fails where one is not found
 
-ROOT is the repository (default: this one). pages.py says what a block is, and exceptions.ini which figures are no results.
+--help has all options. pages.py says what a block is, series.py what is measured, and exceptions.ini which figures are no results.
 """
 import argparse
 import pathlib
@@ -20,6 +22,7 @@ import quality_blocks  # registers its blocks
 import ranks_blocks  # registers its blocks
 import results_blocks  # registers its blocks
 from blocks import ROOT, Results, generate
+from measuring import Place, list_series, measure
 from pages import BLOCK, INLINE, Exempt, differing, faults_of_markers, outside, read_exceptions, rewrite
 from provenance import is_stale, provenance, read_index, result_files
 
@@ -117,18 +120,45 @@ def planted(root: pathlib.Path) -> List[str]:
     return missed
 
 
-def main() -> int:
-    """Runs the program, and returns its exit status."""
+def arguments() -> argparse.Namespace:
+    """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--check", action="store_true", help="fail where a page differs from its results")
     what.add_argument("--write", action="store_true", help="generate all blocks anew")
     what.add_argument("--planted", action="store_true", help="fail where a planted fault is not found")
-    parser.add_argument("root", nargs="?", type=pathlib.Path, default=ROOT, help="the repository (default: this one)")
-    given = parser.parse_args()
-    if given.write:
-        write(given.root)
+    what.add_argument("--list", action="store_true", help="print the series and their states")
+    what.add_argument("--measure", nargs="*", metavar="NAME", help="measure these series, or all")
+    parser.add_argument("--again", action="store_true", help="measure current series, too")
+    parser.add_argument("--root", type=pathlib.Path, default=ROOT, help="the repository (default: this one)")
+    parser.add_argument("--programs", type=pathlib.Path, help="folder of programs (default: build/bench-cuda/bin or build/bench/bin)")
+    parser.add_argument("--scenes", type=pathlib.Path, help="folder with the literature's scenes as glTF")
+    parser.add_argument("--work", type=pathlib.Path, help="folder of pictures, references and caches (default: build/publish)")
+    return parser.parse_args()
+
+
+def place_of(given: argparse.Namespace) -> Place:
+    """Where to measure."""
+    built = [given.root / "build" / preset / "bin" for preset in ("bench-cuda", "bench")]
+    programs = given.programs or next((p for p in built if p.exists()), built[-1])
+    return Place(given.root, programs, given.scenes, given.work or given.root / "build" / "publish")
+
+
+def main() -> int:
+    """Runs the program, and returns its exit status."""
+    given = arguments()
+    if given.list:
+        list_series(place_of(given))
         return 0
+    failed = 0
+    if given.measure is not None:
+        place = place_of(given)
+        if not place.programs.is_dir():
+            raise SystemExit(f"publish.py: no programs in {place.programs}; build them by: cmake --workflow --preset bench")
+        failed = measure(place, given.measure, given.again)
+    if given.write or given.measure is not None:
+        write(given.root)
+        return 1 if failed else 0
     faults = planted(given.root) if given.planted else check(given.root)
     for fault in faults:
         print(fault, file=sys.stderr)

@@ -4,7 +4,7 @@ from typing import Any, Dict, List, Tuple
 
 from blocks import ROOT, Results, Rows, block, three
 
-sys.path.insert(0, str(ROOT / "bench" / "ranks"))
+sys.path.append(str(ROOT / "bench" / "ranks"))
 from plot import NETWORK, WARM_UP, WAVE, Model, fit, gpu_series, models, reduction  # noqa: E402, bench/ranks/plot.py
 
 FILE = "ranks.json"
