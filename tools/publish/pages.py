@@ -16,9 +16,10 @@ INLINE = re.compile(r"(?P<begin><!-- p: (?P<name>[^>]+?) -->)(?P<body>.*?)(?P<en
 COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 NUMBER = r"\d[\d,]*(?:\.\d+)?"
 UNITS = r"(?:[mµn]?s|seconds?|minutes?|hours?|[KMGT]i?B(?:/s)?|%|per cent|times|-?fold)"
+BEGIN = r"(?<![\w.#/])(?<!\w-)"
 # A number with a unit of gain, error, time or bytes, a factor, a decimal number, or a cell of a table that is a number.
-FIGURE = re.compile(rf"(?<![\w.#/-]){NUMBER}[ -]?{UNITS}(?!\w)|(?<![\w.#/-]){NUMBER}x(?!\w)|factor of {NUMBER}"
-                    rf"|(?<![\w.#/-])\d+\.\d+(?:e-?\d+)?(?![\w]|\.\d)|(?<=\| )[-±]?{NUMBER}(?= \|)")
+FIGURE = re.compile(rf"{BEGIN}{NUMBER}[ -]?{UNITS}(?!\w)|{BEGIN}{NUMBER}x(?!\w)|factor of {NUMBER}"
+                    rf"|{BEGIN}\d+\.\d+(?:e-?\d+)?(?![\w]|\.\d)|(?<=\| )[-±]?{NUMBER}(?= \|)")
 
 Generate = Callable[[str, str], str]  # text of a block from its name and page
 

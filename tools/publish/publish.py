@@ -111,6 +111,7 @@ def planted(root: pathlib.Path) -> List[str]:
         "a time outside a block": text + "\nA sample takes 12 ms.\n",
         "bytes outside a block": text + "\nFields take 13 MiB.\n",
         "an error outside a block": text + "\nMeans differ by 3%.\n",
+        "a negative figure outside a block": text + "\nThe difference is -3%.\n",
         "a table outside a block": text + "\n| scene | gain |\n| --- | --- |\n| ajar | 32 |\n",
     }
     for name, changed in faults.items():
