@@ -24,6 +24,7 @@ import results_blocks  # registers its blocks
 from blocks import ROOT, Results, generate
 from measuring import Place, list_series, measure
 from pages import BLOCK, INLINE, Exempt, differing, faults_of_markers, outside, read_exceptions, rewrite
+from plots import differing_plots, drawn, write_plots
 from provenance import is_stale, provenance, read_index, result_files
 
 EXCEPTIONS = pathlib.Path(__file__).resolve().parent / "exceptions.ini"
@@ -70,9 +71,10 @@ def report_stale(root: pathlib.Path) -> None:
 
 
 def check(root: pathlib.Path) -> List[str]:
-    """All faults of the pages and of the index."""
-    results, exceptions, used = Results(root), read_exceptions(EXCEPTIONS), set()  # type: ignore[var-annotated]
-    found = check_index(root)
+    """All faults of the pages, the plots and the index."""
+    results, exceptions = Results(root), read_exceptions(EXCEPTIONS)
+    used: Set[Exempt] = set()
+    found = check_index(root) + differing_plots(root, drawn(root))
     for page in page_names(root):
         found += check_page(results, page, (root / page).read_text(encoding="utf-8"), exceptions, used)
     found += [f"exceptions.ini: [{e.kind}] {e.pattern.pattern} covers nothing in {e.pages}" for e in exceptions
@@ -81,7 +83,8 @@ def check(root: pathlib.Path) -> List[str]:
 
 
 def write(root: pathlib.Path) -> None:
-    """Generates the blocks of all pages."""
+    """Generates the blocks of all pages, and draws the plots."""
+    write_plots(root)
     results = Results(root)
     for page in page_names(root):
         text = (root / page).read_text(encoding="utf-8")
@@ -118,6 +121,9 @@ def planted(root: pathlib.Path) -> List[str]:
         before = len(check_page(Results(root), page, text, exceptions, set()))
         if len(check_page(Results(root), page, changed, exceptions, set())) <= before:
             missed.append(f"not found: {name}")
+    changed_plots = {path: plot + " " for path, plot in drawn(root).items()}
+    if len(differing_plots(root, changed_plots)) < len(changed_plots):
+        missed.append("not found: a changed plot")
     return missed
 
 
