@@ -9,7 +9,7 @@ import time
 from typing import Dict, List, Optional
 
 from blocks import ROOT
-from provenance import RESULTS, head, is_dirty, is_stale, provenance, read_index, write_index
+from provenance import RESULTS, head, is_dirty, is_stale, provenance, read_index, sources, write_index
 from series import ALL, Series
 
 sys.path.append(str(ROOT / "bench"))
@@ -63,7 +63,7 @@ def state(root: pathlib.Path, series: Series) -> str:
     entry = provenance(root, name)
     if entry["commit_is"] != "measured" or entry["command"] != list(series.commands):
         return "stale"
-    return {True: "stale", False: "current", None: "unknown"}[is_stale(root, entry["commit"])]
+    return {True: "stale", False: "current", None: "unknown"}[is_stale(root, entry)]
 
 
 def list_series(place: Place) -> None:
@@ -107,8 +107,8 @@ def record(place: Place, series: Series, made: pathlib.Path, commit: str) -> Non
     shutil.copy(made, target.with_name(target.name + ".part"))
     os.replace(target.with_name(target.name + ".part"), target)
     index = read_index(place.root)
-    index[series.name] = {"commit": commit, "commit_is": "measured", "date": time.strftime("%Y-%m-%d", time.gmtime()),
-                          "machine": machine(place.programs), "command": list(series.commands)}
+    index[series.name] = {"commit": commit, "commit_is": "measured", "sources": sources(place.root),
+                          "date": time.strftime("%Y-%m-%d", time.gmtime()), "machine": machine(place.programs), "command": list(series.commands)}
     write_index(place.root, index)
 
 

@@ -2,8 +2,10 @@
 
 bench/results/index.json has what the files do not say themselves. `commit_is` tells how a commit is known: "measured" at
 it, as the file or its program said, or "log": the file came with that commit, so that it was measured shortly before.
-Where a part of a JSON file has another commit, the index has an entry FILE#KEY for it, too.
+Where a part of a JSON file has another commit, the index has an entry FILE#KEY for it, too. `sources` is a hash of what was
+measured.
 """
+import hashlib
 import json
 import pathlib
 import re
@@ -87,7 +89,18 @@ def is_dirty(root: pathlib.Path) -> bool:
     return bool(done and done.stdout.strip())
 
 
-def is_stale(root: pathlib.Path, commit: str) -> Optional[bool]:
-    """Whether sources changed since `commit`; None where that commit is not known, as in a shallow clone."""
-    done = _git(root, "diff", "--quiet", commit, "--", *SOURCES)
+def sources(root: pathlib.Path) -> Optional[str]:
+    """A hash of the sources that are checked out, which stays where commits are rebased. None without git."""
+    done = _git(root, "ls-files", "--stage", "--", *SOURCES)
+    return hashlib.sha256(done.stdout.encode()).hexdigest()[:12] if done and done.returncode == 0 and done.stdout else None
+
+
+def is_stale(root: pathlib.Path, entry: Entry) -> Optional[bool]:
+    """Whether sources changed since an entry was measured: by their hash, or else by its commit. None where neither is known."""
+    now = sources(root)
+    if now is None:
+        return None
+    if "sources" in entry:
+        return is_dirty(root) or entry["sources"] != now
+    done = _git(root, "diff", "--quiet", entry["commit"], "--", *SOURCES)
     return {0: False, 1: True}.get(done.returncode) if done else None

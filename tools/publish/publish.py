@@ -57,12 +57,9 @@ def check_index(root: pathlib.Path) -> List[str]:
 def report_stale(root: pathlib.Path) -> None:
     """Prints which results were measured before sources changed. That is no fault."""
     states: Dict[str, List[str]] = {"stale": [], "current": [], "unknown": []}
-    by_commit: Dict[str, str] = {}
     for name, entry in read_index(root).items():
-        commit = entry.get("commit", "")
-        if commit not in by_commit:
-            by_commit[commit] = {True: "stale", False: "current", None: "unknown"}[is_stale(root, commit)]
-        states[by_commit[commit]].append(f"{name} ({commit})")
+        state = {True: "stale", False: "current", None: "unknown"}[is_stale(root, entry)]
+        states[state].append(f"{name} ({entry.get('commit')})")
     print(f"{len(states['current'])} results are current, {len(states['stale'])} are stale: include/, examples/, bench/ or "
           f"tools/ changed since their commit; of {len(states['unknown'])} it is unknown")
     for state in ("current", "stale", "unknown"):
