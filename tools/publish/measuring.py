@@ -108,7 +108,8 @@ def record(place: Place, series: Series, made: pathlib.Path, commit: str) -> Non
     os.replace(target.with_name(target.name + ".part"), target)
     index = read_index(place.root)
     index[series.name] = {"commit": commit, "commit_is": "measured", "sources": sources(place.root),
-                          "date": time.strftime("%Y-%m-%d", time.gmtime()), "machine": machine(place.programs), "command": list(series.commands)}
+                          "date": time.strftime("%Y-%m-%d", time.gmtime()), "machine": machine(place.programs),
+                          "command": list(series.commands)}
     write_index(place.root, index)
 
 
