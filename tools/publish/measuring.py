@@ -1,4 +1,5 @@
 """Measures series, and writes their files and where they come from. An interrupted run resumes where it was."""
+import json
 import os
 import pathlib
 import re
@@ -101,11 +102,20 @@ def run(place: Place, series: Series) -> pathlib.Path:
     return folder / series.made
 
 
+def without_runs(text: str) -> str:
+    """A result of wfpg-quality without single renderings; its summary stays."""
+    results = json.loads(text)
+    for scene in results["scenes"]:
+        scene.pop("runs", None)
+    return json.dumps(results, indent=1, ensure_ascii=False) + "\n"
+
+
 def record(place: Place, series: Series, made: pathlib.Path, commit: str) -> None:
     """Takes over a file that was made, and writes its entry."""
     target = place.root / RESULTS / series.name.split("#")[0]
-    shutil.copy(made, target.with_name(target.name + ".part"))
-    os.replace(target.with_name(target.name + ".part"), target)
+    part = target.with_name(target.name + ".part")
+    part.write_text(made.read_text() if series.keeps_runs else without_runs(made.read_text()))
+    os.replace(part, target)
     index = read_index(place.root)
     index[series.name] = {"commit": commit, "commit_is": "measured", "sources": sources(place.root),
                           "date": time.strftime("%Y-%m-%d", time.gmtime()), "machine": machine(place.programs),

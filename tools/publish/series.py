@@ -13,6 +13,7 @@ class Series(NamedTuple):
     needs: Tuple[str, ...]
     minutes: int
     made: str = "results/results.json"  # by the commands, in their folder
+    keeps_runs: bool = True  # each rendering's errors on the way, which pages seldom need
 
 
 QUALITY = "wfpg-quality --cache cache --output results"
@@ -25,7 +26,7 @@ SMALL = ('"scenes/veach-ajar.glb --size 80x45" "scenes/bathroom.glb --size 64x64
 def quality(name: str, needs: Tuple[str, ...], minutes: int, scenes: str, rest: str) -> Series:
     """A series of wfpg-quality. On a GPU, unless methods name it themselves."""
     device = " --device cuda" if "gpu" in needs and "--device cuda" not in rest else ""
-    return Series(name, (f"{QUALITY}{device} --scenes {scenes} {rest}",), needs, minutes)
+    return Series(name, (f"{QUALITY}{device} --scenes {scenes} {rest}",), needs, minutes, keeps_runs="openpgl.json" in name)
 
 
 def methods(base: str, named: Dict[str, str]) -> str:
@@ -55,7 +56,7 @@ ALL: Tuple[Series, ...] = (
             "--methods pt,wfpg,wfpg-product,wfpg-transient-oriented"),
     quality("octree-sources.json", (), 15, "cornell-box ajar cornell-enclosed glossy-room thin-wall caustic-pool",
             "--size 120x90 --spp 64 --seeds 4 --reference-spp 1024 --methods pt "
-            + methods("--method wfpg", {s: f"--octree {s}" for s in ("triangles", "caster", "samples")})),
+            + methods("--method wfpg --least-gain 0", {s: f"--octree {s}" for s in ("triangles", "caster", "samples")})),
     quality("quality-cones.json", (), 30, '"ajar --size 120x90" "cornell-enclosed --size 120x90"',
             "--spp 32 --seeds 3 --reference-spp 4096 --methods pt "
             + methods("--method wfpg", {"kept-scene": "", "kept-march": "--cones march", "kept-trace": "--cones trace",
