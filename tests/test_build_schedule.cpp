@@ -16,7 +16,7 @@ using constants = wfpg::build_schedule_constants;
 build_schedule schedule_in(std::uint32_t sample, std::size_t max_rays = 1000, std::uint32_t leaves = 1000) {
   build_schedule schedule(max_rays, leaves);
   for (std::uint32_t s = 1; s <= sample; ++s) {
-    schedule.begin_sample(s);
+    schedule.begin_sample(s, s);
     schedule.count_sample();
   }
   return schedule;
@@ -36,12 +36,12 @@ std::vector<std::uint32_t> building_waves(build_schedule schedule) {
 TEST_CASE("build schedule: once all paths are guided, bins are chosen and may shrink as at the beginning",
           "[build_schedule]") {
   build_schedule schedule;
-  for (std::uint32_t sample = 1; sample <= 20; ++sample) schedule.begin_sample(sample);
+  for (std::uint32_t sample = 1; sample <= 20; ++sample) schedule.begin_sample(sample, sample);
   schedule.begin_anew();
   CHECK(schedule.before() == 20);
   std::vector<std::uint32_t> chosen;
   for (std::uint32_t sample = 21; sample <= 60; ++sample) {
-    schedule.begin_sample(sample);
+    schedule.begin_sample(sample, sample);
     CHECK(schedule.age() == sample - 20);
     if (schedule.chooses_bins()) chosen.push_back(sample);
     if (sample <= 28) CHECK(schedule.counts_rays());
@@ -55,7 +55,7 @@ TEST_CASE("build schedule: once all paths are guided, bins are chosen and may sh
 
 TEST_CASE("build schedule: where few paths take part, more of their rays are counted", "[build_schedule]") {
   build_schedule schedule(1u << 20, 1u << 12);  // 256 rays a leaf
-  schedule.begin_sample(3);
+  schedule.begin_sample(3, 3);
   CHECK(schedule.counted().stride == 32);
   CHECK(schedule.counted(2).stride == 8);
   CHECK(schedule.counted(9).stride == 1);
@@ -75,10 +75,10 @@ TEST_CASE("build schedule: waves build for four samples after bins or geometry c
   build_schedule schedule = schedule_in(64);
   schedule.expect_builds(constants::busy_samples);
   for (std::uint32_t s = 65; s <= 68; ++s) {
-    schedule.begin_sample(s);
+    schedule.begin_sample(s, s);
     CHECK(building_waves(schedule).size() == 24);
   }
-  schedule.begin_sample(69);
+  schedule.begin_sample(69, 69);
   CHECK(building_waves(schedule).size() == 3);
   schedule.expect_builds(constants::invalidated_samples);
   schedule.expect_builds(1);  // never shortens the period
@@ -123,16 +123,22 @@ TEST_CASE("build schedule: large waves count one ray per stride, others in each 
 
 TEST_CASE("build schedule: a new field is due, and again after a fraction of the samples",
           "[build_schedule]") {
-  CHECK(build_schedule::is_due(5, 0, 5));
-  CHECK_FALSE(build_schedule::is_due(5, 1, 5));
-  CHECK(build_schedule::is_due(8, 1, 7));  // after an eighth of the samples
-  CHECK_FALSE(build_schedule::is_due(16, 1, 15));
-  CHECK(build_schedule::is_due(16, 1, 14));
-  CHECK(build_schedule::is_due(32, 3, 28));
-  CHECK_FALSE(build_schedule::is_due(33, 3, 28));  // after a quarter, once warmed up
-  CHECK(build_schedule::is_due(36, 3, 27));
-  CHECK_FALSE(build_schedule::is_due(100, 3, 76));
-  CHECK(build_schedule::is_due(100, 3, 75));
+  CHECK(build_schedule::is_due(5, 5, 0, 5));
+  CHECK_FALSE(build_schedule::is_due(5, 5, 1, 5));
+  CHECK(build_schedule::is_due(8, 8, 1, 7));  // after an eighth of the samples
+  CHECK_FALSE(build_schedule::is_due(16, 16, 1, 15));
+  CHECK(build_schedule::is_due(16, 16, 1, 14));
+  CHECK(build_schedule::is_due(32, 32, 3, 28));
+  CHECK_FALSE(build_schedule::is_due(33, 33, 3, 28));  // after a quarter, once warmed up
+  CHECK(build_schedule::is_due(36, 36, 3, 27));
+  CHECK_FALSE(build_schedule::is_due(100, 100, 3, 76));
+  CHECK(build_schedule::is_due(100, 100, 3, 75));
+  // After light was forgotten fields are due as in the first samples.
+  CHECK(build_schedule::is_due(100, 1, 3, 99));
+  CHECK(build_schedule::is_due(107, 8, 3, 106));
+  CHECK_FALSE(build_schedule::is_due(115, 16, 3, 114));
+  CHECK(build_schedule::is_due(115, 16, 3, 113));
+  CHECK_FALSE(build_schedule::is_due(115, 16, 3, 115));
 }
 
 TEST_CASE("build schedule: a valid saved state is accepted, an invalid one is refused", "[build_schedule]") {

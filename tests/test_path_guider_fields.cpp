@@ -371,4 +371,72 @@ WFPG_TEST_CASE("path guider: forget_light() forgets choices of lights and learnt
   }
 }
 
+/// The box, whose patch may have moved to the opposite corner of the ceiling.
+struct lamp_box {
+  static constexpr float survival = 1.0f;
+  bool moved;
+  WFPG_HD float operator()(vec3 p) const { return emitted(moved ? vec3(1.0f - p.x, p.y, 1.0f - p.z) : p); }
+};
+
+double variance_of(const std::vector<float>& values) {
+  double sum = 0.0, squares = 0.0;
+  for (const float value : values) {
+    sum += double(value);
+    squares += double(value) * double(value);
+  }
+  const auto n = static_cast<double>(values.size());
+  return squares / n - sum / n * (sum / n);
+}
+
+WFPG_TEST_CASE(
+    "path guider: after a lamp moved, forget_light() leaves a guide that errs as little as a new one",
+    "[path_guider]") {
+  const Exec exec;
+  constexpr std::size_t paths = 4096;
+  const box_mesh<Exec> mesh(exec);
+  double first_told = 0.0, first_new = 0.0, all_told = 0.0, all_new = 0.0;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    guider_options options = tracing_options(paths);
+    options.seed = seed;
+    octree_guider<Exec> told(exec, mesh.view(), options), fresh(exec, mesh.view(), options);
+    trace_paths(exec, told, paths_to_trace{24, paths}, box_caster(), lamp_box{false});
+    told.forget_light();
+    for (std::uint64_t part = 0; part < 4; ++part) {
+      const paths_to_trace four{4, paths, 2, 100 * seed + 4 * part};
+      const double of_told = variance_of(trace_paths(exec, told, four, box_caster(), lamp_box{true})),
+                   of_new = variance_of(trace_paths(exec, fresh, four, box_caster(), lamp_box{true}));
+      if (part == 0) first_told += of_told;
+      if (part == 0) first_new += of_new;
+      all_told += of_told;
+      all_new += of_new;
+    }
+  }
+  INFO("variance of 4 samples " << first_told << " and " << first_new << ", of 16 " << all_told << " and "
+                                << all_new);
+  CHECK(first_told < 1.1 * first_new);
+  CHECK(all_told < 1.1 * all_new);
+  CHECK(all_told > 0.5 * all_new);
+}
+
+WFPG_TEST_CASE("path guider: after forget_light() the first samples are not guided, as of a new guide",
+               "[path_guider]") {
+  const Exec exec;
+  constexpr std::size_t paths = 256;
+  const box_mesh<Exec> mesh(exec);
+  guider_options options = tracing_options(paths);
+  options.unguided_samples = 2;
+  octree_guider<Exec> guider(exec, mesh.view(), options);
+  const auto next_is_guided = [&] {
+    trace_paths(exec, guider, 1, paths, box_caster());
+    return guider.guided();
+  };
+  for (int time = 0; time < 2; ++time) {
+    CHECK_FALSE(next_is_guided());
+    CHECK_FALSE(next_is_guided());
+    CHECK(next_is_guided());
+    CHECK(next_is_guided());
+    guider.forget_light();
+  }
+}
+
 }  // namespace

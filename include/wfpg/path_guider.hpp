@@ -141,7 +141,8 @@ class path_guider {
     compare_anew();
   }
   /// Lights moved: the guide forgets all radiance that it learnt. Kept fields take up the change without
-  /// being cast anew. The next 32 samples are all recorded, as at the beginning. A guide that rests wakes up.
+  /// being cast anew. As at the beginning, the next unguided_samples are not guided, and the next 32 samples
+  /// are all recorded. A guide that rests wakes up.
   void forget_light() {
     guide_.forget_light(exec_);
     warm_up_end_ = samples_ - rests_.rested() + recording_needs::warm_up_samples;
@@ -263,11 +264,15 @@ class path_guider {
   std::uint64_t seed_of(std::uint32_t sample) const { return hash(options_.seed, sample); }
   /// Whether the guide takes part in a sample, counted from 1.
   bool is_guided(std::uint32_t sample) const {
-    return sample > options_.unguided_samples && !guide_.empty() && !rests_now_ &&
+    return age_of(sample) > options_.unguided_samples && !guide_.empty() && !rests_now_ &&
            !rests_.is_unguided(sample);
   }
   /// Number of a sample among those that the guide takes part in. Where it rests, that of the one before.
   std::uint32_t number_of(std::uint32_t sample) const { return sample - rests_.rested(); }
+  /// number_of() a sample, counted from the last forget_light() on.
+  std::uint32_t age_of(std::uint32_t sample) const {
+    return number_of(sample) + recording_needs::warm_up_samples - warm_up_end_;
+  }
   /// All samples of the warm-up, then one of every `sample_stride`, at random. A fixed one could fall in step
   /// with a period of the renderer's, such as that of its tiles. `sample`: its number_of().
   bool is_recorded(std::uint32_t sample) const {
@@ -278,8 +283,15 @@ class path_guider {
   sample_context<Exec> at(std::uint32_t sample) {
     // A sample that rests, and has not begun, is not counted yet.
     const std::uint32_t uncounted = rests_now_ && sample > samples_ ? 1 : 0;
-    return {exec_,  number_of(sample) - uncounted, seed_of(sample),         is_guided(sample), recorded_,
-            clock_, guided_paths(sample),          guided_paths(sample + 1)};
+    return {exec_,
+            number_of(sample) - uncounted,
+            age_of(sample) - uncounted,
+            seed_of(sample),
+            is_guided(sample),
+            recorded_,
+            clock_,
+            guided_paths(sample),
+            guided_paths(sample + 1)};
   }
   /// Paths that a sample guides, if it guides any.
   const recorded_runs& guided_paths(std::uint32_t sample) const {

@@ -95,7 +95,10 @@ struct kept_box {
         log(box.exec, noted) {}
 
   const Exec& exec() const { return box.exec; }
-  void begin() { store.begin_sample(exec(), ++sample); }
+  void begin() {
+    ++sample;
+    store.begin_sample(exec(), sample, sample);
+  }
   void end() { store.end_sample(exec()); }
 
   template <class Caster>

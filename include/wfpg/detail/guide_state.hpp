@@ -89,7 +89,8 @@ struct state_access {
     guider.samples_ = bytes.get<std::uint32_t>();
     bytes.require(guider.samples_ < 0x80000000u, "has samples without end");
     guider.warm_up_end_ = bytes.get<std::uint32_t>();
-    bytes.require(guider.warm_up_end_ <= guider.samples_ + recording_needs::warm_up_samples,
+    bytes.require(guider.warm_up_end_ >= recording_needs::warm_up_samples &&
+                      guider.warm_up_end_ <= guider.samples_ + recording_needs::warm_up_samples,
                   "warms up until after samples that are to come");
     take_rests(bytes, guider);
     guide_sections::take_build(bytes, guider.guide_);

@@ -55,6 +55,7 @@ struct sample_context {
   const Exec& exec;
   /// Number of the sample, counted from 1; 0 before the first. Samples that the guide rests in do not count.
   std::uint32_t number;
+  std::uint32_t age;   ///< `number` counted from the last forget_light() on, from 1; at most `number`
   std::uint64_t seed;  ///< random seed that differs between samples
   /// False: rays must sample their BSDFs alone. So in unguided samples, and from guided_depths on.
   bool guided;

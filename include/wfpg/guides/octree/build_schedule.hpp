@@ -24,7 +24,7 @@ struct build_schedule_constants {
   /// After bins were chosen anew, every wave builds for this many samples. 8: 1.289; 4: 1.282, with equal
   /// errors.
   static constexpr std::uint32_t busy_samples = 4;
-  /// After geometry moved, every wave builds for this many samples, as at the beginning.
+  /// After geometry or lights moved, every wave builds for this many samples, as at the beginning.
   static constexpr std::uint32_t invalidated_samples = 32;
   /// During warm-up a field is due once 1 / 8 of the samples passed since its last build, ...
   static constexpr std::uint32_t warm_up_builds = 8;
@@ -84,9 +84,11 @@ class build_schedule {
       stride_ *= 2;
   }
 
-  /// Begins a sample, counted from 1; its waves are numbered from 0.
-  void begin_sample(std::uint32_t sample) {
+  /// Begins a sample, counted from 1; its waves are numbered from 0. `light_age`: the sample's number since
+  /// light was last forgotten.
+  void begin_sample(std::uint32_t sample, std::uint32_t light_age) {
     sample_ = sample;
+    light_age_ = light_age;
     wave_ = 0;
   }
   /// Notes that the sample's rays are counted, if they are. Call it once a sample.
@@ -100,6 +102,8 @@ class build_schedule {
 
   /// The sample that has begun; 0 before the first.
   std::uint32_t sample() const { return sample_; }
+  /// Number of the sample since light was last forgotten, with this one.
+  std::uint32_t light_age() const { return light_age_; }
   /// Number of waves of the sample that have ended.
   std::uint32_t wave() const { return wave_; }
   /// Whether the next wave builds fields. After the busy samples, each depth builds in another sample.
@@ -141,13 +145,14 @@ class build_schedule {
     return counted <= sample && busy_until <= sample + constants::invalidated_samples && before <= sample;
   }
 
-  /// Whether a field is due in a sample. `builds`: how often it was built; 0 is always due. `last_built`:
-  /// sample of the last build, at most `sample`. A field is built once a sample at most.
-  WFPG_HD static bool is_due(std::uint32_t sample, std::uint32_t builds, std::uint32_t last_built) {
+  /// Whether a field is due in a sample of this light_age(). `builds`: how often it was built; 0 is always
+  /// due. `last_built`: sample of the last build, at most `sample`. A field is built once a sample at most.
+  WFPG_HD static bool is_due(std::uint32_t sample, std::uint32_t light_age, std::uint32_t builds,
+                             std::uint32_t last_built) {
     const std::uint64_t passed = sample - last_built;
     const std::uint64_t builds_a_doubling =
-        sample <= constants::warm_up_samples ? constants::warm_up_builds : constants::later_builds;
-    return builds == 0 || (passed >= 1 && builds_a_doubling * passed >= sample);
+        light_age <= constants::warm_up_samples ? constants::warm_up_builds : constants::later_builds;
+    return builds == 0 || (passed >= 1 && builds_a_doubling * passed >= light_age);
   }
 
   /// Returns the pressure on the size of bins, after a sample in which rays asked for `asked` fields. Bins
@@ -173,6 +178,7 @@ class build_schedule {
   using constants = build_schedule_constants;
 
   std::uint32_t sample_ = 0;
+  std::uint32_t light_age_ = 0;
   std::uint32_t wave_ = 0;
   std::uint32_t counted_ = 0;
   std::uint32_t stride_ = 1;

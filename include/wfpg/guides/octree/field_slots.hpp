@@ -33,8 +33,8 @@ struct field_slot {
   std::uint64_t origin = unpicked;
 
   /// Whether the field is due for its next build in `sample`: build_schedule::is_due().
-  WFPG_HD bool is_due(std::uint32_t sample) const {
-    return build_schedule::is_due(sample, builds, last_built);
+  WFPG_HD bool is_due(std::uint32_t sample, std::uint32_t light_age) const {
+    return build_schedule::is_due(sample, light_age, builds, last_built);
   }
 };
 

@@ -69,7 +69,9 @@ class field_store {
               communicator* ranks = nullptr, std::optional<std::size_t> own_rays = {});
 
   /// Begins a sample, counted from 1. Frees the slots that no ray used for idle_samples samples. O(slots).
-  void begin_sample(const Exec& exec, std::uint32_t sample);
+  /// `age`: the sample's number since light was last forgotten. Fields are due as in the sample of that
+  /// number.
+  void begin_sample(const Exec& exec, std::uint32_t sample, std::uint32_t age);
 
   /// Counts a wave's rays for bins, and guides none. For samples before guiding starts, so that bins are
   /// known then. `Rays`: (std::size_t) -> ray_to_bin, active for one path in
@@ -115,8 +117,12 @@ class field_store {
   /// rays. O(cells of fields used + values), and O(nodes) where bins are chosen.
   void end_sample(const Exec& exec, bool recorded = true, std::uint32_t log2_divisor = 0);
 
-  /// Forgets what fields learnt. Hits and distributions stay: a field changes when it is built next.
-  void forget(const Exec& exec) { pool_.forget(exec); }
+  /// Forgets what fields learnt. Hits stay, and each field is built anew from them when it is next used: the
+  /// next sample has the age 1.
+  void forget(const Exec& exec) {
+    schedule_.expect_builds(build_schedule_constants::invalidated_samples);
+    pool_.forget(exec);
+  }
 
   /// Call after geometry moved inside `bounds`, or light changed in a way that hits do not see. Fields that
   /// may see it cast all their cones when they are next used. Light that changes on surfaces needs no call.

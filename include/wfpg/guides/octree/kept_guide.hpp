@@ -73,7 +73,7 @@ class kept_guide : public octree_scene<Exec> {
 
   /// Call before the waves of a sample. Frees slots that are no longer used. O(slots).
   void begin_sample(const sample_context<Exec>& at) {
-    store_.begin_sample(at.exec, at.number);
+    store_.begin_sample(at.exec, at.number, at.age);
     scene::begin_scene_sample(at);
   }
   /// Finds, makes and refreshes the fields of a wave's rays. Returns the view that kernels sample from, valid

@@ -44,8 +44,8 @@ field_store<Exec>::field_store(const Exec& exec, const sparse_voxel_octree_view&
       counts_(exec, std::vector<field_wave_counts>(2)) {}
 
 template <class Exec>
-void field_store<Exec>::begin_sample(const Exec& exec, std::uint32_t sample) {
-  schedule_.begin_sample(sample);
+void field_store<Exec>::begin_sample(const Exec& exec, std::uint32_t sample, std::uint32_t age) {
+  schedule_.begin_sample(sample, age);
   adapted_ = false;
   table_.begin_sample(exec, pool_.fields(), counts(), sample, options_.idle_samples);
   schedule_.count_sample();  // last: a call that threw is made again
@@ -128,8 +128,8 @@ template <class Exec>
 template <class Surfaces>
 detail::find_field<wave_rays<Surfaces>> field_store<Exec>::finder(const kept_field_wave<Surfaces>& wave,
                                                                   detail::wanted_builds wanted_now) {
-  const detail::use_slot use{table_.view(), schedule_.sample(), wave.seed, wanted_now,
-                             table_.builds(counts())};
+  const detail::use_slot use{table_.view(), schedule_.sample(), schedule_.light_age(),
+                             wave.seed,     wanted_now,         table_.builds(counts())};
   return {rays_of(wave),   {counts(), wave.statistics},
           marks_.view(),   {tree_, use},
           table_.wanted(), schedule_.counted(wave.guided_paths.log2_divisor())};

@@ -38,6 +38,7 @@ enum class wanted_builds : std::uint32_t {
 struct use_slot {
   field_slots_view slots;
   std::uint32_t sample;
+  std::uint32_t light_age;  // build_schedule::light_age()
   std::uint64_t seed;
   wanted_builds wanted;
   build_list builds;
@@ -47,7 +48,7 @@ struct use_slot {
   WFPG_HD void operator()(std::uint32_t slot, const Number& number) const {
     if (atomic_load_cached(slots.noted + slot) != 0) return;
     field_slot& s = slots.slots[slot];
-    const bool is_due = s.is_due(sample);
+    const bool is_due = s.is_due(sample, light_age);
     if (atomic_load(&s.last_used) != sample) {
       atomic_store(&s.last_used, sample);
       if (!is_due) atomic_store(slots.noted + slot, std::uint8_t(1));
