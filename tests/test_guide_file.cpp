@@ -129,6 +129,20 @@ WFPG_TEST_CASE("fields that are refused, invalidated or dark continue bit for bi
   }
 }
 
+WFPG_TEST_CASE("a loaded guide aims cones at the same bright nodes", "[guide_file]") {
+  const Exec exec;
+  wfpg::kept_guide_options options = tracing_options(paths);
+  options.octree_resolution = 8;
+  wfpg::path_guider<Exec> first = trained(exec, options, 7);
+  wfpg::detail::bright_nodes<Exec> bright(exec);
+  bright.find(exec, first.guide().cache());
+  REQUIRE(wfpg::read_element(exec, bright.view().count) > 0);
+  wfpg::path_guider<Exec> second = loaded(exec, saved(first), options);
+  CHECK(trace_paths(exec, second, 1, paths, box_caster()) ==
+        trace_paths(exec, first, 1, paths, box_caster()));
+  CHECK((saved(first) == saved(second)));
+}
+
 WFPG_TEST_CASE("a loaded guide counts fields that wait for their cones", "[guide_file]") {
   const Exec exec;
   wfpg::kept_guide_options options = small_options();

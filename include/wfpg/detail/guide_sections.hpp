@@ -270,6 +270,7 @@ struct guide_sections {
     kept_state::restore_levels(exec, file.section("levels"), samples, guide.store_);
     kept_state::restore_fields(exec, file.section("fields"), guide.first_fraction(), guide.learns_fractions(),
                                guide.store_);
+    guide.store_.aim(exec, guide.cache());
   }
   /// Reads nothing: a transient_guide's file has no fields.
   template <class Exec>

@@ -66,6 +66,12 @@ class exitance_cache_view {
     return leaf.counts[side] ? static_cast<float>(leaf.means[side]) : -1.0f;
   }
 
+  /// Number of deposits that a leaf has received, on both sides. Precondition: the node is a leaf.
+  WFPG_HD std::uint64_t deposits(node_id leaf) const {
+    const detail::leaf_exitance& of_leaf = leaves_[leaf - tree_.first_leaf()];
+    return std::uint64_t(of_leaf.counts[0]) + of_leaf.counts[1];
+  }
+
   /// Outgoing radiance of a node's side, W/(m² sr). Where the side has no data, it is that of the first
   /// ancestor with data, on the side that matches; 0 where none has. There is no cosine: stored radiance does
   /// not depend on the view. Precondition: a node of the octree. O(depth), and one read where the side has

@@ -52,6 +52,13 @@ class cone_hit {
     const float value = word_ & escaped ? bits_float(word_ & ~escaped) : cache.read(word_ / 2, word_ % 2);
     return is_finite(value) ? min(value, 1.0e30f) : 0.0f;
   }
+  /// Returns this hit with a mark: the cone hit the bright node that it was aimed at. Environment and
+  /// darkness stay as they are. A marked hit has no radiance yet. Precondition: the surface's node < 2²⁹.
+  WFPG_HD cone_hit marked() const { return word_ & escaped ? *this : cone_hit(word_ | mark); }
+  /// Whether it has the mark of marked().
+  WFPG_HD bool is_marked() const { return (word_ & (escaped | mark)) == mark; }
+  /// Returns this hit without a mark.
+  WFPG_HD cone_hit unmarked() const { return is_marked() ? cone_hit(word_ & ~mark) : *this; }
   /// Whether this is a valid hit for an octree of `nodes` nodes. Checks hits that were read from a file,
   /// before a kernel reads the cache by them.
   bool is_sound(std::uint32_t nodes) const {
@@ -61,6 +68,7 @@ class cone_hit {
  private:
   // Marks an environment's radiance: the float's sign bit, which radiance does not need.
   static constexpr std::uint32_t escaped = 0x80000000u;
+  static constexpr std::uint32_t mark = 0x40000000u;
 
   WFPG_HD explicit cone_hit(std::uint32_t word) : word_(word) {}
 

@@ -7,7 +7,7 @@
 // Keeping fields and learning are wfpg's own.
 //
 // A sample:  begin_sample, then for each wave prepare, or find_and_sample where it would build none, then
-//   end_sample. Nothing is read back to the host with an inline caster.
+//   aim where the cache changed, then end_sample. Nothing is read back to the host with an inline caster.
 //
 // Cost of a wave of n rays: O(n · depth) look-ups. A new slot casts F² cones, and a refresh F²/R; either
 // takes O(F²). Memory: the budget, 4 bytes a ray, 8 bytes a leaf and 4 an inner node. Where fields learn, a
@@ -18,6 +18,7 @@
 #include <wfpg/guide/statistics.hpp>
 #include <wfpg/guides/octree/build_schedule.hpp>
 #include <wfpg/guides/octree/detail/bin_marks.hpp>
+#include <wfpg/guides/octree/detail/bright_nodes.hpp>
 #include <wfpg/guides/octree/detail/field_pool.hpp>
 #include <wfpg/guides/octree/detail/field_ranks.hpp>
 #include <wfpg/guides/octree/detail/rank_builds.hpp>
@@ -117,6 +118,9 @@ class field_store {
   /// rays. O(cells of fields used + values), and O(nodes) where bins are chosen.
   void end_sample(const Exec& exec, bool recorded = true, std::uint32_t log2_divisor = 0);
 
+  /// Call after the cache changed. Refreshes then aim cones at nodes that are far brighter in it than what
+  /// surrounds them. O(nodes of a level).
+  void aim(const Exec& exec, const exitance_cache_view& cache) { bright_.find(exec, cache); }
   /// Forgets what fields learnt. Hits stay, and each field is built anew from them when it is next used: the
   /// next sample has the age 1.
   void forget(const Exec& exec) {
@@ -151,7 +155,7 @@ class field_store {
   std::size_t level_bytes() const { return marks_.bytes(); }
   /// Bytes needed while a wave is in flight: 4 a ray, and counters.
   std::size_t wave_bytes() const {
-    return field_of_ray_.bytes() + counts_.bytes() + table_.state_bytes() + ranks_.bytes();
+    return field_of_ray_.bytes() + counts_.bytes() + table_.state_bytes() + ranks_.bytes() + bright_.bytes();
   }
   /// Bytes of the queue of values that one sample learns; 0 where fields do not learn.
   std::size_t value_bytes() const { return pool_.value_bytes(); }
@@ -208,6 +212,7 @@ class field_store {
   detail::slot_table<Exec> table_;
   detail::field_pool<Exec> pool_;
   detail::field_ranks<Exec> ranks_;
+  detail::bright_nodes<Exec> bright_;  // follows from the cache, so that files do not hold it
   buffer<std::uint32_t, Exec> field_of_ray_;
   buffer<field_wave_counts, Exec> counts_;
   bool in_wave_ = false;            // also after one whose caster threw

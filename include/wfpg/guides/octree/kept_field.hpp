@@ -1,8 +1,10 @@
 // Builds one kept field: chooses which of its cells are cast, stores what they hit, and makes the
 // distribution. field_store.hpp launches these kernels.
 //
-// Source: fields are those of Yalciner and Akyuz (2024), section 3.3. Partial refreshes and learning are
-// wfpg's own.
+// Refreshes aim some of their cones at bright nodes, such as small lamps (detail/aimed_cones.hpp).
+//
+// Source: fields are those of Yalciner and Akyuz (2024), section 3.3. Partial refreshes, learning and aimed
+// cones are wfpg's own.
 //
 // Cost: F^2 cones for a new field and about F^2/R for a refresh; O(F^2) for either. Memory: none of its own.
 #pragma once
@@ -10,6 +12,7 @@
 #include <wfpg/exec/support/atomic.hpp>
 #include <wfpg/exec/support/running_mean.hpp>
 #include <wfpg/guide/statistics.hpp>
+#include <wfpg/guides/octree/detail/aimed_cones.hpp>
 #include <wfpg/guides/octree/detail/shared_origins.hpp>
 #include <wfpg/guides/octree/field_cells.hpp>
 #include <wfpg/guides/octree/field_slots.hpp>
@@ -54,6 +57,7 @@ struct kept_fields_view {
   std::uint32_t sample;                 ///< current sample, from 1
   std::uint64_t* refreshed;             ///< counter of refreshes: builds that cast a part of the cells
   detail::shared_origins origins = {};  ///< where builds start, with ranks
+  detail::bright_nodes_view bright = {};  ///< that refreshes aim cones at
 };
 
 /// Builds the fields of slots for a wave's rays. `Wave`: kept_field_wave.
@@ -72,6 +76,29 @@ struct kept_field_builder {
     if (whole) return cell_in_order(cone, kept.resolution);
     return cell_at(refreshed_cell(cone, kept.slots.slots[slot].builds, kept.resolution, kept.recast),
                    kept.resolution);
+  }
+
+  /// Returns cone number `number` of a build: that of cell(), or one that is aimed at a bright node.
+  ///
+  /// A run of cells that has bright nodes has an aimed cone in every second refresh, at each node in turn.
+  /// The other refreshes go on through its cells, at half the pace. Other runs are as if there were no such
+  /// nodes. `aimed`: of this build. O(listed nodes).
+  WFPG_HD detail::aimed_cone cone(std::uint32_t slot, bool whole, std::uint32_t number,
+                                  const detail::aimed_cells& aimed) const {
+    return aimed.empty() ? detail::aimed_cone{cell(slot, whole, number)} : cone_of_run(slot, number, aimed);
+  }
+  /// Stores what a cone found in the cell that it looked through. A cone that hit its bright node counts as
+  /// paths that found light, too. `found`: what aimed_cells::find() returned.
+  ///
+  /// A refresh has at most one cone in each cell, so that threads write to different cells. O(listed nodes)
+  /// for such a cone, and O(1) for others.
+  WFPG_HD void store(std::uint32_t slot, const field_cells& cells, const detail::aimed_cells& aimed,
+                     const detail::aimed_cone& cone, cone_hit found) const {
+    const std::size_t cell =
+        std::size_t(slot) * kept.resolution * kept.resolution + cone.cell.index(kept.resolution);
+    kept.hits[cell] = found.unmarked();
+    // A whole field has no aimed cones: its means are forgotten after this.
+    if (found.is_marked() && kept.learnt) learn(cell, cells, aimed, cone);
   }
 
   /// Returns where the cones of a build start. They start at the surface of the ray that the wave picked for
@@ -132,6 +159,26 @@ struct kept_field_builder {
   WFPG_HD std::uint32_t seed_of(std::uint32_t key) const {
     return static_cast<std::uint32_t>(hash(wave.seed, key));
   }
+  // A cone of a refresh where bright nodes are listed: cone(). It is a function of its own, so that builds
+  // without bright nodes stay as short as they were.
+  WFPG_HD detail::aimed_cone cone_of_run(std::uint32_t slot, std::uint32_t number,
+                                         const detail::aimed_cells& aimed) const {
+    const std::uint32_t begin = number * kept.recast, end = begin + kept.recast;
+    const std::uint32_t n = aimed.count(begin, end);
+    if (n == 0) return {cell(slot, false, number)};
+    const std::uint32_t builds = kept.slots.slots[slot].builds;
+    if ((builds + number) % 2 == 0) return aimed.at(builds / 2 % n, begin, end, kept.resolution);
+    return {cell_at(refreshed_cell(number, builds / 2, kept.resolution, kept.recast), kept.resolution)};
+  }
+  // Adds what a cone at a bright node found to the mean of a cell of the pool. Its radiance is the larger of
+  // the cell's mean in the cache, and of the root of the mean square that the bright nodes make.
+  WFPG_HD void learn(std::size_t cell, const field_cells& cells, const detail::aimed_cells& aimed,
+                     const detail::aimed_cone& cone) const {
+    const float radiance =
+        max(kept.hits[cell].radiance(wave.cache), aimed.guiding_radiance(wave.cache, cells, cone));
+    kept.learnt[cell].add(double(radiance) * detail::aimed_cells::paths, detail::aimed_cells::paths,
+                          hash32(cells.origin.seed, static_cast<std::uint32_t>(cell)));
+  }
   /// Radiance of one cell of the pool, `cell` = slot * F² + row-major index. The cone counts as
   /// `cone_samples` values beside the learnt ones.
   WFPG_HD float radiance_of(std::size_t cell, bool whole) const {
@@ -156,6 +203,11 @@ struct kept_field_builder {
   }
 };
 
+/// Bytes of scratch memory that a block of `warps` warps needs to build a kept field.
+inline std::size_t kept_scratch_bytes(std::uint32_t resolution, int warps) {
+  return field_scratch_bytes(resolution, warps) + detail::aimed_cells::scratch_bytes;
+}
+
 /// Kernel: casts the cones of listed slots, and finishes their fields. One block builds one slot.
 ///   Builder  kept_field_builder
 ///   Hits     (std::size_t i, std::uint32_t cone, const ray&, float solid_angle) -> ray_hit
@@ -173,14 +225,14 @@ struct build_kept_fields {
   WFPG_HD void operator()(Block& block, std::size_t i) const {
     const std::uint32_t slot = list[i];
     const field_cells cells = builder.cells(slot, whole);
-    const std::uint32_t n = builder.kept.resolution * builder.kept.resolution;
-    cone_hit* const kept = builder.kept.hits + std::size_t(slot) * n;
+    const detail::aimed_cells aimed(block, builder.kept.bright, cells, !whole);
     const float solid_angle = cells.domain.cell_solid_angle();
     block.for_each(static_cast<int>(builder.cone_count(whole)), [&](int c) {
-      const auto cone = static_cast<std::uint32_t>(c);
-      const field_cell cell = builder.cell(slot, whole, cone);
-      const ray r = cells.cone(cell);
-      kept[cell.index(cells.resolution)] = cells.find(builder.wave.cache, r, hits(i, cone, r, solid_angle));
+      const auto number = static_cast<std::uint32_t>(c);
+      const detail::aimed_cone cone = builder.cone(slot, whole, number, aimed);
+      const ray r = aimed.path(cells, cone);
+      const ray_hit hit = hits(i, number, r, solid_angle);
+      builder.store(slot, cells, aimed, cone, aimed.find(builder.wave.cache, cells, cone, r, hit));
     });
     block.sync();
     builder.finish(block, slot, cells, whole);
@@ -218,10 +270,11 @@ struct write_kept_cones {
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t i) const {
     const field_cells cells = builder.cells(list[i], whole);
+    const detail::aimed_cells aimed(block, builder.kept.bright, cells, !whole);
     const std::uint32_t n = builder.cone_count(whole);
     block.for_each(static_cast<int>(n), [&](int c) {
-      const auto cone = static_cast<std::uint32_t>(c);
-      cones[i * n + cone] = cells.cone(builder.cell(list[i], whole, cone));
+      const auto number = static_cast<std::uint32_t>(c);
+      cones[i * n + number] = aimed.path(cells, builder.cone(list[i], whole, number, aimed));
     });
   }
 };

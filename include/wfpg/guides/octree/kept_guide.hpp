@@ -106,6 +106,7 @@ class kept_guide : public octree_scene<Exec> {
   /// nodes + cells of the fields used).
   void update(const sample_context<Exec>& at) {
     const bool recorded = scene::update_cache(at);
+    if (recorded) store_.aim(at.exec, scene::cache());
     store_.end_sample(at.exec, recorded, at.guided_next.log2_divisor());
     scene::end_scene_sample(at);
   }
@@ -119,6 +120,7 @@ class kept_guide : public octree_scene<Exec> {
   void forget_light(const Exec& exec) {
     scene::forget_scene_light(exec);
     store_.forget(exec);
+    store_.aim(exec, scene::cache());
   }
 
   /// Where a host's kernels record what their directions found, without the recorder. Empty where fields do

@@ -40,6 +40,7 @@ field_store<Exec>::field_store(const Exec& exec, const sparse_voxel_octree_view&
              tree.empty() ? 0 : options.budget_bytes / bytes_a_slot(options.resolution, options_.learn)),
       pool_(exec, table_.size(), options_.resolution, options_.learn ? max_values : 0, ranks),
       ranks_(exec, table_.size(), options_.learn, ranks),
+      bright_(exec),
       field_of_ray_(exec, own_rays.value_or(max_rays)),
       counts_(exec, std::vector<field_wave_counts>(2)) {}
 
@@ -89,7 +90,8 @@ guide_view field_store<Exec>::prepare(const Exec& exec, const kept_field_wave<Su
                               options_.recast,
                               schedule_.sample(),
                               &table_.state()->refreshed,
-                              ranks_.origins()};
+                              ranks_.origins(),
+                              bright_.view()};
   if (builds_in_wave()) {
     const kept_field_builder<kept_field_wave<Surfaces>> builder{wave, kept};
     if (ranks_) {
@@ -165,7 +167,7 @@ void field_store<Exec>::build(const Exec& exec, const Builder& builder, const Ca
   if constexpr (is_inline_caster_v<Caster>) {
     using build_type = build_kept_fields<Builder, inline_hits<Caster>>;
     exec.for_each_block(exec::device_count{&counts()->builds, table_.size()},
-                        field_scratch_bytes(options_.resolution, Exec::warps_per_block),
+                        kept_scratch_bytes(options_.resolution, Exec::warps_per_block),
                         build_listed_fields<build_type>{{builder, {caster}, table_.listed(true), true},
                                                         {builder, {caster}, table_.listed(false), false},
                                                         counts()});
@@ -193,7 +195,7 @@ void field_store<Exec>::build_of_ranks(const Exec& exec, const Builder& builder,
     cast_part(exec, builder, caster, buffer_bytes, whole, found.data() + (whole ? 0 : of_wholes));
   ranks_.share_hits(found);
   for (const bool whole : {true, false})
-    exec.for_each_block(ranks_.builds(whole), field_scratch_bytes(options_.resolution, Exec::warps_per_block),
+    exec.for_each_block(ranks_.builds(whole), kept_scratch_bytes(options_.resolution, Exec::warps_per_block),
                         detail::finish_listed_fields<Builder>{builder, table_.listed(whole), whole,
                                                               found.data() + (whole ? 0 : of_wholes)});
 }
@@ -210,7 +212,8 @@ void field_store<Exec>::cast_part(const Exec& exec, const Builder& builder, cons
   if (n == 0) return;
   if constexpr (is_inline_caster_v<Caster>) {
     exec.for_each_block(
-        n, 0, detail::cast_listed_cones<Builder, inline_hits<Caster>>{builder, {caster}, list, whole, found});
+        n, detail::aimed_cells::scratch_bytes,
+        detail::cast_listed_cones<Builder, inline_hits<Caster>>{builder, {caster}, list, whole, found});
   } else {
     const std::size_t room = max<std::size_t>(cells, buffer_bytes / (sizeof(ray) + sizeof(ray_hit)));
     const buffer<ray, Exec> cones(exec, min(room, n * cells));
@@ -218,11 +221,12 @@ void field_store<Exec>::cast_part(const Exec& exec, const Builder& builder, cons
     cast_in_batches(
         exec, caster, n, cells, cones.view(), hits.view(),
         [&](std::size_t begin, std::size_t count, array_view<ray> to) {
-          exec.for_each_block(count, 0, write_kept_cones<Builder>{builder, to, list + begin, whole});
+          exec.for_each_block(count, detail::aimed_cells::scratch_bytes,
+                              write_kept_cones<Builder>{builder, to, list + begin, whole});
         },
         [&](std::size_t begin, std::size_t count, array_view<ray_hit> from) {
           const stored_hits stored{from, 0, cells};
-          exec.for_each_block(count, 0,
+          exec.for_each_block(count, detail::aimed_cells::scratch_bytes,
                               detail::cast_listed_cones<Builder, stored_hits>{builder, stored, list + begin,
                                                                               whole, found + begin * cells});
         });
@@ -240,11 +244,12 @@ void field_store<Exec>::build_batches(const Exec& exec, const Builder& builder, 
   cast_in_batches(
       exec, caster, count, cones_a_field, cones, hits,
       [&](std::size_t first, std::size_t n, array_view<ray> to) {
-        exec.for_each_block(n, 0, write_kept_cones<Builder>{builder, to, list + first, whole});
+        exec.for_each_block(n, detail::aimed_cells::scratch_bytes,
+                            write_kept_cones<Builder>{builder, to, list + first, whole});
       },
       [&](std::size_t first, std::size_t n, array_view<ray_hit> from) {
         const stored_hits found{from, 0, cones_a_field};
-        exec.for_each_block(n, field_scratch_bytes(options_.resolution, Exec::warps_per_block),
+        exec.for_each_block(n, kept_scratch_bytes(options_.resolution, Exec::warps_per_block),
                             build_kept_fields<Builder, stored_hits>{builder, found, list + first, whole});
       });
 }

@@ -21,11 +21,14 @@ struct cast_listed_cones {
   WFPG_HD void operator()(Block& block, std::size_t i) const {
     const std::uint32_t slot = list[i], n = builder.cone_count(whole);
     const field_cells cells = builder.cells(slot, whole);
+    const aimed_cells aimed(block, builder.kept.bright, cells, !whole);
     const float solid_angle = cells.domain.cell_solid_angle();
     block.for_each(static_cast<int>(n), [&](int c) {
-      const auto cone = static_cast<std::uint32_t>(c);
-      const ray r = cells.cone(builder.cell(slot, whole, cone));
-      found[i * n + cone] = cells.find(builder.wave.cache, r, hits(i, cone, r, solid_angle));
+      const auto number = static_cast<std::uint32_t>(c);
+      const aimed_cone cone = builder.cone(slot, whole, number, aimed);
+      const ray r = aimed.path(cells, cone);
+      const ray_hit hit = hits(i, number, r, solid_angle);
+      found[i * n + number] = aimed.find(builder.wave.cache, cells, cone, r, hit);
     });
   }
 };
@@ -41,12 +44,11 @@ struct finish_listed_fields {
   template <class Block>
   WFPG_HD void operator()(Block& block, std::size_t i) const {
     const std::uint32_t slot = list[i], n = builder.cone_count(whole);
-    const std::uint32_t size = builder.kept.resolution;
     const field_cells cells = builder.cells(slot, whole);
-    cone_hit* const kept = builder.kept.hits + std::size_t(slot) * size * size;
+    const aimed_cells aimed(block, builder.kept.bright, cells, !whole);
     block.for_each(static_cast<int>(n), [&](int c) {
-      const auto cone = static_cast<std::uint32_t>(c);
-      kept[builder.cell(slot, whole, cone).index(size)] = found[i * n + cone];
+      const auto number = static_cast<std::uint32_t>(c);
+      builder.store(slot, cells, aimed, builder.cone(slot, whole, number, aimed), found[i * n + number]);
     });
     block.sync();
     builder.finish(block, slot, cells, whole);

@@ -1,0 +1,191 @@
+// Lists the nodes of the octree that are far brighter than what surrounds them, such as small lamps.
+// Refreshes of kept fields aim cones at them (aimed_cones.hpp).
+//
+// The list is a function of the exitance cache alone. Ranks with equal caches have equal lists, and guide
+// files need not hold it. wfpg's own.
+//
+// Cost: O(nodes of level 5) each time the cache changes. Nothing is read back to the host. Memory: 2.3 KB.
+#pragma once
+
+#include <wfpg/exec/buffer.hpp>
+#include <wfpg/exec/support/atomic.hpp>
+#include <wfpg/octree/exitance_cache.hpp>
+
+#include <vector>
+
+namespace wfpg::detail {
+
+/// Constants of the list. Measured in wfpg-room (docs/ablations.md).
+struct bright_node_constants {
+  /// Nodes of this level are compared, or leaves where these are less deep. 6: a 64th of the scene's side.
+  static constexpr std::uint32_t level = 6;
+  /// A node is compared with its ancestor this many levels up, which has about 64 such nodes of a surface.
+  static constexpr std::uint32_t levels_up = 3;
+  /// Radiance of a bright node over that ancestor's, at least.
+  static constexpr float over_surroundings = 4.0f;
+  /// Radiance of a bright node over the scene's mean, at least. Rooms with one broad lamp then list nothing.
+  static constexpr float over_scene = 32.0f;
+  /// Deposits that a node needs, and 64 times as many its ancestor. With fewer, either may be bright or dark
+  /// by chance.
+  static constexpr std::uint32_t deposits = 64;
+  /// Nodes in the list, at most.
+  static constexpr std::uint32_t most = 64;
+};
+
+/// A bright side of a node.
+struct bright_side {
+  vec3 position;     // world space: middle of its brightest leaf, where cones are aimed
+  std::uint32_t id;  // 2 node + side
+  vec3 normal;       // of the side, unit length
+};
+
+/// The list as kernels see it. Trivially copyable. Empty by default.
+struct bright_nodes_view {
+  const bright_side* sides = nullptr;    // the brightest first
+  const std::uint32_t* count = nullptr;  // number of them, at most bright_node_constants::most
+
+  /// Number of sides in the list.
+  WFPG_HD std::uint32_t size() const { return count ? *count : 0; }
+};
+
+/// Kernel: offers both sides of a node's children to the list. A side belongs to one of `most` buckets, which
+/// keeps the brightest: the same one in any order of threads.
+struct offer_bright_sides {
+  using constants = bright_node_constants;
+  static constexpr std::uint64_t none = ~std::uint64_t(0);
+
+  exitance_cache_view cache;
+  node_id first;           // of the level above
+  std::uint64_t* buckets;  // inverted radiance above the side's id; the least number wins
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const node_id parent = first + static_cast<node_id>(i);
+    const float least = constants::over_scene * max(max(cache.radiance(0, 0), cache.radiance(0, 1)), 0.0f);
+    // A parent is the mean of at most eight children. Nearly all have no bright one.
+    if (!(8.0f * max(cache.radiance(parent, 0), cache.radiance(parent, 1)) > least)) return;
+    const node_id child = cache.octree().first_child(parent);
+    for (std::uint32_t k = 0; k < 2 * cache.octree().child_count(parent); ++k)
+      offer(child + k / 2, k % 2, least);
+  }
+
+ private:
+  WFPG_HD void offer(node_id node, std::uint32_t side, float least) const {
+    const float radiance = cache.radiance(node, side);
+    if (!(radiance > least) || !is_finite(radiance)) return;
+    const node_side around = surroundings(node, side);
+    const float of_surroundings = max(cache.radiance(around.node, around.side), 0.0f);
+    if (!(radiance > constants::over_surroundings * of_surroundings)) return;
+    if (!has_deposits(node, constants::deposits)) return;
+    if (!has_deposits(around.node, constants::deposits << 2 * constants::levels_up)) return;
+    const std::uint32_t id = 2 * node + side;
+    atomic_min(buckets + hash32(0, id) % constants::most, std::uint64_t(~float_bits(radiance)) << 32 | id);
+  }
+
+  struct node_side {
+    node_id node;
+    std::uint32_t side;
+  };
+
+  // The ancestor that a node is compared with, and its side that faces as `side` of the node does.
+  WFPG_HD node_side surroundings(node_id node, std::uint32_t side) const {
+    const sparse_voxel_octree_view& tree = cache.octree();
+    for (std::uint32_t i = 0; i < constants::levels_up; ++i) {
+      const node_id up = tree.parent(node);
+      side = cache.matching_side(up, node - tree.first_child(up), side);
+      node = up;
+    }
+    return {node, side};
+  }
+  // Whether the leaves of a node have `wanted` deposits, on both sides together. Looks at no more leaves than
+  // that.
+  WFPG_HD bool has_deposits(node_id node, std::uint32_t wanted) const {
+    const sparse_voxel_octree_view& tree = cache.octree();
+    node_id leaf = node, last = node;
+    while (!tree.is_leaf(leaf)) {
+      leaf = tree.first_child(leaf);
+      last = tree.first_child(last) + tree.child_count(last) - 1;
+    }
+    last = min(last, leaf + wanted - 1);
+    std::uint64_t n = 0;
+    for (; leaf <= last && n < wanted; ++leaf) n += cache.deposits(leaf);
+    return n >= wanted;
+  }
+};
+
+/// Kernel: sorts what the buckets hold into the list. One call a bucket.
+struct list_bright_sides {
+  exitance_cache_view cache;
+  const std::uint64_t* buckets;
+  bright_side* sides;
+  std::uint32_t* count;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    std::uint32_t before = 0, all = 0;
+    for (std::uint32_t k = 0; k < bright_node_constants::most; ++k) {
+      before += buckets[k] < buckets[i] ? 1u : 0u;
+      all += buckets[k] != offer_bright_sides::none ? 1u : 0u;
+    }
+    if (i == 0) *count = all;
+    if (buckets[i] != offer_bright_sides::none)
+      sides[before] = described(static_cast<std::uint32_t>(buckets[i]));
+  }
+
+ private:
+  // Finds the brightest leaf of a side, child by child.
+  WFPG_HD bright_side described(std::uint32_t id) const {
+    const sparse_voxel_octree_view& tree = cache.octree();
+    node_id node = id / 2;
+    std::uint32_t side = id % 2;
+    const vec3 normal = side == 0 ? cache.normal(node) : -cache.normal(node);
+    while (!tree.is_leaf(node)) {
+      const node_id first = tree.first_child(node);
+      std::uint32_t brightest = 0;
+      float most = -2.0f;  // less than a child without data has
+      for (std::uint32_t c = 0; c < tree.child_count(node); ++c) {
+        const float radiance = cache.radiance(first + c, cache.matching_side(node, c, side));
+        if (radiance > most) brightest = c;
+        most = max(most, radiance);
+      }
+      side = cache.matching_side(node, brightest, side);
+      node = first + brightest;
+    }
+    return {tree.centre(node), id, normal};
+  }
+};
+
+/// Owns the list, in the memory of `Exec`.
+template <class Exec>
+class bright_nodes {
+  using constants = bright_node_constants;
+
+ public:
+  /// Without memory; may only be assigned to.
+  bright_nodes() = default;
+  /// Makes an empty list.
+  explicit bright_nodes(const Exec& exec)
+      : buckets_(exec, constants::most),
+        sides_(exec, constants::most),
+        count_(exec, std::vector<std::uint32_t>(1)) {}
+
+  /// Lists the bright nodes of a cache. Stays empty where the octree has fewer than `levels_up` levels below
+  /// the root.
+  void find(const Exec& exec, const exitance_cache_view& cache) {
+    const sparse_voxel_octree_view& tree = cache.octree();
+    if (tree.empty() || tree.depth() < constants::levels_up) return;
+    const std::uint32_t level = min(tree.depth(), constants::level);
+    exec.fill_bytes(buckets_.data(), 0xff, buckets_.bytes());  // offer_bright_sides::none
+    const node_id above = tree.level_begin(level - 1);
+    exec.for_each(tree.level_size(level - 1), offer_bright_sides{cache, above, buckets_.data()});
+    exec.for_each(constants::most, list_bright_sides{cache, buckets_.data(), sides_.data(), count_.data()});
+  }
+
+  bright_nodes_view view() const { return {sides_.data(), count_.data()}; }
+  std::size_t bytes() const { return buckets_.bytes() + sides_.bytes() + count_.bytes(); }
+
+ private:
+  buffer<std::uint64_t, Exec> buckets_;
+  buffer<bright_side, Exec> sides_;
+  buffer<std::uint32_t, Exec> count_;
+};
+
+}  // namespace wfpg::detail
