@@ -3,9 +3,12 @@ from typing import Any, Dict, List
 
 from blocks import Results, Rows, block, three
 
-ROOM, FRACTIONS, TUNING = "room.json", "fractions.json", "tuning.json"
+ROOM, MORE, AIMED = "room.json", "room-64.json", "aimed-cones.json"
+FRACTIONS, TUNING = "fractions.json", "tuning.json"
+UNAIMED = "without_aimed_cones"
 DESIGNS = {
-    "cosine": "cosine alone", "wfpg": "wfpg's fields", "openpgl-pavmm": "Open PGL 0.7.1, parallax-aware mixtures",
+    "cosine": "cosine alone", "wfpg": "wfpg's fields", "unaimed": "wfpg's fields, without aimed cones",
+    "openpgl-pavmm": "Open PGL 0.7.1, parallax-aware mixtures",
     "openpgl-quadtree": "Open PGL 0.7.1, quadtrees", "recorded-grid-mean": "paths: grid", "recorded-quadtree-mean": "paths: quadtree",
     "recorded-caps-mean": "paths: caps", "cache-grid-mean": "cache: grid", "cache-grid-rms": "cache: grid, roots",
     "exact-grid-mean": "exact: grid", "exact-grid-rms": "exact: grid, roots", "exact-blocks-mean": "exact: blocks",
@@ -20,15 +23,47 @@ def variance(found: Dict[str, float]) -> str:
 @block
 def room(results: Results) -> Rows:
     """Variance of designs in a room of known light."""
-    methods = results.json(ROOM, "methods")
+    methods = dict(results.json(ROOM, "methods"), unaimed=results.json(ROOM, UNAIMED, "methods", "wfpg"))
     rows = [["design", "half and half with a cosine", "alone"]]
-    return rows + [[name, variance(methods[m]["half"]), variance(methods[m]["alone"])] for m, name in DESIGNS.items()]
+    for method, name in DESIGNS.items():
+        rows.append([name, variance(methods[method]["half"]), variance(methods[method]["alone"])])
+    return rows
+
+
+@block
+def room_aimed(results: Results) -> str:
+    """Mean variance of fields with aimed cones over that without, half and half."""
+    before, after = (results.json(ROOM, *keys, "methods", "wfpg", "half", "mean") for keys in ((UNAIMED,), ()))
+    return f"{after / before:.2f}"
+
+
+@block
+def room_more_unaimed(results: Results) -> str:
+    """Variance of fields without aimed cones after four times the samples, half and half."""
+    return variance(results.json(MORE, UNAIMED, "methods", "wfpg", "half"))
+
+
+@block
+def aimed_cones(results: Results) -> Rows:
+    """Variance in the room by what an aimed cone does."""
+    rows = [["what an aimed cone does", "half and half"]]
+    return rows + [[name, variance(found)] for name, found in results.json(AIMED, "room").items()]
+
+
+@block
+def aimed_pictures(results: Results, scene: str, spp: str, seeds: str) -> str:
+    """Variance of pictures with aimed cones over that without."""
+    rows = [row for row in results.json(AIMED, "pictures", "mse_reinhard")
+            if (row["scene"], row["spp"], row["seeds"]) == (scene, int(spp), int(seeds))]
+    if len(rows) != 1:
+        raise KeyError(f"{AIMED} has {len(rows)} pictures of {scene}")
+    return f"{rows[0]['aimed'] / rows[0]['before']:.3f} times"
 
 
 @block
 def room_more(results: Results, method: str) -> str:
     """Variance half and half after four times the samples."""
-    return variance(results.json("room-64.json", "methods", method, "half"))
+    return variance(results.json(MORE, "methods", method, "half"))
 
 
 @block
