@@ -120,9 +120,9 @@ class sparse_voxel_octree_view {
     }
     return node;
   }
-  /// Node of a level, at most depth(), that holds a world-space point. Where there is none, it is the ancestor
-  /// of nearest_leaf(), or invalid_node. O(level): most empty voxels beside a surface have a node on the
-  /// levels above.
+  /// Node of a level, at most depth(), that holds a world-space point. Where there is none, it is the
+  /// ancestor of nearest_leaf(), or invalid_node. O(level): most empty voxels beside a surface have a node on
+  /// the levels above.
   WFPG_HD node_id nearest_node(vec3 p, std::uint32_t level) const {
     uvec3 voxel;
     const node_id here = grid_.voxel_of(p, voxel) ? node_at(voxel, level) : invalid_node;
