@@ -292,7 +292,10 @@ WFPG_TEST_CASE("irradiance records: they are built before the first guided wave 
   exec.copy_from_host(mesh.emitters.data(), lamp.data(), mesh.emitters.bytes());
   CHECK(everything(exec, view, places) == first);
   guider.forget_light();
+  begin_with_wave(exec, guider, walled_box_caster());  // not guided, as the first sample
+  CHECK(guider.guide().statistics().builds == 2);
   begin_with_wave(exec, guider, walled_box_caster());
+  CHECK(guider.guide().statistics().builds == 3);
   const std::vector<vec3> floors{{0.3f, 0.0f, 0.5f}, {0.8f, 0.0f, 0.5f}};
   const auto tags = evaluate(exec, floors, tag_at{view});
   CHECK(tags[0] == voxel_tag::object);

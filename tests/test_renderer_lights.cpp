@@ -4,6 +4,7 @@
 #include "scene/alias_table.hpp"
 #include "scene/builtin_scenes.hpp"
 #include "support/catch.hpp"
+#include "tracer/path_kernels.hpp"
 #include "tracer/rng.hpp"
 
 #include <wfpg/exec/seq.hpp>
@@ -238,6 +239,11 @@ TEST_CASE("choices of groups change the lights' densities, not their radiance", 
     }
   });
   CHECK(found == Approx(expected).epsilon(0.02));
+  // In a sample without a guide, groups are chosen by power.
+  const path_lights without_guide{geometry.view(), parts.view()};
+  const double by_power = irradiance(
+      parts, [&](std::uint32_t i) { return without_guide.choose(path_vertex{}, numbers(i, 20).x); });
+  CHECK(by_power == Approx(expected).epsilon(0.02));
 }
 
 namespace {

@@ -161,10 +161,10 @@ guiding_gain noisy_gain_of(double value, double noise) {
 
 TEST_CASE("rest: in noise less is asked for than of typical paths, but no less than guiding costs",
           "[rest]") {
-  const auto taken_part = [](float least_gain, double gain) {
+  const auto taken_part = [](float least_gain, double gain, std::uint32_t sample = 16) {
     rest_schedule schedule(least_gain, 1);
-    schedule.decide(4, noisy_gain_of(gain, 10.0));
-    return schedule.resting() ? 0 : schedule.probes(5) ? 1 : 2;
+    schedule.decide(sample, noisy_gain_of(gain, 10.0));
+    return schedule.resting() ? 0 : schedule.probes(sample + 1) ? 1 : 2;
   };
   for (const auto& [least_gain, enough] : std::vector<std::pair<float, double>>{
            {1.1f, 0.95}, {1.25f, 0.95}, {1.5f, 1.2}, {1.7f, 1.4}, {2.5f, 1.4}}) {
@@ -173,6 +173,9 @@ TEST_CASE("rest: in noise less is asked for than of typical paths, but no less t
     CHECK(taken_part(least_gain, enough - 0.01) == 1);
     CHECK(taken_part(least_gain, enough - 0.06) == 0);
   }
+  // At first guides still learn: in noise no more is asked for than of typical paths.
+  CHECK(taken_part(1.5f, 1.13, 4) == 1);
+  CHECK(taken_part(1.5f, 1.12, 4) == 0);
 }
 
 TEST_CASE("rest: where few paths find light, a gain of about 1 is enough to go on", "[rest]") {

@@ -110,6 +110,29 @@ WFPG_TEST_CASE("check_surfaces: correct surfaces of a wave pass, and the first w
   check_names(report(), {"ray 90", "outgoing is (2, 2, 2)", "length 3.464"});
 }
 
+/// Surfaces whose path() is right for all rays but one.
+struct surfaces_with_paths {
+  stored_surfaces stored;
+  std::uint32_t wrong;
+  WFPG_HD test_surface operator()(std::uint32_t ray) const {
+    test_surface s = stored(ray);
+    s.path = 2 * ray;
+    return s;
+  }
+  WFPG_HD std::uint32_t path(std::uint32_t ray) const { return 2 * ray + (ray == wrong ? 1u : 0u); }
+};
+
+WFPG_TEST_CASE("check_surfaces: path() has to agree with the surface's path", "[testing]") {
+  const Exec exec;
+  const auto tree = box_octree(exec, 32);
+  const std::vector<test_surface> host = wall_surfaces(200, 4);
+  const wfpg::buffer<test_surface, Exec> device(exec, host);
+  const stored_surfaces stored{const_view<test_surface>(device)};
+  check_passes(check_surfaces(exec, surfaces_with_paths{stored, 200}, host.size(), tree.view()));
+  check_names(check_surfaces(exec, surfaces_with_paths{stored, 20}, host.size(), tree.view()),
+              {"ray 20", "path() is 41, expected surface::path, 40"});
+}
+
 }  // namespace
 
 TEST_CASE("check_ray_caster: each fault is found and named", "[testing]") {

@@ -142,7 +142,8 @@ class path_guider {
   }
   /// Lights moved: the guide forgets all radiance that it learnt. Kept fields take up the change without
   /// being cast anew. As at the beginning, the next unguided_samples are not guided, and the next 32 samples
-  /// are all recorded. A guide that rests wakes up.
+  /// are all recorded. A guide that rests wakes up. A host that calls it after each sample guides none, since
+  /// nothing is known.
   void forget_light() {
     guide_.forget_light(exec_);
     warm_up_end_ = samples_ - rests_.rested() + recording_needs::warm_up_samples;
@@ -164,11 +165,13 @@ class path_guider {
       return no_path_recorder{};
   }
   /// Returns the view that chooses lights for next-event estimation, valid for the current sample. A
-  /// light_guide_view, or no_light_choices for a guide that does not choose lights. The view is empty where
-  /// choices rest with the guide, since they gain little: rest_constants::light_gain.
+  /// light_guide_view, or no_light_choices for a guide that does not choose lights. Choices are by weight
+  /// alone where they rest with the guide, since they gain little: rest_constants::light_gain.
   auto lights() const {
-    const auto view = guide_.lights();
-    return lights_rest_now_ ? decltype(guide_.lights()){} : view;
+    if constexpr (Guide::measures_gain)
+      return lights_rest_now_ ? guide_.resting_lights() : guide_.lights();
+    else
+      return guide_.lights();
   }
 
   /// The guide, to look at what it learnt.

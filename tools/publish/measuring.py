@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import sys
 import time
-from typing import Dict, List, Optional
+from typing import Any, Dict, List, Optional
 
 from blocks import ROOT
 from provenance import RESULTS, head, is_dirty, is_stale, provenance, read_index, sources, write_index
@@ -110,14 +110,14 @@ def without_runs(text: str) -> str:
     return json.dumps(results, indent=1, ensure_ascii=False) + "\n"
 
 
-def record(place: Place, series: Series, made: pathlib.Path, commit: str) -> None:
-    """Takes over a file that was made, and writes its entry."""
+def record(place: Place, series: Series, made: pathlib.Path, measured: Dict[str, Any]) -> None:
+    """Takes over a file that was made, and writes its entry. `measured`: the commit and the sources' hash before the run."""
     target = place.root / RESULTS / series.name.split("#")[0]
     part = target.with_name(target.name + ".part")
     part.write_text(made.read_text() if series.keeps_runs else without_runs(made.read_text()))
     os.replace(part, target)
     index = read_index(place.root)
-    index[series.name] = {"commit": commit, "commit_is": "measured", "sources": sources(place.root),
+    index[series.name] = {**measured, "commit_is": "measured",
                           "date": time.strftime("%Y-%m-%d", time.gmtime()), "machine": machine(place.programs),
                           "command": list(series.commands)}
     write_index(place.root, index)
@@ -128,8 +128,7 @@ def measure(place: Place, names: List[str], again: bool) -> int:
     unknown = [name for name in names if not any(name in (s.name, s.name.rsplit(".", 1)[0]) for s in ALL)]
     if unknown:
         raise SystemExit(f"publish.py: there is no series {', '.join(unknown)}; --list has all")
-    commit = head(place.root)
-    if commit is None:
+    if head(place.root) is None:
         raise SystemExit("publish.py: --measure needs git, to say at which commit it measures")
     if is_dirty(place.root):
         raise SystemExit("publish.py: include/, examples/, bench/ or tools/ have changes: commit them before measuring")
@@ -145,8 +144,9 @@ def measure(place: Place, names: List[str], again: bool) -> int:
         else:
             print(f"{title}: about {series.minutes} minutes", flush=True)
             begin = time.monotonic()
+            measured = {"commit": head(place.root), "sources": sources(place.root)}
             try:
-                record(place, series, run(place, series), commit)
+                record(place, series, run(place, series), measured)
                 print(f"{title}: written after {(time.monotonic() - begin) / 60:.1f} minutes")
             except (subprocess.CalledProcessError, OSError) as error:
                 print(f"{title}: failed: {error}", file=sys.stderr)

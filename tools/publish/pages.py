@@ -10,9 +10,9 @@ import pathlib
 import re
 from typing import Callable, Dict, List, NamedTuple, Set, Tuple
 
-BLOCK = re.compile(r"^(?P<begin>(?P<indent> *)<!-- publish: (?P<name>.+?) -->\n)(?P<body>.*?)(?P<end> *<!-- /publish -->)",
+BLOCK = re.compile(r"^(?P<begin>(?P<indent> *)<!-- publish: (?P<name>.+?) -->\n)(?P<body>(?:(?!<!-- publish: ).)*?)(?P<end> *<!-- /publish -->)",
                    re.DOTALL | re.MULTILINE)
-INLINE = re.compile(r"(?P<begin><!-- p: (?P<name>[^>]+?) -->)(?P<body>.*?)(?P<end><!-- /p -->)", re.DOTALL)
+INLINE = re.compile(r"(?P<begin><!-- p: (?P<name>[^>]+?) -->)(?P<body>(?:(?!<!--).)*?)(?P<end><!-- /p -->)", re.DOTALL)
 COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 NUMBER = r"\d[\d,]*(?:\.\d+)?"
 UNITS = r"(?:[mµn]?s|seconds?|minutes?|hours?|[KMGT]i?B(?:/s)?|%|per cent|times|-?fold)"

@@ -15,7 +15,8 @@ from typing import Any, Dict, List, Optional
 RESULTS = "bench/results"
 INDEX = f"{RESULTS}/index.json"
 # What results depend on. The results themselves, and this program, do not change what is measured.
-SOURCES = ("include", "examples", "bench", "tools", f":!{RESULTS}", ":!tools/publish")
+SOURCES = ("include", "examples", "bench", "tools", f":!{RESULTS}", ":!tools/publish", ":!tools/upbp_scenes", ":!*.md",
+           ":!bench/table.py", ":!bench/svg.py", ":!bench/tuning_plot.py", ":!bench/ranks/plot.py")
 
 Entry = Dict[str, Any]
 
@@ -62,7 +63,7 @@ def provenance(root: pathlib.Path, name: str) -> Entry:
         if machine:
             entry.setdefault("machine", machine)
     else:
-        commands = re.findall(r"^ {4}((?:wfpg-|g\+\+ |ncu |build/|test_)\S*.*)$", (root / RESULTS / name).read_text(), re.MULTILINE)
+        commands = re.findall(r"^ {4}((?:wfpg-|g\+\+ |ncu |build/|test_)\S*(?:.*\\\n)*.*)$", (root / RESULTS / name).read_text(), re.MULTILINE)
         entry.setdefault("command", commands)
     command = entry.get("command", [])
     entry["command"] = [command] if isinstance(command, str) else list(command)

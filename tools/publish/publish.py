@@ -85,7 +85,12 @@ def write(root: pathlib.Path) -> None:
     results = Results(root)
     for page in page_names(root):
         text = (root / page).read_text(encoding="utf-8")
-        new = rewrite(text, page, lambda name, of_page: generate(results, name, of_page))
+        for line, fault in faults_of_markers(text):
+            raise SystemExit(f"publish.py: {page}:{line}: {fault}")
+        try:
+            new = rewrite(text, page, lambda name, of_page: generate(results, name, of_page))
+        except (KeyError, IndexError, ValueError, OSError) as error:
+            raise SystemExit(f"publish.py: {page} cannot be generated: {error}") from error
         if new != text:
             (root / page).write_text(new, encoding="utf-8")
             print(f"{page}: written")

@@ -171,9 +171,9 @@ def without_groups(results: Results, scene: str) -> str:
 
 
 @block
-def combining(results: Results, scene: int = 0) -> str:
+def combining(results: Results) -> str:
     """What `pt-linear` gains over the plain mean of samples of kept fields."""
-    combined = results.json("quality-series.json", "scenes", scene, "single_samples", "wfpg", "combined")
+    combined = results.json("quality-series.json", "scenes", 0, "single_samples", "wfpg", "combined")
     plain, weighed = (combined[way]["mse_reinhard"][-1] for way in ("constant", "pt-linear"))
     return f"{100 * (plain / weighed - 1):.0f}%"
 
@@ -190,7 +190,7 @@ def gains(results: Results) -> Rows:
     rows = [["scene", "next-event estimation", "equal samples", "equal time"]]
     for scene, nee in of.items():
         cell = results.json("rest.json", "cpu", "scenes", scene, "64")
-        name = scene + (" (nothing is hidden)" if scene == "cornell-box" else "")
+        name = scene + {"cornell-box": " (nothing is hidden)", "thin-wall": ", depth 6"}.get(scene, "")
         rows.append([name, nee, three(cell["gain"]), three(cell["equal_time"])])
     return rows
 

@@ -30,9 +30,9 @@ struct path_lights {
   bool next_event = true;
   wfpg::light_guide_view guide = {};  ///< empty: lights are chosen by power
 
-  /// Chooses the group of lights for a vertex.
+  /// Chooses the group of lights for a vertex, from u in [0, 1).
   WFPG_HD wfpg::light_choice choose(const path_vertex& vertex, float u) const {
-    return guide.empty() ? wfpg::light_choice{} : guide.choose(row(vertex), u);
+    return guide.empty() ? choose_by_power(u) : guide.choose(row(vertex), u);
   }
   /// The probability of a group at a vertex, over its probability by power.
   WFPG_HD float preference(const path_vertex& vertex, std::uint32_t group) const {
@@ -40,6 +40,14 @@ struct path_lights {
   }
 
  private:
+  // Lights may be in groups also in a sample without a guide.
+  WFPG_HD wfpg::light_choice choose_by_power(float u) const {
+    if (lights.groups.size() < 2) return {};
+    std::uint32_t group = 0;
+    while (group + 1 < lights.groups.size() && u >= lights.groups[group].share)
+      u -= lights.groups[group++].share;
+    return {group, lights.groups[group].share, wfpg::no_light_choice};
+  }
   WFPG_HD std::uint32_t row(const path_vertex& vertex) const {
     return guide.find(vertex.position, vertex.geometric_normal);
   }

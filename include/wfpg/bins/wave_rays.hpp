@@ -41,7 +41,7 @@ struct wave_rays {
     // While the guide probes, most rays are of other paths. Reading a surface may take as long as finding its
     // field.
     if constexpr (gives_paths_v<Surfaces>)
-      if (!guided_paths.includes(surfaces.path(ray))) return result;
+      if (guided_paths.log2_divisor() > 0 && !guided_paths.includes(surfaces.path(ray))) return result;
     const auto s = surfaces(ray);
     result.active = s.active && !s.bsdf.is_delta() && guided_paths.includes(s.path);
     result.paths = s.path == no_path ? 1u : 1u << guided_paths.log2_divisor();

@@ -89,10 +89,11 @@ struct state_access {
     guider.samples_ = bytes.get<std::uint32_t>();
     bytes.require(guider.samples_ < 0x80000000u, "has samples without end");
     guider.warm_up_end_ = bytes.get<std::uint32_t>();
-    bytes.require(guider.warm_up_end_ >= recording_needs::warm_up_samples &&
-                      guider.warm_up_end_ <= guider.samples_ + recording_needs::warm_up_samples,
-                  "warms up until after samples that are to come");
     take_rests(bytes, guider);
+    bytes.require(
+        guider.warm_up_end_ >= recording_needs::warm_up_samples &&
+            guider.warm_up_end_ <= guider.number_of(guider.samples_) + recording_needs::warm_up_samples,
+        "warms up until after samples that are to come");
     guide_sections::take_build(bytes, guider.guide_);
     const auto dropped = bytes.get<std::uint32_t>();
     guide_sections::take_depths(guider.exec_, bytes, guider.guide_);

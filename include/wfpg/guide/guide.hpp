@@ -132,6 +132,7 @@ struct guide_base {
   ///   void keep_unguided(const Exec&, const path_recorder<Exec>&, const recorded_runs& compared,
   ///                      std::uint32_t number);         of the unguided sample, from 0
   ///   guiding_gain gain(const Exec&, const path_recorder<Exec>&, const recorded_runs& compared);
+  ///   auto resting_lights() const;                  lights() of samples in which nothing is learnt
   /// and a default view_type guides no ray. The last two run before learn(), keep_unguided() after an
   /// unguided sample.
   static constexpr bool measures_gain = false;

@@ -45,6 +45,8 @@ struct recorded_surfaces {
     s.bsdf.transmits_below = (state & detail::wave_transmits) != 0;
     return s;
   }
+  /// Returns the path of ray `path`: itself.
+  WFPG_HD std::uint32_t path(std::uint32_t path) const { return path; }
 };
 
 }  // namespace wfpg

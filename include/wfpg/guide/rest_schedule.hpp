@@ -122,27 +122,28 @@ class rest_schedule {
         static_cast<float>(age_of(sample)) / static_cast<float>(rest_constants::settled_samples);
     return 1.0f + (least_gain_ - 1.0f) * min(part, 1.0f);
   }
-  /// Gain in noise that lets the guide take part in all paths. `relative_variance`: that of typical unguided
-  /// paths, over the square of the mean.
-  float enough_in_noise(double relative_variance) const {
-    if (relative_variance > rest_constants::little_light) return rest_constants::least_in_noise;
+  /// Gain in noise that lets the guide take part in all paths. `finds_little`: whether the variance is above
+  /// rest_constants::little_light.
+  float enough_in_noise(bool finds_little) const {
+    if (finds_little) return rest_constants::least_in_noise;
     return clamp(least_gain_ - rest_constants::hidden_in_noise, rest_constants::least_in_noise,
                  rest_constants::most_in_noise);
   }
   /// Takes what was measured in a sample, which decides from the next one on. The guide takes part in all
   /// paths where the gain is not known, or at least least_gain. It rests where the gain is less than
   /// threshold(). Between them it takes part in as many as before, and in few where it rested. Noisy paths
-  /// have limits of their own: enough_in_noise(), and slack_in_noise below it. Nothing is decided before the
+  /// have limits of their own: enough_in_noise(), and slack_in_noise below it where that is less than
+  /// threshold(). Nothing is decided before the
   /// first comparison. Precondition: compares(sample).
   void decide(std::uint32_t sample, const guiding_gain& measured) {
     if (age_of(sample) < rest_constants::first_comparison) return;
     weight_ = weight_of(measured);
     const double gain = measured.typical_value(), mean = measured.unguided_mean;
-    const double noise = measured.typical_unguided / (mean * mean);
-    const bool is_noisy = noise > rest_constants::much_noise;
-    const float in_noise = enough_in_noise(noise),
-                least = is_noisy ? in_noise - rest_constants::slack_in_noise : threshold(sample),
-                enough = is_noisy ? in_noise : least_gain_;
+    const auto varies = [&](double times) { return measured.typical_unguided > times * mean * mean; };
+    const bool is_noisy = varies(rest_constants::much_noise);
+    const float in_noise = enough_in_noise(varies(rest_constants::little_light)),
+                enough = is_noisy ? in_noise : least_gain_,
+                least = min(threshold(sample), is_noisy ? in_noise - rest_constants::slack_in_noise : enough);
     if (!measured.is_known() || gain >= enough)
       takes_part_ = part::in_all;
     else if (gain < least)

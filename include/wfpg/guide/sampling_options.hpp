@@ -29,7 +29,7 @@ struct sampling_options {
   /// Guide toward emitters themselves, too. With next-event estimation, emitters count with their MIS weight.
   /// False leaves them to next-event estimation: better where fields do not learn.
   bool include_emission = true;
-  /// Samples at the beginning that only record: "PT first" in section 3.7.
+  /// Samples at the beginning, and after forget_light(), that only record: "PT first" in section 3.7.
   std::uint32_t unguided_samples = 1;
   /// Gain below which guiding does not pay: at least 1, or 0 for a guide that never rests. Unset: what suits
   /// policy and scene, rest_constants::gpu_least_gain or cpu_least_gain(). Samples 4, 8, 16 and so on are

@@ -109,9 +109,10 @@ struct guiding_gain {
 
 /// Returned by path_guider::statistics(). A guide that makes no fields leaves theirs at 0.
 struct guider_statistics {
-  std::uint32_t samples = 0;         ///< samples begun
-  std::uint32_t guided_samples = 0;  ///< samples begun after unguided_samples, where the guide can guide and
-                                     ///< did not rest; of these, samples that are compared may be unguided
+  std::uint32_t samples = 0;  ///< samples begun
+  /// Samples begun after the first unguided_samples, where the guide can guide and did not rest. Of these,
+  /// samples that are compared, or begin after light was forgotten, may be unguided.
+  std::uint32_t guided_samples = 0;
   /// Samples begun in which the guide rested, since guiding gained less than least_gain.
   std::uint32_t rested_samples = 0;
   /// Mean of the comparisons of guided samples with an unguided one. Each weighs half of the one after it.

@@ -2,7 +2,7 @@
 // are counted for bins, and when bins are chosen anew. Pure functions of counters; every constant is here.
 // wfpg's own.
 //
-// Cost: O(1) a call. Memory: six counters.
+// Cost: O(1) a call. Memory: seven counters.
 #pragma once
 
 #include <wfpg/base/config.hpp>

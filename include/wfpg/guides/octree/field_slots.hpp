@@ -32,7 +32,7 @@ struct field_slot {
   /// minimum over rays picks one uniformly, in any order of threads.
   std::uint64_t origin = unpicked;
 
-  /// Whether the field is due for its next build in `sample`: build_schedule::is_due().
+  /// Whether the field is due for its next build in `sample`, which has this build_schedule::light_age().
   WFPG_HD bool is_due(std::uint32_t sample, std::uint32_t light_age) const {
     return build_schedule::is_due(sample, light_age, builds, last_built);
   }

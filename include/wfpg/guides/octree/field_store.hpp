@@ -121,8 +121,8 @@ class field_store {
   /// Call after the cache changed. Refreshes then aim cones at nodes that are far brighter in it than what
   /// surrounds them. O(nodes of a level).
   void aim(const Exec& exec, const exitance_cache_view& cache) { bright_.find(exec, cache); }
-  /// Forgets what fields learnt. Hits stay, and each field is built anew from them when it is next used: the
-  /// next sample has the age 1.
+  /// Forgets what fields learnt. Hits stay, and each field is built anew from them when it is next used and
+  /// max_wave_cones has room. The next sample has the age 1.
   void forget(const Exec& exec) {
     schedule_.expect_builds(build_schedule_constants::invalidated_samples);
     pool_.forget(exec);

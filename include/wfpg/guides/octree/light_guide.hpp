@@ -50,8 +50,10 @@ class light_guide_view {
   /// Returns the row of probabilities for a surface. `position`: world space. `normal`: unit length, on the
   /// side that is lit; its dominant axis decides.
   ///
-  /// A point that the octree does not know gets the root's row. O(depth). Precondition: not empty.
+  /// A point that the octree does not know gets the root's row. O(depth), and O(1) where choices rest.
+  /// Precondition: not empty.
   WFPG_HD std::uint32_t find(vec3 position, vec3 normal) const {
+    if (tree_.empty()) return 0;
     const node_id node = tree_.nearest_node(position, level_);
     return static_cast<std::uint32_t>(rows_.row(node == invalid_node ? 0 : node, dominant_axis(normal)));
   }
@@ -130,6 +132,15 @@ class light_guide {
 
   /// What the kernels of the current sample use.
   light_guide_view view() const { return view_; }
+  /// A view for samples in which nothing is learnt: it chooses by weight alone, and its keys are
+  /// no_light_choice.
+  light_guide_view resting_view() const {
+    light_guide_view result;
+    result.rows_ = view_.rows_;
+    result.first_row_ = 1;
+    result.sums_ = resting_sums_.data();
+    return result;
+  }
 
   /// Begins a sample. `seed` decides which paths it records.
   void begin_sample(std::uint32_t seed) { view_.runs_.seed = seed; }
@@ -138,9 +149,9 @@ class light_guide {
   /// Forgets all means, and deposits since the last end_sample(). Probabilities follow the weights again.
   void forget(const Exec& exec);
 
-  /// Bytes kept across samples: 48 a node and group, and 8 a group.
+  /// Bytes kept across samples: 48 a node and group, and 12 a group.
   std::size_t persistent_bytes() const {
-    return sums_.bytes() + means_.bytes() + weights_.bytes() + defensive_.bytes();
+    return sums_.bytes() + means_.bytes() + weights_.bytes() + defensive_.bytes() + resting_sums_.bytes();
   }
   /// Bytes of the queue that holds a sample's deposits.
   std::size_t transient_bytes() const { return queue_.bytes(); }
@@ -163,6 +174,8 @@ class light_guide {
   light_guide_view view_;
   // One element a group; each sums to 1.
   buffer<float, Exec> weights_, defensive_;
+  // Inclusive sums of the weights: the one row of resting_view().
+  buffer<float, Exec> resting_sums_;
   // One element a row and group: probabilities as inclusive sums, and means.
   buffer<float, Exec> sums_;
   buffer<learnt_mean, Exec> means_;

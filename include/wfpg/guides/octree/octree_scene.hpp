@@ -44,6 +44,8 @@ class octree_scene : public guide_base {
   exitance_cache_view cache() const { return cache_.view(); }
   /// Choices of lights for next-event estimation in this sample. Empty without options.lights.weights.
   light_guide_view lights() const { return lights_.view(); }
+  /// Choices by weight alone, for samples in which choices of lights rest.
+  light_guide_view resting_lights() const { return lights_.resting_view(); }
   /// The octree over the scene's surfaces. Its view goes to an svo_ray_caster. The guide must outlive that
   /// view.
   const sparse_voxel_octree<Exec>& octree() const { return octree_; }

@@ -3,6 +3,7 @@
 
 #include <wfpg/base/math.hpp>
 #include <wfpg/exec/buffer.hpp>
+#include <wfpg/host/wave.hpp>
 #include <wfpg/testing/check_surfaces.hpp>
 #include <wfpg/testing/detail/describe.hpp>
 
@@ -20,14 +21,21 @@ namespace wfpg::detail {
 struct surface_probe {
   vec3 position, geometric_normal, normal, outgoing;
   std::uint16_t active, at_leaf;
+  std::uint32_t path, path_alone;  // surface::path, and what path() of the functor returns
 };
 
 template <class Bsdf>
 WFPG_HD surface_probe probe_of(const surface<Bsdf>& s, const sparse_voxel_octree_view& tree) {
   const bool look_up = s.active && !tree.empty() && is_finite(s.position);
   const bool at_leaf = !look_up || tree.nearest_leaf(s.position) != invalid_node;
-  return {s.position, s.geometric_normal,      s.normal,
-          s.outgoing, std::uint16_t(s.active), std::uint16_t(at_leaf)};
+  return {s.position,
+          s.geometric_normal,
+          s.normal,
+          s.outgoing,
+          std::uint16_t(s.active),
+          std::uint16_t(at_leaf),
+          s.path,
+          s.path};
 }
 
 template <class Surfaces>
@@ -36,7 +44,9 @@ struct probe_surfaces {
   sparse_voxel_octree_view tree;
   array_view<surface_probe> probes;
   WFPG_HD void operator()(std::size_t i) const {
-    probes[i] = probe_of(surfaces(static_cast<std::uint32_t>(i)), tree);
+    const auto ray = static_cast<std::uint32_t>(i);
+    probes[i] = probe_of(surfaces(ray), tree);
+    if constexpr (gives_paths_v<Surfaces>) probes[i].path_alone = surfaces.path(ray);
   }
 };
 
@@ -58,6 +68,8 @@ inline std::string violation_of(const surface_probe& s) {
     return sentence("normal ", in_words{s.normal}, " and geometric_normal ", in_words{s.geometric_normal},
                     " have dot product ", glm::dot(s.normal, s.geometric_normal),
                     ", expected on the same side");
+  if (s.path_alone != s.path)
+    return sentence("path() is ", s.path_alone, ", expected surface::path, ", s.path);
   if (s.at_leaf == 0)
     return sentence("position ", in_words{s.position},
                     " lies in no leaf of the octree nor beside one, expected a leaf in its voxel or the 26 "

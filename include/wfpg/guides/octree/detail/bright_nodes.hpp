@@ -96,8 +96,8 @@ struct offer_bright_sides {
     }
     return {node, side};
   }
-  // Whether the leaves of a node have `wanted` deposits, on both sides together. Looks at no more leaves than
-  // that.
+  // Whether the leaves of a node have `wanted` deposits, on both sides together. Only bright sides are asked,
+  // and most end after a few leaves.
   WFPG_HD bool has_deposits(node_id node, std::uint32_t wanted) const {
     const sparse_voxel_octree_view& tree = cache.octree();
     node_id leaf = node, last = node;
@@ -105,7 +105,6 @@ struct offer_bright_sides {
       leaf = tree.first_child(leaf);
       last = tree.first_child(last) + tree.child_count(last) - 1;
     }
-    last = min(last, leaf + wanted - 1);
     std::uint64_t n = 0;
     for (; leaf <= last && n < wanted; ++leaf) n += cache.deposits(leaf);
     return n >= wanted;

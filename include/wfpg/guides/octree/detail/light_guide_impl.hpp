@@ -63,14 +63,18 @@ void light_guide<Exec>::set_weights(const Exec& exec, const std::vector<float>& 
     total += static_cast<double>(w);
     count += w > 0.0f ? 1.0 : 0.0;
   }
-  std::vector<float> shares, defensive;
+  double sum = 0.0;
+  std::vector<float> shares, defensive, sums;
   for (const float w : weights) {
     const double share = static_cast<double>(w) / total;
+    sum += static_cast<double>(w);
     shares.push_back(static_cast<float>(share));
+    sums.push_back(static_cast<float>(sum / total));
     defensive.push_back(static_cast<float>(w > 0.0f ? 0.5 * (share + 1.0 / count) : 0.0));
   }
   weights_ = buffer<float, Exec>(exec, shares);
   defensive_ = buffer<float, Exec>(exec, defensive);
+  resting_sums_ = buffer<float, Exec>(exec, sums);
 }
 
 template <class Exec>
