@@ -35,10 +35,10 @@ def gpu_and_driver():
         return ""
 
 
-def write_results(out, results):
-    """With the command that made them, and the GPU if there is one."""
+def write_results(out, results, part=""):
+    """With the command that made them, or a `part` of them, and the GPU if there is one."""
     gpu = gpu_and_driver()
-    head = {"command": " ".join(sys.argv), **({"gpu_and_driver": gpu} if gpu else {})}
+    head = {f"{part}_command" if part else "command": " ".join(sys.argv), **({"gpu_and_driver": gpu} if gpu else {})}
     with open(out, "w") as file:
         json.dump({**results, **head}, file, indent=1)
         file.write("\n")

@@ -67,7 +67,7 @@ def main(directory, out, device, folder):
             path = os.path.join(folder, name) if name in FILES else name
             scenes[name] = {samples: measure(programs, path, options, samples) for samples in ("16", "64")}
     results[device] = {"device": kind, "size": size, "scenes": scenes}
-    write_results(out, results)
+    write_results(out, results, device)
 
 
 if __name__ == "__main__":

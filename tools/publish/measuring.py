@@ -83,10 +83,18 @@ def link(path: pathlib.Path, target: pathlib.Path) -> None:
     path.symlink_to(target)
 
 
-def run(place: Place, series: Series) -> pathlib.Path:
-    """Runs the commands of a series in their folder, and returns the file that they made."""
+def build(programs: pathlib.Path) -> None:
+    """Builds programs that CMake built before, so that they are of the sources that are checked out."""
+    if (programs.parent / "CMakeCache.txt").exists():
+        subprocess.run(["cmake", "--build", str(programs.parent)], check=True)
+
+
+def run(place: Place, series: Series, again: bool) -> pathlib.Path:
+    """Runs the commands of a series in their folder, and returns the file that they made. `again`: without its caches."""
     name = series.name.split("#")[0]
     folder = place.work / series.name.replace("#", "-").rsplit(".", 1)[0]
+    if again and folder.exists():
+        shutil.rmtree(folder)
     folder.mkdir(parents=True, exist_ok=True)
     link(folder / "bin", place.programs)
     link(folder / "bench", place.root / "bench")
@@ -132,6 +140,7 @@ def measure(place: Place, names: List[str], again: bool) -> int:
         raise SystemExit("publish.py: --measure needs git, to say at which commit it measures")
     if is_dirty(place.root):
         raise SystemExit("publish.py: include/, examples/, bench/ or tools/ have changes: commit them before measuring")
+    build(place.programs)
     chosen = [s for s in ALL if not names or s.name in names or s.name.rsplit(".", 1)[0] in names]
     failed = 0
     for number, series in enumerate(chosen, 1):
@@ -146,7 +155,7 @@ def measure(place: Place, names: List[str], again: bool) -> int:
             begin = time.monotonic()
             measured = {"commit": head(place.root), "sources": sources(place.root)}
             try:
-                record(place, series, run(place, series), measured)
+                record(place, series, run(place, series, again), measured)
                 print(f"{title}: written after {(time.monotonic() - begin) / 60:.1f} minutes")
             except (subprocess.CalledProcessError, OSError) as error:
                 print(f"{title}: failed: {error}", file=sys.stderr)

@@ -15,11 +15,11 @@ BLOCK = re.compile(r"^(?P<begin>(?P<indent> *)<!-- publish: (?P<name>.+?) -->\n)
 INLINE = re.compile(r"(?P<begin><!-- p: (?P<name>[^>]+?) -->)(?P<body>(?:(?!<!--).)*?)(?P<end><!-- /p -->)", re.DOTALL)
 COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 NUMBER = r"\d[\d,]*(?:\.\d+)?"
-UNITS = r"(?:[mµn]?s|seconds?|minutes?|hours?|[KMGT]i?B(?:/s)?|%|per cent|times|-?fold)"
+UNITS = r"(?:[mµn]?s|(?:milli|micro)?seconds?|min|minutes?|hours?|[KMGT]i?B(?:/s)?|%|per cent|times|-?fold)"
 BEGIN = r"(?<![\w.#/])(?<!\w-)"
 # A number with a unit of gain, error, time or bytes, a factor, a decimal number, or a cell of a table that is a number.
-FIGURE = re.compile(rf"{BEGIN}{NUMBER}[ -]?{UNITS}(?!\w)|{BEGIN}{NUMBER}x(?!\w)|factor of {NUMBER}"
-                    rf"|{BEGIN}\d+\.\d+(?:e-?\d+)?(?![\w]|\.\d)|(?<=\| )[-±]?{NUMBER}(?= \|)")
+FIGURE = re.compile(rf"{BEGIN}{NUMBER}[\s-]?{UNITS}(?!\w)|{BEGIN}{NUMBER}[x×](?![\w×])(?!\d)|factor of {NUMBER}"
+                    rf"|{BEGIN}(?:\d+\.\d+(?:e-?\d+)?|\d+e-?\d+)(?![\w]|\.\d)|(?<=\|) *\**[-±]?{NUMBER}\**(?: \([^|]*\))? *(?=\|)")
 
 Generate = Callable[[str, str], str]  # text of a block from its name and page
 
@@ -71,7 +71,7 @@ def prose(text: str) -> str:
     text = COMMENT.sub(_blank, text)
     text = re.sub(r"^```.*?^```", _blank, text, flags=re.DOTALL | re.MULTILINE)
     text = re.sub(r"(?<=\n\n)(?: {4}[^\n]*\n+)+", _blank, text)
-    text = re.sub(r"(`+)(?!`).+?\1", _blank, text, flags=re.DOTALL)
+    text = re.sub(r"(`+)(?!`)(?:(?!\n\n).)+?\1", _blank, text, flags=re.DOTALL)
     return re.sub(r"\]\([^)]*\)|<?https?://[^\s)>]+>?", _blank, text)
 
 
@@ -93,7 +93,7 @@ def faults_of_markers(text: str) -> List[Tuple[int, str]]:
     """Comments that open no block or close none, and figures at the beginning of a line."""
     rest = INLINE.sub(_blank, BLOCK.sub(_blank, text))
     found = [(rest.count("\n", 0, m.start()) + 1, f"{m[0]} has no other end")
-             for m in re.finditer(r"<!-- /?(?:publish|p)\b.*?-->", rest)]
+             for m in re.finditer(r"<!-- */?(?:publish|p)\b.*?-->", rest)]
     found += [(text.count("\n", 0, m.start()) + 1, f"a line begins with {m[0]}")
               for m in re.finditer(r"^[ \t]*<!-- p: .*?-->", text, re.MULTILINE)]
     return found

@@ -117,6 +117,12 @@ def planted(root: pathlib.Path) -> List[str]:
         "bytes outside a block": text + "\nFields take 13 MiB.\n",
         "an error outside a block": text + "\nMeans differ by 3%.\n",
         "a negative figure outside a block": text + "\nThe difference is -3%.\n",
+        "a time over a line's end": text + "\nA sample takes 12\nms.\n",
+        "a factor with a sign": text + "\nIt is 3× faster.\n",
+        "a power of ten outside a block": text + "\nThe error is 4e-5.\n",
+        "a cell with a second figure": text + "\n| scene | gain |\n| --- | --- |\n| ajar | 32 (5) |\n",
+        "a figure after a stray backquote": text + "\nA stray ` here.\n\nIt takes 12 ms, and ` there.\n",
+        "a marker without a blank": text + "\n<!--publish: builtin -->\n",
         "a table outside a block": text + "\n| scene | gain |\n| --- | --- |\n| ajar | 32 |\n",
     }
     for name, changed in faults.items():
