@@ -3,7 +3,7 @@ import math
 import re
 from typing import Dict, List, NamedTuple, Tuple
 
-from blocks import Results, Rows, block
+from blocks import Results, Rows, block, span
 
 GPU, TECHNIQUES, VCM, UPBP = "bidirectional-gpu.txt", "techniques.txt", "smallvcm.txt", "smallupbp.txt"
 
@@ -72,7 +72,7 @@ def ordered_photons(results: Results) -> str:
     """Time of a sample with photons in the order of their map over that without."""
     lines = section(results, "                           one     one a      ordered", "wax")
     ratios = [cell(lines, "ordered", r) / cell(lines, "one a  ", r) for r in (3, 5, 7)]
-    return f"{min(ratios):.2f} to {max(ratios):.2f}"
+    return span(ratios, 2)
 
 
 BENCH = r"^  {} +(?:caustic-pool )?([\d.]+) ms, ([\d.]+) of its rays; (?:clustered|mirror-balls) ([\d.]+)(?: ms)?, ([\d.]+)$"
@@ -120,7 +120,7 @@ def bounded(results: Results, stage: str) -> str:
              "connections": ((1, 2), (5, 6), (14, 16))}[stage]
     lines = registers(results)
     ratios = [cell(lines, stage, after) / cell(lines, stage, before) for before, after in pairs]
-    return f"{min(ratios):.2f} to {max(ratios):.2f}"
+    return span(ratios, 2)
 
 
 @block
@@ -156,9 +156,6 @@ def techniques(results: Results) -> Rows:
     fog = [technique(results, n) for n in ("pb2d", "bb1d")]
     points = technique(results, "pp3d")
     sets = len(re.findall(r"^  \S+ +[12]\.\d{5} \+-", results.text(TECHNIQUES), re.MULTILINE))
-
-    def span(values: List[float], digits: int) -> str:
-        return f"{min(values):.{digits}f} to {max(values):.{digits}f}"
     return [["", "scene", "difference, per cent", "a tile's error, median"],
             ["hits, nee, splat, surf", "`cornell-box`, from pt", span([t.difference for t in box], 2),
              span([float(t.tile[:-1]) for t in box], 2) + "%"],
@@ -228,7 +225,7 @@ def smallvcm_tiles(results: Results) -> str:
 def smallvcm_median(results: Results) -> str:
     """Least and most of median tiles' errors."""
     errors = [float(e) for r in vcm_rows(results) for e in r[8:10]]
-    return f"{min(errors):.1f} to {max(errors):.1f}%"
+    return span(errors) + "%"
 
 
 @block
@@ -242,8 +239,13 @@ def smallvcm_largest(results: Results) -> str:
 @block
 def smallvcm_planted(results: Results) -> str:
     """What a picture scaled by 1.01 is off, in standard errors."""
-    found = [float(r[3]) for r in vcm_rows(results)]
-    return f"{min(found):.0f} to {max(found):.0f}"
+    return span([float(r[3]) for r in vcm_rows(results)], 0)
+
+
+def in_errors(results: Results, row: str) -> str:
+    """A difference from smallupbp's picture, in standard errors."""
+    value = differences(results, UPBP, row)
+    return f"{abs(value[0] / value[1]):.1f}"
 
 
 @block
@@ -267,8 +269,7 @@ def smallupbp(results: Results) -> Rows:
 @block
 def smallupbp_fog(results: Results) -> str:
     """The difference of upbp in scene 14, in standard errors."""
-    value = differences(results, UPBP, r" 14 +ALL +0.02 +512 ")
-    return f"{abs(value[0] / value[1]):.1f}"
+    return in_errors(results, r" 14 +ALL +0.02 +512 ")
 
 
 @block
@@ -278,22 +279,21 @@ def upbp_scenes(results: Results) -> Rows:
     for scene, name in {"MB": "Mirror Balls, 12", "SL": "Still Life, 80"}.items():
         times = [float(t) for t in re.findall(rf"^{scene} +(?:400|800)x(?:400|350) .* ([\d.]+)$", results.text(UPBP), re.MULTILINE)]
         upbp = with_error(differences(results, UPBP, r"MB +upbp +26 x 8")) if scene == "MB" else ""
-        rows.append([name, with_error(differences(results, UPBP, rf"{scene} +bpt")), upbp, f"{min(times):.1f} to {max(times):.1f}"])
+        rows.append([name, with_error(differences(results, UPBP, rf"{scene} +bpt")), upbp, span(times)])
     return rows
 
 
 @block
 def upbp_scenes_difference(results: Results) -> str:
     """The difference of upbp in Mirror Balls, in standard errors."""
-    value = differences(results, UPBP, r"MB +upbp +26 x 8")
-    return f"{abs(value[0] / value[1]):.1f}"
+    return in_errors(results, r"MB +upbp +26 x 8")
 
 
 @block
 def upbp_scenes_floor(results: Results) -> str:
     """How much brighter a part of Still Life's floor is."""
     found = results.found(UPBP, r"\+([\d.]+)%, and .*\+([\d.]+)%\.$")
-    return f"{float(found[1]):.0f} to {float(found[2]):.0f}%"
+    return span([float(found[1]), float(found[2])], 0) + "%"
 
 
 @block

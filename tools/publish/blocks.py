@@ -74,6 +74,17 @@ def three(value: Optional[float], least_decimals: int = 0) -> str:
     return f"{value:.{least_decimals}f}"
 
 
+def span(values: List[float], digits: int = 1) -> str:
+    """Least and most of values."""
+    least, most = f"{min(values):.{digits}f}", f"{max(values):.{digits}f}"
+    return least if least == most else f"{least} to {most}"
+
+
+def per_cent(values: List[float]) -> str:
+    """Least and most of values, in per cent."""
+    return span([100 * value for value in values], 0) + "%"
+
+
 def table(rows: Rows) -> str:
     """A table of Markdown."""
     head = ["| " + " | ".join(rows[0]) + " |", "| " + "--- | " * (len(rows[0]) - 1) + "--- |"]

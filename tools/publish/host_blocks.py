@@ -1,7 +1,7 @@
 """Tables and figures of docs/algorithm.md, docs/guides.md, docs/host.md and docs/hosts.md."""
 from typing import Any, Dict, List
 
-from blocks import Results, Rows, block, three
+from blocks import Results, Rows, block, per_cent, three
 from quality_blocks import short, summary
 
 CONES, SOURCES, REST = "quality-cones.json", "octree-sources.json", "rest.json"
@@ -29,11 +29,6 @@ def relative_errors(results: Results, file: str) -> List[float]:
     found = [m["errors"]["mse_reinhard"] for s in results.json(file, "scenes") for m in s["summary"][0]["methods"]
              if m["method"] != "pt"]
     return [e["ratio_standard_error"] / e["ratio"] for e in found]
-
-
-def per_cent(values: List[float]) -> str:
-    """Least and most of values, in per cent."""
-    return f"{100 * min(values):.0f} to {100 * max(values):.0f}%"
 
 
 @block
@@ -113,4 +108,4 @@ def rests_gpu_loss(results: Results) -> str:
 def rests_cpu_loss(results: Results, samples: str) -> str:
     """What guiding costs on a CPU where it does not pay, without veach-mis."""
     losses = [1 - g[0] for s, g in at_equal_time(results, "cpu", samples).items() if g[0] < 1.0 and s != "veach-mis.glb"]
-    return f"{100 * min(losses):.0f} to {100 * max(losses):.0f}%"
+    return per_cent(losses)

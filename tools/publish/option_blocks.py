@@ -1,7 +1,7 @@
 """Tables and figures of docs/ablations.md and docs/tuning.md: what parts and options of the guide do."""
 from typing import Any, Dict, List
 
-from blocks import Results, Rows, block, three
+from blocks import Results, Rows, block, per_cent, three
 
 ROOM, MORE, AIMED = "room.json", "room-64.json", "aimed-cones.json"
 FRACTIONS, TUNING = "fractions.json", "tuning.json"
@@ -93,7 +93,7 @@ def learnt_over(results: Results, key: str, scenes: List[str]) -> List[float]:
 def fractions_gain(results: Results, *scenes: str) -> str:
     """What learnt fractions gain in these scenes, least and most."""
     ratios = learnt_over(results, "gain", list(scenes))
-    return f"{100 * (min(ratios) - 1):.0f} to {100 * (max(ratios) - 1):.0f}%"
+    return per_cent([ratio - 1 for ratio in ratios])
 
 
 @block

@@ -2,7 +2,7 @@
 import re
 from typing import Dict, List
 
-from blocks import Results, Rows, block, three
+from blocks import Results, Rows, block, span, three
 
 from table import STAGES, compiler_rows, stage_rows  # bench/table.py
 
@@ -42,7 +42,7 @@ def equal_time_stages(results: Results) -> Rows:
 def equal_time_sort(results: Results) -> str:
     """Least and most time of sorting a sample's rays."""
     times = [m["milliseconds_a_sample"]["sort"] for s in results.json(EQUAL_TIME, "scenes") for m in s["methods"].values()]
-    return f"{min(times):.2f} to {max(times):.2f} ms"
+    return span(times, 2) + " ms"
 
 
 @block
@@ -120,9 +120,9 @@ def profile_pass(results: Results, what: str) -> str:
     """Of the pass over a wave: its `time`, what it moves in `memory`, or active `warps`."""
     waves = passes(results)
     if what == "time":
-        return f"{min(w[0] for w in waves):.0f} to {max(w[0] for w in waves):.0f} µs"
+        return span([w[0] for w in waves], 0) + " µs"
     if what == "memory":
-        return f"{min(w[1] for w in waves) / 1e3:.2f} to {max(w[1] for w in waves) / 1e3:.2f} GB"
+        return span([w[1] / 1e3 for w in waves], 2) + " GB"
     return f"{max(w[4] for w in waves):.0f}%"
 
 

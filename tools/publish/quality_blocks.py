@@ -2,7 +2,7 @@
 import re
 from typing import Any, Dict, List
 
-from blocks import Results, Rows, block, three
+from blocks import Results, Rows, block, span, three
 
 from table import errors_at  # bench/table.py
 
@@ -79,7 +79,7 @@ def openpgl_short_memory(results: Results) -> str:
     """Least and most MiB that Open PGL keeps after 64 samples."""
     kept = [summary(s, m["method"])["persistent_bytes"] / 2**20 for s in results.json("quality-openpgl-sweep.json", "scenes")
             for m in s["summary"][-1]["methods"] if m["method"] == "vmm-1000"]
-    return f"{min(kept):.0f} to {max(kept):.0f} MiB"
+    return span(kept, 0) + " MiB"
 
 
 @block

@@ -2,7 +2,7 @@
 import sys
 from typing import Any, Dict, List, Tuple
 
-from blocks import ROOT, Results, Rows, block, three
+from blocks import ROOT, Results, Rows, block, span, three
 
 sys.path.append(str(ROOT / "bench" / "ranks"))
 from plot import NETWORK, WARM_UP, WAVE, Model, fit, gpu_series, models, reduction  # noqa: E402, bench/ranks/plot.py
@@ -14,12 +14,6 @@ GPUS = ("1", "2", "4", "8")
 def sent(results: Results, scene: str) -> List[float]:
     """MiB of each sample of a large picture, by two processes."""
     return results.json(FILE, "processes", scene, "1920x1080", "2", "mib")
-
-
-def span(values: List[float], digits: int = 1) -> str:
-    """Least and most of values."""
-    least, most = f"{min(values):.{digits}f}", f"{max(values):.{digits}f}"
-    return least if least == most else f"{least} to {most}"
 
 
 @block

@@ -69,7 +69,7 @@ class aimed_cells {
       result.direction = glm::normalize(sides_[cone.target].position - cells.origin.position);
     return result;
   }
-  /// What a cone found, marked if it was aimed and hit its node. `hit`: what the caster returned for `path`.
+  /// The hit of a cone, marked if it was aimed and hit its node. `hit`: what the caster returned for `path`.
   WFPG_HD cone_hit find(const exitance_cache_view& cache, const field_cells& cells, const aimed_cone& cone,
                         const ray& path, const ray_hit& hit) const {
     const cone_hit found = cells.find(cache, path, hit);
