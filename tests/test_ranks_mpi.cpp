@@ -73,4 +73,8 @@ TEST_CASE("Ranks that disagree are told so, all of them", "[ranks][mpi]") {
   CHECK(function.code == 0);
   CHECK(times(function.text, ": done") == 2);
   CHECK(times(function.text, "another rank calls another function") == 2);
+  const printed arrays = run_ranks(2, "other_arrays");
+  INFO(arrays.text);
+  CHECK(arrays.code == 0);
+  CHECK(times(arrays.text, "calls all_reduce with 5 values, another rank") == 2);
 }

@@ -41,12 +41,20 @@ TEST_CASE("threads reduce sums and maxima, and broadcast", "[ranks_threads]") {
         ranks.all_reduce_max(view_of(max32));
         ranks.all_reduce_max(view_of(max64));
         ranks.all_reduce_sum(view_of(none));
+        std::vector<std::uint32_t> also_sum32{r}, also_max32{r};
+        std::vector<std::uint64_t> also_sum64{r}, also_max64{r};
+        const wfpg::reduction all_of[] = {
+            wfpg::reduction::sum(view_of(also_sum32)), wfpg::reduction::max(view_of(also_max64)),
+            wfpg::reduction::sum(view_of(also_sum64)), wfpg::reduction::max(view_of(also_max32)),
+            wfpg::reduction::sum(view_of(none))};
+        ranks.all_reduce({all_of, 5});
         ranks.broadcast(view_of(bytes), turn % n);
         const std::uint32_t all = n * (n - 1) / 2;
         if (sum32 != std::vector<std::uint32_t>{all + n * turn, 0u - n} ||
             sum64 != std::vector<std::uint64_t>{std::uint64_t(all) << 40} ||
             max32 != std::vector<std::uint32_t>{(n - 1) * turn, 7u} ||
-            max64 != std::vector<std::uint64_t>{std::uint64_t(n - 1) << 40, 1} ||
+            max64 != std::vector<std::uint64_t>{std::uint64_t(n - 1) << 40, 1} || also_sum32[0] != all ||
+            also_sum64[0] != all || also_max32[0] != n - 1 || also_max64[0] != n - 1 ||
             bytes != std::vector<unsigned char>(3, static_cast<unsigned char>(turn % n)))
           ++wrong[r];
       }

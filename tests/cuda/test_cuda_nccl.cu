@@ -1,8 +1,10 @@
 // Ranks as GPUs of one process, a thread each, joined by NCCL. With one GPU there is one rank.
 #include "cuda/shared_walls.hpp"
 #include "support/catch.hpp"
+#include "support/ranks.hpp"
 
 #include <wfpg/exec/cuda.hpp>
+#include <wfpg/exec/seq.hpp>
 #include <wfpg/ranks/nccl.hpp>
 #include <wfpg/ranks/single.hpp>
 
@@ -86,6 +88,21 @@ bool maxima_are_right(nccl_communicator& ranks, const exec& policy, std::size_t 
   return values.to_host(policy) == most;
 }
 
+// Arrays of all kinds in one call.
+bool several_are_right(nccl_communicator& ranks, const exec& policy, std::size_t count) {
+  const std::uint32_t all = ranks.size() * (ranks.size() - 1) / 2, last = ranks.size() - 1;
+  const buffer<std::uint32_t, exec> sum32(policy, std::vector<std::uint32_t>(count, ranks.rank())),
+      max32(policy, std::vector<std::uint32_t>(1, ranks.rank()));
+  const buffer<std::uint64_t, exec> sum64(policy, std::vector<std::uint64_t>(count, ranks.rank())),
+      max64(policy, std::vector<std::uint64_t>(1, ranks.rank()));
+  const wfpg::reduction arrays[] = {wfpg::reduction::sum(sum32.view()), wfpg::reduction::max(max32.view()),
+                                    wfpg::reduction::sum(sum64.view()), wfpg::reduction::max(max64.view())};
+  ranks.all_reduce({arrays, 4});
+  return sum32.to_host(policy) == std::vector<std::uint32_t>(count, all) &&
+         sum64.to_host(policy) == std::vector<std::uint64_t>(count, all) &&
+         max32.to_host(policy)[0] == last && max64.to_host(policy)[0] == last;
+}
+
 bool bytes_are_right(nccl_communicator& ranks, const exec& policy, std::size_t count) {
   const std::uint32_t root = ranks.size() - 1;
   const buffer<unsigned char, exec> bytes(policy, values_of<unsigned char>(ranks.rank(), count));
@@ -103,9 +120,30 @@ TEST_CASE("NCCL: sums, maxima and broadcasts are those of all GPUs", "[ranks][nc
           if (!sums_are_right<std::uint64_t>(ranks, policy, count)) throw std::runtime_error("64-bit sums");
           if (!maxima_are_right(ranks, policy, count)) throw std::runtime_error("maxima");
           if (!bytes_are_right(ranks, policy, count)) throw std::runtime_error("bytes");
+          if (!several_are_right(ranks, policy, count)) throw std::runtime_error("several arrays");
         }
       });
   for (const std::string& error : errors) CHECK(error.empty());
+}
+
+TEST_CASE("NCCL: ranks of the host find a GPU that disagrees, or ends", "[ranks][nccl]") {
+  if (!has_several_devices()) return;
+  const std::string last_one = GENERATE("agrees", "disagrees", "ends");
+  constexpr std::uint32_t size = 2;
+  const ncclUniqueId id = wfpg::make_nccl_id();
+  const auto errors =
+      wfpg_test::run_ranks<wfpg::exec::seq>(size, std::chrono::seconds(10), [&](wfpg::communicator& host) {
+        wfpg::check_cuda(cudaSetDevice(static_cast<int>(host.rank())), "cudaSetDevice");
+        const exec policy;
+        nccl_communicator ranks(policy, host.rank(), size, id, {10.0, &host});
+        if (!several_are_right(ranks, policy, 1000)) throw std::runtime_error("several arrays");
+        const bool is_last = host.rank() + 1 == size;
+        if (is_last && last_one == "ends") throw std::runtime_error("the last one ends");
+        sums_are_right<std::uint32_t>(ranks, policy, is_last && last_one == "disagrees" ? 6 : 5);
+      });
+  if (last_one == "agrees") CHECK(errors == std::vector<std::string>(size));
+  if (last_one == "disagrees") CHECK_THAT(errors[0], WFPG_TEST_CONTAINS("with 5 values, ranks have 5 to 6"));
+  if (last_one == "ends") CHECK_THAT(errors[0], WFPG_TEST_CONTAINS("rank 1 has ended"));
 }
 
 TEST_CASE("NCCL: a late GPU, or one that disagrees, is an error on the others", "[ranks][nccl]") {

@@ -95,6 +95,21 @@ void check_maxima(ranks& joined, std::size_t count) {
   }
 }
 
+// Arrays of all kinds in one call.
+void check_several(ranks& joined, std::size_t count) {
+  const std::uint32_t all = joined.size() * (joined.size() - 1) / 2, most = joined.size() - 1;
+  const wfpg::buffer<std::uint32_t, exec> sum32(exec(), std::vector<std::uint32_t>(count, joined.rank())),
+      max32(exec(), std::vector<std::uint32_t>(count, joined.rank()));
+  const wfpg::buffer<std::uint64_t, exec> sum64(exec(), std::vector<std::uint64_t>(1, joined.rank())),
+      max64(exec(), std::vector<std::uint64_t>(1, joined.rank()));
+  const wfpg::reduction arrays[] = {wfpg::reduction::sum(sum32.view()), wfpg::reduction::max(max32.view()),
+                                    wfpg::reduction::sum(sum64.view()), wfpg::reduction::max(max64.view())};
+  joined.all_reduce({arrays, 4});
+  for (std::size_t i = 0; i < count; ++i)
+    expect(sum32.view()[i] == all && max32.view()[i] == most, "several arrays, 32 bits");
+  expect(sum64.view()[0] == all && max64.view()[0] == most, "several arrays, 64 bits");
+}
+
 void check_broadcast(ranks& joined, std::size_t count) {
   using T = unsigned char;
   for (std::uint32_t root = 0; root < joined.size(); ++root) {
@@ -118,6 +133,7 @@ void check_functions() {
       check_sums<std::uint64_t>(joined, count);
       check_maxima<std::uint32_t>(joined, count);
       check_maxima<std::uint64_t>(joined, count);
+      check_several(joined, count);
       check_broadcast(joined, count);
     }
   }
@@ -142,6 +158,18 @@ void expect_rank_error(ranks& joined, std::size_t count) {
   }
 }
 
+// Sums two arrays of 5 values in all, or says what it finds.
+void sum_two(ranks& joined, std::size_t first) {
+  const wfpg::buffer<std::uint32_t, exec> values(exec(), std::vector<std::uint32_t>(5, 1));
+  const wfpg::reduction two[] = {wfpg::reduction::sum(values.view().subview(0, first)),
+                                 wfpg::reduction::sum(values.view().subview(first, 5 - first))};
+  try {
+    joined.all_reduce({two, 2});
+  } catch (const wfpg::rank_error& error) {
+    std::printf("rank %d: %s\n", world_rank(), error.what());
+  }
+}
+
 // The last rank ends by a signal, comes too late, or disagrees; the others say what they find.
 void lose_rank(const std::string& how) {
   ranks joined(exec(), MPI_COMM_WORLD, {short_limit});
@@ -159,6 +187,7 @@ void lose_rank(const std::string& how) {
     }
     return;
   }
+  if (how == "other_arrays") return sum_two(joined, is_last ? 2 : 3);
   expect_rank_error(joined, is_last && how == "other_count" ? 6 : 5);
 }
 

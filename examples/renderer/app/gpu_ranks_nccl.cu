@@ -15,7 +15,7 @@ std::unique_ptr<wfpg::communicator> join_by_nccl(const wfpg::exec::cuda& exec, w
   ranks.broadcast(wfpg::array_view<unsigned char>(bytes, sizeof(bytes)), 0);
   std::memcpy(&id, bytes, sizeof(id));
   return std::make_unique<wfpg::nccl_communicator<wfpg::exec::cuda>>(exec, ranks.rank(), ranks.size(), id,
-                                                                     wfpg::nccl_options{seconds});
+                                                                     wfpg::nccl_options{seconds, &ranks});
 }
 
 }  // namespace render

@@ -26,6 +26,26 @@ class rank_error : public std::runtime_error {
   explicit rank_error(const std::string& reason) : std::runtime_error("wfpg: " + reason) {}
 };
 
+/// One array that ranks reduce in place, for communicator::all_reduce().
+/// The array must stay where it is until the call returns. Copyable.
+struct reduction {
+  /// What becomes of the values: their sum or the largest, of 32 or 64 bits.
+  enum class kind : std::uint32_t { sum32, sum64, max32, max64 };
+
+  kind what = kind::sum32;  ///< what becomes of the values
+  void* values = nullptr;   ///< the first of them, in the memory of the communicator's policy
+  std::size_t count = 0;    ///< number of values, not bytes; may be 0
+
+  /// Returns the sum of 32-bit values, modulo 2^32.
+  static reduction sum(array_view<std::uint32_t> v) { return {kind::sum32, v.data(), v.size()}; }
+  /// Returns that of 64-bit values, modulo 2^64.
+  static reduction sum(array_view<std::uint64_t> v) { return {kind::sum64, v.data(), v.size()}; }
+  /// Returns the largest of 32-bit values.
+  static reduction max(array_view<std::uint32_t> v) { return {kind::max32, v.data(), v.size()}; }
+  /// Returns the largest of 64-bit values.
+  static reduction max(array_view<std::uint64_t> v) { return {kind::max64, v.data(), v.size()}; }
+};
+
 /// Joins ranks 0 to size() - 1. All ranks call the same functions in the same order with as many values.
 /// Arrays lie in the memory of the policy for which the communicator was made. A call is ordered after the
 /// policy's calls before it, and calls after it see its result. One thread at a time may call one rank's
@@ -47,8 +67,30 @@ class communicator {
   virtual void all_reduce_max(array_view<std::uint32_t> values) = 0;
   /// As above, of 64 bits.
   virtual void all_reduce_max(array_view<std::uint64_t> values) = 0;
+  /// Makes several reductions, whose arrays must not overlap. All ranks have equal kinds and numbers of
+  /// values in the same order. Here it makes one call after the other; adapters make one exchange of all.
+  virtual void all_reduce(array_view<const reduction> arrays) {
+    for (const reduction& one : arrays) reduce_one(one);
+  }
   /// Replaces the bytes of all ranks by those of the rank `root`.
   virtual void broadcast(array_view<unsigned char> bytes, std::uint32_t root) = 0;
+
+ private:
+  // Makes one reduction by the function of its kind.
+  void reduce_one(const reduction& one) {
+    const array_view<std::uint32_t> words(static_cast<std::uint32_t*>(one.values), one.count);
+    const array_view<std::uint64_t> longs(static_cast<std::uint64_t*>(one.values), one.count);
+    switch (one.what) {
+      case reduction::kind::sum32:
+        return all_reduce_sum(words);
+      case reduction::kind::sum64:
+        return all_reduce_sum(longs);
+      case reduction::kind::max32:
+        return all_reduce_max(words);
+      case reduction::kind::max64:
+        return all_reduce_max(longs);
+    }
+  }
 };
 
 }  // namespace wfpg

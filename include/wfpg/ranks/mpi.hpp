@@ -130,23 +130,22 @@ class mpi_communicator final : public communicator {
   std::uint32_t size() const override { return size_; }
   /// Sums 32-bit values; a piece on the host at a time.
   /// Throws rank_error where a rank is late, is lost, or calls with another number of values.
-  void all_reduce_sum(array_view<std::uint32_t> values) override {
-    reduce(detail::rank_function::sum32, values, MPI_UINT32_T, MPI_SUM);
-  }
+  void all_reduce_sum(array_view<std::uint32_t> values) override { reduce(reduction::sum(values)); }
   /// Sums 64-bit values.
   /// Throws rank_error likewise.
-  void all_reduce_sum(array_view<std::uint64_t> values) override {
-    reduce(detail::rank_function::sum64, values, MPI_UINT64_T, MPI_SUM);
-  }
+  void all_reduce_sum(array_view<std::uint64_t> values) override { reduce(reduction::sum(values)); }
   /// Takes the largest values of 32 bits.
   /// Throws rank_error likewise.
-  void all_reduce_max(array_view<std::uint32_t> values) override {
-    reduce(detail::rank_function::max32, values, MPI_UINT32_T, MPI_MAX);
-  }
+  void all_reduce_max(array_view<std::uint32_t> values) override { reduce(reduction::max(values)); }
   /// Takes the largest values of 64 bits.
   /// Throws rank_error likewise.
-  void all_reduce_max(array_view<std::uint64_t> values) override {
-    reduce(detail::rank_function::max64, values, MPI_UINT64_T, MPI_MAX);
+  void all_reduce_max(array_view<std::uint64_t> values) override { reduce(reduction::max(values)); }
+  /// Reduces several arrays, and checks once that ranks agree.
+  /// Throws rank_error likewise.
+  void all_reduce(array_view<const reduction> arrays) override {
+    const detail::rank_call call = detail::rank_call::of(arrays);
+    require_same(call);
+    for (const reduction& one : arrays) reduce_one(one, detail::name_of(call.function));
   }
   /// Sends the bytes of the rank `root` to all others.
   /// Throws rank_error likewise.
@@ -176,13 +175,24 @@ class mpi_communicator final : public communicator {
     std::unique_ptr<std::uint64_t[]> piece;
   };
 
-  /// Checks that ranks agree, and reduces values in the policy's memory.
+  /// Reduces one array.
+  void reduce(const reduction& one) { all_reduce(array_view<const reduction>(&one, 1)); }
+  /// Reduces values in the policy's memory. Ranks agree that they do.
+  /// `doing`: the function that was called, for messages.
+  void reduce_one(const reduction& one, const char* doing) {
+    const bool is_sum = one.what == reduction::kind::sum32 || one.what == reduction::kind::sum64;
+    const MPI_Op operation = is_sum ? MPI_SUM : MPI_MAX;
+    if (one.what == reduction::kind::sum32 || one.what == reduction::kind::max32)
+      reduce_in_pieces(static_cast<std::uint32_t*>(one.values), one.count, MPI_UINT32_T, operation, doing);
+    else
+      reduce_in_pieces(static_cast<std::uint64_t*>(one.values), one.count, MPI_UINT64_T, operation, doing);
+  }
+  /// As above, of values of a type that both languages know.
   template <class T>
-  void reduce(detail::rank_function function, array_view<T> values, MPI_Datatype type, MPI_Op operation) {
-    require_same({function, values.size()});
-    in_pieces(values, [&](void* piece, int count) {
-      all_reduce(piece, count, type, operation, detail::name_of(function));
-    });
+  void reduce_in_pieces(T* values, std::size_t count, MPI_Datatype type, MPI_Op operation,
+                        const char* doing) {
+    in_pieces(array_view<T>(values, count),
+              [&](void* piece, int n) { reduce_on_host(piece, n, type, operation, doing); });
   }
 
   /// Throws rank_error unless all ranks make this call.
@@ -190,8 +200,8 @@ class mpi_communicator final : public communicator {
   void require_same(const detail::rank_call& call) {
     if (!messages_) throw rank_error("the communicator is of no more use, since an earlier call has failed");
     call.write(messages_->call);
-    all_reduce(messages_->call, int(detail::rank_call::word_count), MPI_UINT64_T, MPI_MAX,
-               detail::name_of(call.function));
+    reduce_on_host(messages_->call, int(detail::rank_call::word_count), MPI_UINT64_T, MPI_MAX,
+                   detail::name_of(call.function));
     if (call.agrees(messages_->call)) return;
     // Ranks are no longer in step, so that later calls must fail, too.
     call.require_same(abandon().call, rank_);
@@ -215,7 +225,7 @@ class mpi_communicator final : public communicator {
 
   /// Reduces values on the host in place, and waits.
   /// `doing`: the function that was called, for messages.
-  void all_reduce(void* values, int count, MPI_Datatype type, MPI_Op operation, const char* doing) {
+  void reduce_on_host(void* values, int count, MPI_Datatype type, MPI_Op operation, const char* doing) {
     MPI_Request request = MPI_REQUEST_NULL;
     start(MPI_Iallreduce(MPI_IN_PLACE, values, count, type, operation, messages_->ranks, &request),
           "MPI_Iallreduce");

@@ -7,6 +7,7 @@
 //
 // Source: NCCL's user guide, "Creating a communicator with options" and "Fault tolerance".
 // Cost: two collectives a call, one of 32 bytes that checks that ranks agree.
+// The first is the host's where options name its communicator, which takes less time.
 // The host waits for each of them, since a kernel that waits for a lost rank never ends.
 //
 // Ranks join by a communicator that does not block, so that one that does not come is an error.
@@ -44,6 +45,10 @@ struct nccl_options {
   /// Seconds after which a rank that waits for others throws rank_error, in (0, 1e6].
   /// Work of the rank's own stream does not count.
   double seconds = 30.0;
+  /// Ranks of the host's memory, with equal numbers, by which calls are compared; null: NCCL compares them.
+  /// thread_communicator for GPUs of one process, or mpi_communicator.
+  /// It must outlive the communicator, and its time limit counts in calls.
+  communicator* host = nullptr;
 };
 
 /// A GPU that takes part, for join_devices().
@@ -80,6 +85,8 @@ inline ncclUniqueId make_nccl_id() {
 ///   const wfpg::exec::cuda exec;
 ///   wfpg::nccl_communicator<wfpg::exec::cuda> ranks(exec, rank, size, id);
 ///
+/// Joining connects the GPUs for arrays of all sizes, and takes 16 MiB of device memory meanwhile.
+///
 /// After rank_error, further calls throw at once.
 /// NCCL's work on the stream is aborted, so that the stream can be used.
 /// The guider's own arrays may then hold sums of some ranks.
@@ -95,13 +102,17 @@ class nccl_communicator final : public communicator {
   /// Throws std::invalid_argument where `rank` is not less than `size`, or for options out of range.
   nccl_communicator(const Exec& exec, std::uint32_t rank, std::uint32_t size, const ncclUniqueId& id,
                     const nccl_options& options = {})
-      : nccl_communicator(exec, rank, size, options) {
+      : exec_(exec), options_(options), rank_(rank), size_(size) {
+    require(rank < size, "rank", rank, "less than the number of ranks");
+    require(options.seconds > 0.0 && options.seconds <= 1.0e6, "seconds", options.seconds,
+            "above 0, up to 1e6");
     try {
       begin(id);
       wait_to_join("ncclCommInitRankConfig");
       begin_calls();
       wait_to_join("ncclCommSplit");
       meet();
+      connect();
     } catch (...) {
       // The destructor must not wait for ranks that have not joined.
       abandon();
@@ -131,23 +142,35 @@ class nccl_communicator final : public communicator {
   /// Returns the communicators of GPUs of this process, all of them, in the order of `devices`.
   /// Each is then for a thread of its own.
   /// The current GPU stays what it was.
-  /// Throws rank_error, device_error, or std::invalid_argument where there is no GPU.
+  /// Throws rank_error, device_error, or std::invalid_argument where there is no GPU, or for options.host.
   static std::vector<std::unique_ptr<nccl_communicator>> join_devices(
       const std::vector<nccl_device<Exec>>& devices, const nccl_options& options = {}) {
     require(!devices.empty(), "devices", devices.size(), "one or more");
+    require(!options.host, "host", "a communicator", "null here, since each rank needs its own");
+    // Before any rank waits for another.
     const detail::device_keeper keeper;
-    std::vector<std::unique_ptr<nccl_communicator>> all;
-    try {
-      begin_all(devices, options, all);
-      for (const std::unique_ptr<nccl_communicator>& one : all) one->wait_to_join("ncclCommInitRankConfig");
-      begin_calls_of(devices, all);
-      for (const std::unique_ptr<nccl_communicator>& one : all) one->wait_to_join("ncclCommSplit");
-      meet_all(devices, all);
-    } catch (...) {
-      // Where one has not joined, NCCL may still write to the others.
-      for (const std::unique_ptr<nccl_communicator>& one : all) one->abandon();
-      throw;
-    }
+    for (const nccl_device<Exec>& one : devices)
+      detail::check_runtime(cudaSetDevice(one.device), "cudaSetDevice");
+    const ncclUniqueId id = make_nccl_id();
+    std::vector<std::unique_ptr<nccl_communicator>> all(devices.size());
+    std::vector<std::exception_ptr> errors(devices.size());
+    // Each call of joining waits for all ranks.
+    std::vector<std::thread> threads;
+    for (std::size_t rank = 0; rank < devices.size(); ++rank)
+      threads.emplace_back([&, rank] {
+        try {
+          detail::check_runtime(cudaSetDevice(devices[rank].device), "cudaSetDevice");
+          all[rank] =
+              std::make_unique<nccl_communicator>(devices[rank].exec, static_cast<std::uint32_t>(rank),
+                                                  static_cast<std::uint32_t>(devices.size()), id, options);
+          all[rank]->is_of_one_thread_ = true;
+        } catch (...) {
+          errors[rank] = std::current_exception();
+        }
+      });
+    for (std::thread& thread : threads) thread.join();
+    for (const std::exception_ptr& error : errors)
+      if (error) std::rethrow_exception(error);
     return all;
   }
 
@@ -157,23 +180,20 @@ class nccl_communicator final : public communicator {
   std::uint32_t size() const override { return size_; }
   /// Sums 32-bit values in device memory.
   /// Throws rank_error where a rank is late, is lost, or calls with another number of values.
-  void all_reduce_sum(array_view<std::uint32_t> values) override {
-    reduce(detail::rank_function::sum32, values, ncclUint32, ncclSum);
-  }
+  void all_reduce_sum(array_view<std::uint32_t> values) override { reduce(reduction::sum(values)); }
   /// Sums 64-bit values.
   /// Throws rank_error likewise.
-  void all_reduce_sum(array_view<std::uint64_t> values) override {
-    reduce(detail::rank_function::sum64, values, ncclUint64, ncclSum);
-  }
+  void all_reduce_sum(array_view<std::uint64_t> values) override { reduce(reduction::sum(values)); }
   /// Takes the largest values of 32 bits.
   /// Throws rank_error likewise.
-  void all_reduce_max(array_view<std::uint32_t> values) override {
-    reduce(detail::rank_function::max32, values, ncclUint32, ncclMax);
-  }
+  void all_reduce_max(array_view<std::uint32_t> values) override { reduce(reduction::max(values)); }
   /// Takes the largest values of 64 bits.
   /// Throws rank_error likewise.
-  void all_reduce_max(array_view<std::uint64_t> values) override {
-    reduce(detail::rank_function::max64, values, ncclUint64, ncclMax);
+  void all_reduce_max(array_view<std::uint64_t> values) override { reduce(reduction::max(values)); }
+  /// Reduces several arrays as one group of NCCL's calls.
+  /// Throws rank_error likewise.
+  void all_reduce(array_view<const reduction> arrays) override {
+    exchange(detail::rank_call::of(arrays), [&] { return begin_group(arrays); });
   }
   /// Sends the bytes of the rank `root` to all others.
   /// Throws rank_error likewise.
@@ -187,18 +207,7 @@ class nccl_communicator final : public communicator {
   }
 
  private:
-  /// Joins nobody yet.
-  /// Checks arguments, and takes memory of the current GPU.
-  /// begin(), begin_calls() and wait_to_join() do the rest, so that several can begin before one waits.
-  nccl_communicator(const Exec& exec, std::uint32_t rank, std::uint32_t size, const nccl_options& options)
-      : exec_(exec), options_(options), rank_(rank), size_(size) {
-    require(rank < size, "rank", rank, "less than the number of ranks");
-    require(options.seconds > 0.0 && options.seconds <= 1.0e6, "seconds", options.seconds,
-            "above 0, up to 1e6");
-  }
-
   /// Begins to join the other ranks, and returns at once.
-  /// NCCL writes joined_ later where calls are grouped, so this object must not move.
   void begin(const ncclUniqueId& id) {
     ncclConfig_t config = NCCL_CONFIG_INITIALIZER;
     config.blocking = 0;
@@ -212,36 +221,6 @@ class nccl_communicator final : public communicator {
     ncclConfig_t config = NCCL_CONFIG_INITIALIZER;
     config.blocking = 1;
     require_taken(ncclCommSplit(joined_, 0, static_cast<int>(rank_), &ranks_, &config), "ncclCommSplit");
-  }
-
-  /// Begins to join GPUs of this process, and adds their communicators to `all`.
-  /// Changes the current GPU.
-  /// After an exception, `all` has those that were made.
-  static void begin_all(const std::vector<nccl_device<Exec>>& devices, const nccl_options& options,
-                        std::vector<std::unique_ptr<nccl_communicator>>& all) {
-    const ncclUniqueId id = make_nccl_id();
-    const auto size = static_cast<std::uint32_t>(devices.size());
-    // A group, so that no call waits for those after it.
-    detail::nccl_group group;
-    for (std::uint32_t rank = 0; rank < size; ++rank) {
-      detail::check_runtime(cudaSetDevice(devices[rank].device), "cudaSetDevice");
-      all.emplace_back(new nccl_communicator(devices[rank].exec, rank, size, options));
-      all.back()->is_of_one_thread_ = true;
-      all.back()->begin(id);
-    }
-    group.end();
-  }
-  /// begin_calls() of all of them, as a group, so that none waits for those after it.
-  /// Precondition: all of them have joined.
-  /// Changes the current GPU.
-  static void begin_calls_of(const std::vector<nccl_device<Exec>>& devices,
-                             const std::vector<std::unique_ptr<nccl_communicator>>& all) {
-    detail::nccl_group group;
-    for (const std::unique_ptr<nccl_communicator>& one : all) {
-      detail::check_runtime(cudaSetDevice(devices[one->rank_].device), "cudaSetDevice");
-      one->begin_calls();
-    }
-    group.end();
   }
 
   /// Throws rank_error where NCCL has not taken a call of ranks_.
@@ -258,51 +237,39 @@ class nccl_communicator final : public communicator {
     detail::check_nccl(begun, doing);
   }
 
-  /// Reduces values in place, in device memory.
-  /// `function`, `type` and `operation` say one thing in three ways: for the check, and for NCCL.
+  /// Reduces one array in device memory.
   /// Throws rank_error.
-  template <class T>
-  void reduce(detail::rank_function function, array_view<T> values, ncclDataType_t type,
-              ncclRedOp_t operation) {
-    exchange({function, values.size()}, [&] {
-      return ncclAllReduce(values.data(), values.data(), values.size(), type, operation, ranks_,
-                           exec_.stream());
-    });
+  void reduce(const reduction& one) { all_reduce(array_view<const reduction>(&one, 1)); }
+  /// Puts the collectives of arrays on the stream, and returns NCCL's result.
+  ncclResult_t begin_group(array_view<const reduction> arrays) {
+    detail::nccl_group group;
+    for (const reduction& one : arrays) {
+      const ncclResult_t taken = begin_one(one);
+      if (taken != ncclSuccess && taken != ncclInProgress) return taken;
+    }
+    return group.finish();
+  }
+  /// Puts the collective of one array on the stream, and returns NCCL's result.
+  ncclResult_t begin_one(const reduction& one) {
+    using kind = reduction::kind;
+    const bool is_sum = one.what == kind::sum32 || one.what == kind::sum64;
+    const bool is_short = one.what == kind::sum32 || one.what == kind::max32;
+    return ncclAllReduce(one.values, one.values, one.count, is_short ? ncclUint32 : ncclUint64,
+                         is_sum ? ncclSum : ncclMax, ranks_, exec_.stream());
   }
 
   /// Waits for all ranks, and exchanges no values.
-  /// NCCL connects the GPUs in it, where it is the first call.
   /// Throws rank_error where one does not come.
   void meet() {
     exchange(meeting, [] { return ncclSuccess; });
   }
-  /// meet() of GPUs of this process, by one thread.
-  /// NCCL connects them here, since a call that connects waits for all.
-  /// Later calls are made by threads, any of which may be late.
-  /// Changes the current GPU.
-  static void meet_all(const std::vector<nccl_device<Exec>>& devices,
-                       const std::vector<std::unique_ptr<nccl_communicator>>& all) {
-    const auto on_each = [&](const auto& f) {
-      for (const std::unique_ptr<nccl_communicator>& one : all) {
-        detail::check_runtime(cudaSetDevice(devices[one->rank_].device), "cudaSetDevice");
-        f(*one);
-      }
-    };
-    // Collectives are a group, since the first of them would wait for the others.
-    // Copies are not: in a group, only NCCL's calls come at its end.
-    on_each([](nccl_communicator& one) {
-      meeting.write(one.words_.host());
-      one.words_.send(one.exec_.stream());
-    });
-    const char* const doing = detail::name_of(meeting.function);
-    detail::nccl_group group;
-    for (const std::unique_ptr<nccl_communicator>& one : all) one->require_taken(one->compare_words(), doing);
-    group.end();
-    on_each([doing](nccl_communicator& one) {
-      one.wait(one.ranks_, doing, [] { return true; });  // until it is on the stream
-      one.words_.take(one.exec_.stream());
-    });
-    on_each([](nccl_communicator& one) { one.require_same(meeting); });
+  /// Connects the GPUs as arrays of all sizes need it, by summing some.
+  /// NCCL connects them in the first call of a size, which takes long, and where it may wait without a limit.
+  /// Throws rank_error, and device_error where memory ran out.
+  void connect() {
+    const detail::connecting_words words;
+    for (const std::size_t count : detail::connecting_words::counts)
+      reduce(reduction::sum(words.first(count)));
   }
 
   /// Makes a call with all ranks, and waits for it.
@@ -315,15 +282,35 @@ class nccl_communicator final : public communicator {
     const char* const doing = detail::name_of(call.function);
     // The rank's own work comes first, so that the time limit is for the others alone.
     detail::check_runtime(cudaStreamSynchronize(exec_.stream()), "cudaStreamSynchronize");
-    call.write(words_.host());
-    words_.send(exec_.stream());
-    require_begun(compare_words(), doing);
-    words_.take(exec_.stream());
-    require_same(call);
+    if (options_.host)
+      require_same_by_host(call);
+    else
+      require_same_by_nccl(call);
     // All ranks have come. NCCL connects them in the first calls of a size, and would wait in them.
     if (call.count == 0) return;
     require_begun(begin(), doing);
     wait_for_stream(doing);
+  }
+
+  /// Throws rank_error unless all ranks make this call, as the host's ranks find.
+  void require_same_by_host(const detail::rank_call& call) {
+    try {
+      call.write(words_.host());
+      options_.host->all_reduce_max({words_.host(), detail::rank_call::word_count});
+    } catch (...) {
+      abandon();
+      throw;
+    }
+    require_same(call);
+  }
+  /// As above, by NCCL.
+  void require_same_by_nccl(const detail::rank_call& call) {
+    call.write(words_.host());
+    words_.send(exec_.stream());
+    require_begun(compare_words(), detail::name_of(call.function));
+    words_.take(exec_.stream());
+    wait_for_stream(detail::name_of(call.function));
+    require_same(call);
   }
 
   /// Puts on the stream the collective of the words that ranks compare: their maxima.
@@ -334,11 +321,9 @@ class nccl_communicator final : public communicator {
                          ranks_, exec_.stream());
   }
 
-  /// Waits until the words of all ranks have come to the host.
-  /// Precondition: their collective and the copy back are on the stream.
   /// Throws rank_error unless all ranks make this call.
+  /// Precondition: the host has the maxima of all ranks' words.
   void require_same(const detail::rank_call& call) {
-    wait_for_stream(detail::name_of(call.function));
     if (call.agrees(words_.host())) return;
     // Ranks are no longer in step, so that later calls must fail, too.
     abandon();

@@ -15,6 +15,7 @@
 
 #include <wfpg/ranks/communicator.hpp>
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -59,11 +60,14 @@ class thread_ranks {
     std::string text() const;
   };
 
-  // Waits until all ranks made the call. Then writes its result over `data`.
+  // Waits until all ranks made the call. Then writes its result over `data`. Spins for a millisecond at
+  // first, since ranks that are equally fast come in less.
   void meet(std::uint32_t rank, const call& now, unsigned char* data);
   // Adds one rank's values to the turn's result.
   static void combine(std::uint32_t rank, const call& now, const unsigned char* data,
                       std::vector<unsigned char>& result);
+  // Waits until `turn` is completed, a rank is lost, or the limit has passed. The lock is free meanwhile.
+  void wait_for_turn(std::unique_lock<std::mutex>& lock, std::uint64_t turn);
   // Ends all calls that wait, and all that follow. The first reason stays.
   void lose(const std::string& reason);
   // Whether a rank was lost. No call is made then.
@@ -85,8 +89,8 @@ class thread_ranks {
   // Why no further call is made. Empty: calls are made.
   std::string lost_;
   // Turns are counted, so that a rank that waits knows its own.
-  std::uint64_t turn_ = 0;     // calls that were completed
-  std::uint32_t arrived_ = 0;  // ranks that made the call of this turn
+  std::atomic<std::uint64_t> turn_{0};  // calls that were completed; written with the lock held
+  std::uint32_t arrived_ = 0;           // ranks that made the call of this turn
   // The call of the turn, and the rank that made it first.
   call first_{};
   std::uint32_t first_rank_ = 0;

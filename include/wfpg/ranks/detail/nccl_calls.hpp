@@ -43,11 +43,13 @@ class nccl_group {
   ~nccl_group() {
     if (is_open_) ncclGroupEnd();
   }
-  /// Begins the calls. Throws rank_error.
-  void end() {
+  /// Begins the calls, and returns NCCL's result.
+  ncclResult_t finish() {
     is_open_ = false;
-    check_nccl(ncclGroupEnd(), "ncclGroupEnd");
+    return ncclGroupEnd();
   }
+  /// As above. Throws rank_error.
+  void end() { check_nccl(finish(), "ncclGroupEnd"); }
 
  private:
   bool is_open_ = true;
@@ -85,6 +87,32 @@ class cuda_event {
 
  private:
   cudaEvent_t event_ = nullptr;
+};
+
+/// Zeros in memory of the current device, whose sums connect GPUs.
+class connecting_words {
+ public:
+  /// Numbers of words by which NCCL chooses ways of its own: below a packet, up to many chunks.
+  static constexpr std::size_t counts[] = {1, 1 << 10, 1 << 14, 1 << 17, 1 << 21};
+
+  /// Throws device_error.
+  connecting_words() {
+    check_runtime(cudaMalloc(&words_, bytes), "cudaMalloc");
+    cudaMemset(words_, 0, bytes);
+  }
+  /// Not copyable: the memory has one owner.
+  connecting_words(const connecting_words&) = delete;
+  connecting_words& operator=(const connecting_words&) = delete;
+  /// Errors are ignored, as destructors must not throw.
+  ~connecting_words() { cudaFree(words_); }
+  /// Returns the first `count` words. Precondition: `count` is one of counts.
+  array_view<std::uint64_t> first(std::size_t count) const {
+    return {static_cast<std::uint64_t*>(words_), count};
+  }
+
+ private:
+  static constexpr std::size_t bytes = sizeof(std::uint64_t) << 21;
+  void* words_ = nullptr;
 };
 
 /// The words that ranks compare, in memory of the current device and in the host's.

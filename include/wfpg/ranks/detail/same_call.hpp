@@ -6,6 +6,7 @@
 // Memory: the four words.
 #pragma once
 
+#include <wfpg/base/math.hpp>
 #include <wfpg/ranks/communicator.hpp>
 
 #include <cstddef>
@@ -16,11 +17,13 @@
 namespace wfpg::detail {
 
 /// The functions of a communicator, and a meeting: an adapter's own, where ranks wait for each other.
-enum class rank_function : std::uint32_t { sum32, sum64, max32, max64, broadcast, meeting };
+/// The first four are numbered as reduction::kind.
+enum class rank_function : std::uint32_t { sum32, sum64, max32, max64, all, broadcast, meeting };
 
 /// Returns the function's name, for messages.
 inline const char* name_of(rank_function function) {
   if (function == rank_function::broadcast) return "broadcast";
+  if (function == rank_function::all) return "all_reduce";
   if (function == rank_function::meeting) return "the meeting of ranks that join or leave";
   const bool is_sum = function == rank_function::sum32 || function == rank_function::sum64;
   return is_sum ? "all_reduce_sum" : "all_reduce_max";
@@ -33,7 +36,18 @@ struct rank_call {
 
   rank_function function;  ///< the function that this rank calls
   std::uint64_t count;     ///< number of its values, or bytes
-  std::uint32_t root = 0;  ///< of a broadcast
+  std::uint32_t root = 0;  ///< of a broadcast; of several arrays, a hash of their kinds and sizes
+
+  /// Returns the call of communicator::all_reduce(). A single array is as if its own function was called.
+  static rank_call of(array_view<const reduction> arrays) {
+    if (arrays.size() == 1) return {static_cast<rank_function>(arrays[0].what), arrays[0].count};
+    std::uint64_t count = 0, kinds = arrays.size();
+    for (const reduction& one : arrays) {
+      count += one.count;
+      kinds = hash(hash(kinds, static_cast<std::uint64_t>(one.what)), one.count);
+    }
+    return {rank_function::all, count, static_cast<std::uint32_t>(kinds)};
+  }
 
   /// Writes the words whose maxima over all ranks agrees() and require_same() read.
   void write(std::uint64_t (&words)[word_count]) const {
@@ -54,7 +68,7 @@ struct rank_call {
                             std::to_string(count) + " values, ";
     const std::string others =
         is_function ? "ranks have " + std::to_string(~most[3]) + " to " + std::to_string(most[2])
-                    : std::string("another rank calls another function, or has another root");
+                    : std::string("another rank calls another function, or has another root or other arrays");
     throw rank_error(own + others + "; give all ranks the same scene, options and version of the program");
   }
 

@@ -4,6 +4,7 @@
 #include <wfpg/ranks/threads.hpp>
 
 #include <cstring>
+#include <thread>
 
 namespace wfpg {
 
@@ -64,13 +65,23 @@ inline void thread_ranks::meet(std::uint32_t rank, const call& now, unsigned cha
     arrived_ = 0;
     ++turn_;
     changed_.notify_all();
-  } else if (!changed_.wait_until(lock, std::chrono::steady_clock::now() + limit_,
-                                  [&] { return turn_ != turn || is_lost(); })) {
-    lose(missing() + " did not come within " + std::to_string(limit_.count()) + " ms");
+  } else {
+    wait_for_turn(lock, turn);
   }
   // A completed turn has a result, even if a rank was lost since.
   if (turn_ == turn) throw rank_error(lost_);
   if (now.bytes > 0) std::memcpy(data, result.data(), now.bytes);
+}
+
+inline void thread_ranks::wait_for_turn(std::unique_lock<std::mutex>& lock, std::uint64_t turn) {
+  using clock = std::chrono::steady_clock;
+  const clock::time_point begin = clock::now();
+  lock.unlock();
+  while (turn_.load() == turn && clock::now() - begin < std::chrono::milliseconds(1))
+    std::this_thread::yield();
+  lock.lock();
+  if (!changed_.wait_until(lock, begin + limit_, [&] { return turn_ != turn || is_lost(); }))
+    lose(missing() + " did not come within " + std::to_string(limit_.count()) + " ms");
 }
 
 inline void thread_ranks::combine(std::uint32_t rank, const call& now, const unsigned char* data,
