@@ -5,7 +5,7 @@
 #include "support/ranks.hpp"
 #include "support/scenes.hpp"
 
-#include <wfpg/exec/support/value_queue.hpp>
+#include <wfpg/exec/support/rank_exchange.hpp>
 
 #include <chrono>
 #include <cmath>
@@ -53,7 +53,13 @@ class counting_communicator final : public wfpg::communicator {
     to_.broadcast(values, root);
   }
 
+  void all_reduce(wfpg::array_view<const wfpg::reduction> arrays) override {
+    ++calls;
+    communicator::all_reduce(arrays);
+  }
+
   std::size_t bytes = 0;
+  std::size_t calls = 0;  // of all_reduce()
 
  private:
   wfpg::communicator& to_;
@@ -133,6 +139,65 @@ std::vector<keyed_value> scattered_values(std::size_t n) {
   return values;
 }
 
+/// What a rank has of an exchange of three queues and two arrays.
+struct exchanged {
+  std::vector<taken_sum> taken;     // of the first and last key of each queue
+  std::vector<std::uint32_t> sums;  // of the arrays
+  std::size_t takes = 0;            // of the arrays' results
+  std::size_t calls = 0, calls_after_two = 0;
+
+  bool operator==(const exchanged& other) const {
+    return taken == other.taken && sums == other.sums && takes == other.takes && calls == other.calls &&
+           calls_after_two == other.calls_after_two;
+  }
+};
+
+/// Queues a value of each of `n` keys, and with `twice` another of key 0.
+void queue_ones(const one_policy& exec, const wfpg::detail::value_queue_view& view, std::size_t n,
+                bool twice) {
+  exec.for_each(n + (twice ? 1 : 0), [=] WFPG_HD(std::size_t i) {
+    view.write(view.reserve(1), static_cast<std::uint32_t>(i % n), 1.0f);
+  });
+}
+/// Takes the first and last of `n` keys.
+void take_two(const one_policy& exec, const wfpg::detail::value_queue_view& view, std::size_t n,
+              std::vector<taken_sum>& to) {
+  const wfpg::buffer<taken_sum, one_policy> taken(exec, 2);
+  const wfpg::array_view<taken_sum> two = taken.view();
+  exec.for_each(2, [=] WFPG_HD(std::size_t i) {
+    two[i].sum = 0.0;
+    two[i].count = view.take(i * (n - 1), two[i].sum);
+  });
+  for (const taken_sum& one : taken.to_host(exec)) to.push_back(one);
+}
+
+exchanged exchange_of(wfpg::communicator& joins) {
+  constexpr std::size_t few[] = {5, 700, 9};  // keys of the queues; the last one has no values
+  const one_policy exec;
+  const std::uint32_t rank = joins.rank();
+  counting_communicator counting(joins);
+  std::vector<wfpg::detail::value_queue<one_policy>> queues;
+  for (const std::size_t n : few) queues.emplace_back(exec, 2 * n, n, &counting);
+  for (std::size_t q = 0; q < 2; ++q) queue_ones(exec, queues[q].view(), few[q], rank == 0);
+  const wfpg::buffer<std::uint32_t, one_policy> sum(exec, std::vector<std::uint32_t>{rank + 1}),
+      most(exec, std::vector<std::uint32_t>{rank + 1});
+
+  exchanged result;
+  wfpg::detail::rank_exchange<one_policy> all(counting);
+  for (wfpg::detail::value_queue<one_policy>& queue : queues) all.add(queue);
+  all.add(wfpg::reduction::sum(sum.view()), [&] { result.takes += 1; });
+  all.add(wfpg::reduction::max(most.view()), [&] { result.takes += 2; });
+  all.run(exec);
+  for (wfpg::detail::value_queue<one_policy>& queue : queues) queue.sum(exec);
+  result.calls = counting.calls;
+  result.sums = {sum.to_host(exec)[0], most.to_host(exec)[0]};
+  for (std::size_t q = 0; q < 3; ++q) take_two(exec, queues[q].view(), few[q], result.taken);
+  // What was summed ahead counts once.
+  queues[2].sum(exec);
+  result.calls_after_two = counting.calls;
+  return result;
+}
+
 }  // namespace
 
 TEST_CASE("any number of ranks has the sums of one queue", "[packed_sums]") {
@@ -185,15 +250,33 @@ TEST_CASE("blocks of as many values as there may be fill lanes of 32 bits", "[pa
     if (rank == 3) own[63] = all[63];
     const one_policy exec;
     const wfpg::buffer<pending_values, one_policy> pending(exec, own);
-    wfpg::detail::packed_sums<one_policy> packed(exec, few);
-    packed.reduce(exec, joins, pending.view());
+    // A second queue of other keys, which has the first three alone.
+    const wfpg::buffer<pending_values, one_policy> others(
+        exec, std::vector<pending_values>(own.begin(), own.begin() + 3));
+    wfpg::detail::packed_sums<one_policy> packed(exec, few), packed_others(exec, 3);
+    std::vector<wfpg::detail::sums_to_pack<one_policy>> both{{&packed, pending.view(), {}},
+                                                             {&packed_others, others.view(), {}}};
+    wfpg::detail::packed_sums<one_policy>::reduce(exec, joins, both);
     found[rank] = pending.to_host(exec);
+    for (const pending_values& one : others.to_host(exec)) found[rank].push_back(one);
   });
+  for (std::size_t key = 0; key < 3; ++key) all.push_back(all[key]);
   CHECK(errors == std::vector<std::string>(ranks));
   for (const std::vector<pending_values>& of_rank : found)
-    for (std::size_t key = 0; key < few; ++key) {
+    for (std::size_t key = 0; key < all.size(); ++key) {
       CAPTURE(key);
       CHECK(of_rank[key].sum == all[key].sum);
       CHECK(of_rank[key].count == all[key].count);
     }
+}
+
+TEST_CASE("Several queues and arrays take five reductions, and have the sums of all ranks", "[packed_sums]") {
+  constexpr std::uint32_t ranks = 3;
+  std::vector<exchanged> found(ranks);
+  const std::vector<std::string> errors = run_ranks<one_policy>(
+      ranks, limit, [&](wfpg::communicator& joins) { found[joins.rank()] = exchange_of(joins); });
+  CHECK(errors == std::vector<std::string>(ranks));
+  // Keys have a value of each rank, and key 0 has two of rank 0.
+  const exchanged expected{{{4.0, 4}, {3.0, 3}, {4.0, 4}, {3.0, 3}, {0.0, 0}, {0.0, 0}}, {6, 3}, 3, 5, 6};
+  for (const exchanged& of_rank : found) CHECK((of_rank == expected));
 }

@@ -90,9 +90,10 @@ void path_guider<Exec, Guide>::end_sample() {
     guide_.update(now());
   else if (!lights_rest_now_)
     guide_.end_rest(now());
-  if (options_.ranks)
-    shared_counters_.sum(exec_, *options_.ranks,
-                         detail::counters_in_a_row<std::uint32_t>{recorder_.counters().data()});
+  if (!options_.ranks) return;
+  detail::rank_exchange<Exec> all(*options_.ranks);
+  shared_counters_.add_to(exec_, all, detail::counters_in_a_row<std::uint32_t>{recorder_.counters().data()});
+  all.run(exec_);
 }
 
 // Runs before the guide learns, so that the cache does not have the paths that are measured. Once a sample:

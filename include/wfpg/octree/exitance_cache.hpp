@@ -14,8 +14,8 @@
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/support/atomic.hpp>
 #include <wfpg/exec/support/rank_counters.hpp>
+#include <wfpg/exec/support/rank_exchange.hpp>
 #include <wfpg/exec/support/thrust.hpp>
-#include <wfpg/exec/support/value_queue.hpp>
 #include <wfpg/octree/bottom_up.hpp>
 #include <wfpg/octree/sparse_voxel_octree.hpp>
 #include <wfpg/octree/statistics.hpp>
@@ -247,10 +247,11 @@ class exitance_cache {
   /// Packed normal of each node, as the cache stores it, for ranks to compare. Equal scenes have equal ones.
   /// Waits for the work before it.
   std::vector<std::uint16_t> normals(const Exec& exec) const { return normals_.to_host(exec); }
-  /// Adds up the deposits that all ranks dropped, so that dropped() has the sum on each of them. 12 bytes of
-  /// traffic. Throws rank_error.
-  void sum_dropped(const Exec& exec, communicator& ranks) {
-    shared_counters_.sum(exec, ranks, detail::counters_in_a_row<std::uint32_t>{counters_.data()});
+  /// Adds the deposits of all ranks to an exchange, for update(), and how many were dropped. Then dropped()
+  /// has the sum on each rank. `deposits`: whether update() follows.
+  void share(const Exec& exec, detail::rank_exchange<Exec>& all, bool deposits) {
+    if (deposits && queue_.capacity() > 0) all.add(queue_);
+    shared_counters_.add_to(exec, all, detail::counters_in_a_row<std::uint32_t>{counters_.data()});
   }
   /// Number of deposits dropped since the cache was built, by reason. It waits for the work before it.
   dropped_deposits dropped(const Exec& exec) const {

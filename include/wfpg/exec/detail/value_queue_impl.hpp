@@ -22,18 +22,40 @@ struct set_unit_of_ranks {
 
 /// Units follow from the values of all ranks, so that their sums can be added up.
 template <class Exec>
-void value_queue<Exec>::sum_of_ranks(const Exec& exec) {
-  exec.for_each(all_queued_.size(), count_queued{queued_.data(), view_.capacity_, all_queued_.data()});
-  ranks_->all_reduce_sum(all_queued_.view());
-  const std::uint64_t all = read_element(exec, all_queued_.data());
-  require(all <= most_queued, "values that all ranks record in a sample", all, "at most 2^31");
-  if (all > 0) {
-    ranks_->all_reduce_max(largest_.view());
-    exec.for_each(units_.size(), set_unit_of_ranks{view_, static_cast<std::uint32_t>(all)});
-    exec.for_each(exec::device_count{queued_.data(), queue_.size()}, add_queued_values{view_});
-    if (ranks_->size() > 1) packed_.reduce(exec, *ranks_, pending_.view());
+void value_queue<Exec>::sum_of_ranks(const Exec& exec, communicator& ranks,
+                                     const std::vector<value_queue*>& queues, std::vector<reduction> arrays) {
+  for (value_queue* const one : queues) {
+    std::uint64_t* const count = one->all_queued_.data();
+    exec.for_each(one->all_queued_.size(), count_queued{one->queued_.data(), one->view_.capacity_, count});
+    arrays.push_back(reduction::sum(one->all_queued_.view()));
   }
-  empty(exec);
+  ranks.all_reduce({arrays.data(), arrays.size()});
+
+  // Of queues with values.
+  arrays.clear();
+  std::vector<value_queue*> with_values;
+  std::vector<std::uint32_t> counts;
+  for (value_queue* const one : queues) {
+    const std::uint64_t all = read_element(exec, one->all_queued_.data());
+    require(all <= most_queued, "values that all ranks record in a sample", all, "at most 2^31");
+    if (all == 0) continue;
+    with_values.push_back(one);
+    counts.push_back(static_cast<std::uint32_t>(all));
+    arrays.push_back(reduction::max(one->largest_.view()));
+  }
+  if (!arrays.empty()) ranks.all_reduce({arrays.data(), arrays.size()});
+  std::vector<sums_to_pack<Exec>> sums;
+  for (std::size_t i = 0; i < with_values.size(); ++i) {
+    value_queue* const one = with_values[i];
+    exec.for_each(one->units_.size(), set_unit_of_ranks{one->view_, counts[i]});
+    exec.for_each(exec::device_count{one->queued_.data(), one->queue_.size()}, add_queued_values{one->view_});
+    sums.push_back({&one->packed_, one->pending_.view(), {}});
+  }
+  if (ranks.size() > 1) packed_sums<Exec>::reduce(exec, ranks, sums);
+  for (value_queue* const one : queues) {
+    one->empty(exec);
+    one->is_summed_ = true;
+  }
 }
 
 }  // namespace wfpg::detail

@@ -21,6 +21,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 namespace wfpg::detail {
 
@@ -187,6 +188,18 @@ struct call_packed_step {
   }
 };
 
+template <class Exec>
+class packed_sums;
+
+/// Sums of one queue, for packed_sums::reduce().
+template <class Exec>
+struct sums_to_pack {
+  // The caller sets the first two.
+  packed_sums<Exec>* memory;           ///< for as many keys; no other sums of the call have it
+  array_view<pending_values> pending;  ///< by key; a sum without values must be 0
+  packed_sums_view view;               ///< set by the call
+};
+
 /// Adds up the sums of all ranks.
 /// Takes three reductions, since what is sent next follows from what came before.
 /// Owns the memory for it, in that of `Exec`; words grow with what samples have.
@@ -209,39 +222,60 @@ class packed_sums {
     return totals_.bytes() + count_ends_.bytes() + sum_ends_.bytes() + counts_.bytes() + sums_.bytes();
   }
 
-  /// Gives all ranks the sums and counts of all of them.
-  /// All ranks call it with as many keys, and with sums in equal units.
-  /// `pending`: by key; a sum without values must be 0.
+  /// Gives all ranks the sums and counts of all of them, for several queues at once.
+  /// All ranks call it with as many queues and keys, and with sums in equal units.
   /// Preconditions: all ranks have at most 2³¹ values; a single value's sum has at most 24 significant bits.
-  /// Waits for the host twice. Throws rank_error and out_of_memory.
-  void reduce(const Exec& exec, communicator& ranks, array_view<pending_values> pending) {
-    packed_sums_view view;
-    view.pending = pending.data();
-    view.keys = pending.size();
-    view.totals = totals_.data();
-    view.counts.ends = count_ends_.data();
-    view.sums.ends = sum_ends_.data();
+  /// Waits for the host twice a queue. Throws rank_error and out_of_memory.
+  static void reduce(const Exec& exec, communicator& ranks, std::vector<sums_to_pack<Exec>>& all) {
+    if (all.empty()) return;
     // Totals decide how wide counts are.
-    run<packed_step::count>(exec, view);
-    ranks.all_reduce_sum(totals_.view());
+    // Of each queue, so that queues with few values a key send narrow ones.
+    std::vector<reduction> arrays;
+    for (sums_to_pack<Exec>& one : all) arrays.push_back(one.memory->begin(exec, one));
+    ranks.all_reduce({arrays.data(), arrays.size()});
 
     // Counts decide what is sent of each key.
-    run<packed_step::measure_counts>(exec, view);
-    const array_view<std::uint64_t> counts = fit(exec, counts_, count_ends_);
-    view.counts.words = counts.data();
-    run<packed_step::put_counts>(exec, view);
-    ranks.all_reduce_sum(counts);
+    arrays.clear();
+    for (sums_to_pack<Exec>& one : all) arrays.push_back(one.memory->pack_counts(exec, one));
+    ranks.all_reduce({arrays.data(), arrays.size()});
 
     // Where both are known, sums and floats are sent, and then unpacked.
-    run<packed_step::measure_sums>(exec, view);
-    const array_view<std::uint64_t> sums = fit(exec, sums_, sum_ends_);
-    view.sums.words = sums.data();
-    run<packed_step::put_sums>(exec, view);
-    ranks.all_reduce_sum(sums);
-    run<packed_step::take_sums>(exec, view);
+    arrays.clear();
+    for (sums_to_pack<Exec>& one : all) arrays.push_back(one.memory->pack_sums(exec, one));
+    ranks.all_reduce({arrays.data(), arrays.size()});
+    for (sums_to_pack<Exec>& one : all) one.memory->template run<packed_step::take_sums>(exec, one.view);
   }
 
  private:
+  // The first step: totals of blocks.
+  // Sets where the other steps find their arrays.
+  reduction begin(const Exec& exec, sums_to_pack<Exec>& one) {
+    one.view.pending = one.pending.data();
+    one.view.keys = one.pending.size();
+    one.view.totals = totals_.data();
+    one.view.counts.ends = count_ends_.data();
+    one.view.sums.ends = sum_ends_.data();
+    run<packed_step::count>(exec, one.view);
+    return reduction::sum(totals_.view());
+  }
+  // The second: counts of keys, as wide as totals say.
+  // Steps before it are done on all ranks.
+  reduction pack_counts(const Exec& exec, sums_to_pack<Exec>& one) {
+    run<packed_step::measure_counts>(exec, one.view);
+    const array_view<std::uint64_t> counts = fit(exec, counts_, count_ends_);
+    one.view.counts.words = counts.data();
+    run<packed_step::put_counts>(exec, one.view);
+    return reduction::sum(counts);
+  }
+  // The third: sums and floats of keys, which counts tell apart.
+  // Waits for their number, as the second does.
+  reduction pack_sums(const Exec& exec, sums_to_pack<Exec>& one) {
+    run<packed_step::measure_sums>(exec, one.view);
+    const array_view<std::uint64_t> sums = fit(exec, sums_, sum_ends_);
+    one.view.sums.words = sums.data();
+    run<packed_step::put_sums>(exec, one.view);
+    return reduction::sum(sums);
+  }
   // Runs a step for all blocks.
   // Steps before it are done, and those of other ranks as far as reductions say.
   template <packed_step step>

@@ -8,7 +8,7 @@
 
 #include <wfpg/base/math.hpp>
 #include <wfpg/exec/buffer.hpp>
-#include <wfpg/ranks/communicator.hpp>
+#include <wfpg/exec/support/rank_exchange.hpp>
 
 #include <cstddef>
 
@@ -58,12 +58,14 @@ class rank_counters {
   void restart(const Exec& exec, const At& at) {
     exec.for_each(shared_.size(), take_counts<T, At>{shared_.data(), at, true});
   }
-  /// Gives all ranks the sums, but no more than `most`. Throws rank_error.
+  /// Adds them to an exchange, which gives all ranks the sums, but no more than `most`. They must stay where
+  /// they are until it has run.
   template <class At>
-  void sum(const Exec& exec, communicator& ranks, const At& at, T most = static_cast<T>(~T(0))) {
-    exec.for_each(shared_.size(), take_counts<T, At>{shared_.data(), at, ranks.rank() == 0});
-    ranks.all_reduce_sum(shared_.view());
-    exec.for_each(shared_.size(), put_counts<T, At>{shared_.data(), at, most});
+  void add_to(const Exec& exec, rank_exchange<Exec>& all, const At& at, T most = static_cast<T>(~T(0))) {
+    exec.for_each(shared_.size(), take_counts<T, At>{shared_.data(), at, all.ranks().rank() == 0});
+    all.add(reduction::sum(shared_.view()), [this, exec, at, most] {
+      exec.for_each(shared_.size(), put_counts<T, At>{shared_.data(), at, most});
+    });
   }
   /// Bytes in the policy's memory.
   std::size_t bytes() const { return shared_.bytes(); }

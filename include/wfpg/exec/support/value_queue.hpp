@@ -7,7 +7,7 @@
 // Of 2²⁰ values, those down to 2⁻¹⁹ of their group's largest keep all 24 bits.
 // Below 2⁻⁴³ they count as 0.
 // Where several ranks share a sample, each queues the values of its paths.
-// sum() then adds up the sums of all ranks, too.
+// sum() then adds up the sums of all ranks, too; rank_exchange.hpp sums several queues at once.
 // Traffic: 8 bytes, 4 a group, and that of packed_sums.hpp.
 // Source: sums of floats in fixed point, as in reproducible summation (Demmel and Nguyen 2013).
 // Cost: two atomics a value, one a reservation, and one where a value is its group's largest so far.
@@ -23,6 +23,8 @@
 #include <wfpg/ranks/communicator.hpp>
 
 #include <thrust/fill.h>
+
+#include <vector>
 
 namespace wfpg::detail {
 
@@ -280,17 +282,24 @@ class value_queue {
   /// std::invalid_argument above 2³¹ values.
   /// Call end_takes() before the next one: sums that are left are forgotten with their group.
   void sum(const Exec& exec) {
-    if (ranks_) return sum_of_ranks(exec);
+    if (ranks_) {
+      if (!is_summed_) sum_of_ranks(exec, *ranks_, {this}, {});
+      is_summed_ = false;
+      return;
+    }
     exec.for_each(units_.size(), set_group_unit{view_});
     exec.for_each(exec::device_count{queued_.data(), queue_.size()}, add_queued_values{view_});
     empty(exec);
   }
   /// Says that all sums were taken. Groups then have none. O(keys / 512).
   void end_takes(const Exec& exec) { exec.for_each(units_.size(), end_takes_of_group{view_}); }
+  /// Does for several queues with ranks what their next sum() would, which then does nothing.
+  /// They share their reductions, the first of which has `arrays`, too.
+  /// Waits and throws as sum() does.
+  static void sum_of_ranks(const Exec& exec, communicator& ranks, const std::vector<value_queue*>& queues,
+                           std::vector<reduction> arrays);
 
  private:
-  /// Adds the values of all ranks to their keys' sums.
-  void sum_of_ranks(const Exec& exec);
   void empty(const Exec& exec) {
     exec.fill_bytes(largest_.data(), 0, largest_.bytes());
     // Should this fail, a repeated sum adds and counts all values twice, which leaves their means.
@@ -298,6 +307,7 @@ class value_queue {
   }
 
   communicator* ranks_ = nullptr;
+  bool is_summed_ = false;  // by sum_of_ranks(), for the next sum()
   buffer<std::uint64_t, Exec> queue_;
   buffer<pending_values, Exec> pending_;         // a key
   buffer<std::uint32_t, Exec> largest_, units_;  // a group

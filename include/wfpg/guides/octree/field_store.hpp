@@ -7,7 +7,8 @@
 // Keeping fields and learning are wfpg's own.
 //
 // A sample:  begin_sample, then for each wave prepare, or find_and_sample where it would build none, then
-//   aim where the cache changed, then end_sample. Nothing is read back to the host with an inline caster.
+//   aim where the cache changed, then end_sample; with ranks share before that. Nothing is read back to the
+//   host with an inline caster.
 //
 // Cost of a wave of n rays: O(n · depth) look-ups. A new slot casts F² cones, and a refresh F²/R; either
 // takes O(F²). Memory: the budget, 4 bytes a ray, 8 bytes a leaf and 4 an inner node. Where fields learn, a
@@ -112,6 +113,9 @@ class field_store {
   /// fields also learn their fractions of guided directions.
   learnt_radiance_view learnt(bool with_fractions = true) const { return pool_.learnt(with_fractions); }
 
+  /// Adds what a sample's end needs of other ranks to an exchange, which must run before end_sample(). Only
+  /// with ranks. `recorded`: as there.
+  void share(const Exec& exec, detail::rank_exchange<Exec>& all, bool recorded);
   /// Ends the sample. Fields learn if anything was `recorded` in learnt(). After samples 1, 2, 4, 8, ...
   /// chooses bins anew by the rays counted so far. Also where another part of the paths is guided from the
   /// next sample on: one in 2^log2_divisor. Bins are then as much larger, so that they have as many guided

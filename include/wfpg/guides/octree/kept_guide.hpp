@@ -105,6 +105,8 @@ class kept_guide : public octree_scene<Exec> {
   /// Updates the cache, fields and choices of lights. Call after each sample, recorded or not. O(deposits +
   /// nodes + cells of the fields used).
   void update(const sample_context<Exec>& at) {
+    // First, since the cache and fields learn from what all ranks found.
+    scene::exchange(at, [&](auto& all) { store_.share(at.exec, all, scene::has_deposits()); });
     const bool recorded = scene::update_cache(at);
     if (recorded) store_.aim(at.exec, scene::cache());
     store_.end_sample(at.exec, recorded, at.guided_next.log2_divisor());

@@ -14,7 +14,7 @@
 #include <wfpg/base/prefix_search.hpp>
 #include <wfpg/bins/spatial_binner.hpp>
 #include <wfpg/exec/buffer.hpp>
-#include <wfpg/exec/support/value_queue.hpp>
+#include <wfpg/exec/support/rank_exchange.hpp>
 #include <wfpg/guides/octree/detail/learn_lights.hpp>
 #include <wfpg/guides/octree/options.hpp>
 #include <wfpg/host/recorded_runs.hpp>
@@ -144,6 +144,10 @@ class light_guide {
 
   /// Begins a sample. `seed` decides which paths it records.
   void begin_sample(std::uint32_t seed) { view_.runs_.seed = seed; }
+  /// Adds the deposits of all ranks to an exchange, for end_sample(). Only with ranks.
+  void share(detail::rank_exchange<Exec>& all) {
+    if (!view_.empty() && queue_.capacity() > 0) all.add(queue_);
+  }
   /// Learns from the sample's deposits, and updates all probabilities. O(choices + nodes * groups).
   void end_sample(const Exec& exec);
   /// Forgets all means, and deposits since the last end_sample(). Probabilities follow the weights again.

@@ -73,7 +73,10 @@ class octree_scene : public guide_base {
   /// Neither fields nor cache take part.
   void begin_rest(const sample_context<Exec>& at) { begin_scene_sample(at); }
   /// Ends a sample without the guide: light choices learn from it.
-  void end_rest(const sample_context<Exec>& at) { end_scene_sample(at); }
+  void end_rest(const sample_context<Exec>& at) {
+    exchange(at, [](const auto&) {});
+    end_scene_sample(at);
+  }
 
  protected:
   /// Builds octree and cache from fragments. `exec` allocates what is kept; `working` what each sample needs
@@ -149,11 +152,29 @@ class octree_scene : public guide_base {
     has_deposits_ = true;
     deposit_paths(at.exec, paths, cache_.view(), learnt);
   }
+  /// Whether the sample has deposits, which change the cache. A host that has its own may have made some in
+  /// any sample.
+  bool has_deposits() const { return has_deposits_ || options_.deposit_capacity.value_or(0) > 0; }
+  /// Gives all ranks what each has found in the sample, and what they counted, for statistics and files.
+  /// Call it before the cache and choices of lights change; without ranks it does nothing.
+  ///
+  /// `more`: (rank_exchange&), adds what a derived guide has, in an order that all ranks share. Waits for the
+  /// work before it. Throws rank_error.
+  template <class More>
+  void exchange(const sample_context<Exec>& at, const More& more) {
+    if (!options_.ranks) return;
+    // Ranks add the parts in this order.
+    detail::rank_exchange<Exec> all(*options_.ranks);
+    cache_.share(at.exec, all, has_deposits());
+    lights_.share(all);
+    shared_counts_.add_to(at.exec, all, detail::rays_of_depth{counts_.data()});
+    more(all);
+    all.run(at.exec);
+  }
   /// Folds the sample's deposits into the cache. Returns false where there cannot be any, and then does
   /// nothing. O(deposits + nodes).
   bool update_cache(const sample_context<Exec>& at) {
-    // A host that has its own deposits may have made some in any sample.
-    const bool deposits = has_deposits_ || options_.deposit_capacity.value_or(0) > 0;
+    const bool deposits = has_deposits();
     if (deposits) cache_.update(at.exec);
     return deposits;
   }
@@ -161,7 +182,6 @@ class octree_scene : public guide_base {
   void end_scene_sample(const sample_context<Exec>& at) {
     lights_.end_sample(at.exec);
     has_deposits_ = false;
-    if (options_.ranks) sum_counts(at.exec);
   }
   /// Forgets all cached light and all that light choices learnt. Deposits that are queued are lost too. The
   /// octree stays. For scenes whose lights moved.
@@ -185,18 +205,13 @@ class octree_scene : public guide_base {
  private:
   friend struct detail::guide_sections;
 
-  // Adds up what the ranks counted, for statistics and files. Without it a file would have one rank's counts
-  // of rays and dropped deposits. All else in it is exchanged where it is learnt.
-  void sum_counts(const Exec& exec) {
-    cache_.sum_dropped(exec, *options_.ranks);
-    shared_counts_.sum(exec, *options_.ranks, detail::rays_of_depth{counts_.data()});
-  }
-  // `deposits_per_leaf` times the leaves: vertices that a sample is to record, 0 for all.
+  // Which paths are recorded: those of `deposits_per_leaf` times the leaves vertices a sample, or all where
+  // the option is unset.
   detail::recorded_fraction recorded() const {
     return {options_, std::uint64_t(options_.deposits_per_leaf.value_or(0)) * octree_.leaf_count()};
   }
 
-  // As given to the constructor.
+  // As given to the constructor. Its ranks outlive the guide.
   //
   // In the order of construction: the cache is built from the fragments that the octree sorted.
   octree_guide_options options_;
@@ -208,7 +223,7 @@ class octree_scene : public guide_base {
   gain_meter<Exec> meter_;
   // P² points over the hemisphere, then P² over the sphere.
   buffer<product_point, Exec> product_points_;  // P² over the hemisphere, then P² over the sphere
-  // One element a depth, since the guide was made.
+  // One element a depth, since the guide was made. Kernels add to it.
   buffer<depth_statistics, Exec> counts_;  // a depth, at most max_depth
   // With ranks: rays and unbinned rays of each depth. Bins and cones are equal on all ranks, since each makes
   // all fields.

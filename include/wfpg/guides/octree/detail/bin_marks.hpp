@@ -108,7 +108,7 @@ template <class Exec>
 class bin_marks {
  public:
   bin_marks() = default;
-  /// `has_ranks`: sum_ranks() will be called.
+  /// `has_ranks`: share() will be called.
   bin_marks(const Exec& exec, const sparse_voxel_octree_view& tree, const binning_options& options,
             bool has_ranks = false)
       : tree_(tree),
@@ -125,9 +125,9 @@ class bin_marks {
   bin_marks_view view() const { return {tree_.first_leaf(), leaves_.data(), inner_.data()}; }
   std::size_t bytes() const { return leaves_.bytes() + inner_.bytes() + shared_.bytes(); }
 
-  /// Adds up the rays that all ranks counted: 4 bytes a leaf. Throws rank_error.
-  void sum_ranks(const Exec& exec, communicator& ranks) {
-    shared_.sum(exec, ranks, leaf_ray_count{leaves_.data()}, bin_marks_view::most);
+  /// Adds the rays that all ranks counted to an exchange: 4 bytes a leaf.
+  void share(const Exec& exec, rank_exchange<Exec>& all) {
+    shared_.add_to(exec, all, leaf_ray_count{leaves_.data()}, bin_marks_view::most);
   }
   /// Takes counts of a file as those of all ranks.
   void restart_ranks(const Exec& exec) { shared_.restart(exec, leaf_ray_count{leaves_.data()}); }

@@ -6,8 +6,8 @@
 #pragma once
 
 #include <wfpg/exec/buffer.hpp>
+#include <wfpg/exec/support/rank_exchange.hpp>
 #include <wfpg/exec/support/running_mean.hpp>
-#include <wfpg/exec/support/value_queue.hpp>
 #include <wfpg/guides/octree/field_cells.hpp>
 #include <wfpg/guides/octree/field_slots.hpp>
 #include <wfpg/guides/octree/guide_view.hpp>
@@ -95,6 +95,10 @@ class field_pool {
     if (!learns()) return {};
     return {array_view<const resident_field>(fields_.data(), fields_.size()), resolution_, queue_.view(),
             with_fractions ? fractions_.data() : nullptr};
+  }
+  /// Adds the recorded values of all ranks to an exchange, for learn().
+  void share(rank_exchange<Exec>& all) {
+    if (learns()) all.add(queue_);
   }
   /// Adds the recorded values to the means of their fields, and to the fractions of those that were used in
   /// `sample`. O(values + cells of these fields).

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <wfpg/exec/buffer.hpp>
+#include <wfpg/exec/support/rank_exchange.hpp>
 #include <wfpg/guides/octree/detail/slot_table.hpp>
 #include <wfpg/guides/octree/kept_field.hpp>
 #include <wfpg/ranks/communicator.hpp>
@@ -79,7 +80,8 @@ struct exchange_use {
   }
 };
 
-/// Kernel: sums that a slot's fractions learn from, to or from arrays. Of slots that no ray used, zeros.
+/// Kernel: sums that a slot's fractions learn from, to or from arrays. Those of slots that no rank used are
+/// not written back: they may be anything.
 struct exchange_fractions {
   array_view<const field_slot> slots;
   std::uint32_t sample;
@@ -89,17 +91,17 @@ struct exchange_fractions {
   bool back;
 
   WFPG_HD void operator()(std::size_t i) const {
-    const bool used = slots[i].last_used == sample;
+    if (back && slots[i].last_used != sample) return;
     for (std::uint32_t kind = 0; kind < 2; ++kind) {
       fraction_sums& of_slot = fractions[i].sums[kind];
       std::uint64_t* const to = sums + 6 * i + 3 * kind;
       std::uint32_t& most = largest[2 * i + kind];
       if (!back) {
-        to[0] = used ? of_slot.light : 0;
-        to[1] = used ? of_slot.guided : 0;
-        to[2] = used ? of_slot.count : 0;
-        most = used ? of_slot.largest : 0;
-      } else if (used) {
+        to[0] = of_slot.light;
+        to[1] = of_slot.guided;
+        to[2] = of_slot.count;
+        most = of_slot.largest;
+      } else {
         of_slot.light = to[0];
         of_slot.guided = to[1];
         of_slot.count = static_cast<std::uint32_t>(to[2]);
@@ -175,22 +177,24 @@ class field_ranks {
     ranks_->all_reduce_sum({reinterpret_cast<std::uint32_t*>(hits.data()), hits.size()});
   }
 
-  /// Notes the slots that rays of any rank used.
-  void share_use(const Exec& exec, array_view<field_slot> slots) {
+  /// Adds the slots that rays used to an exchange, which notes those of all ranks.
+  void share_use(const Exec& exec, rank_exchange<Exec>& all, array_view<field_slot> slots) {
     exec.for_each(slots.size(), exchange_use{slots, words_.data(), false});
-    ranks_->all_reduce_max(words_.view());
-    exec.for_each(slots.size(), exchange_use{slots, words_.data(), true});
+    all.add(reduction::max(words_.view()), [this, exec, slots] {
+      exec.for_each(slots.size(), exchange_use{slots, words_.data(), true});
+    });
   }
-  /// Adds up what fractions learn from in a sample.
-  void share_fractions(const Exec& exec, array_view<field_slot> slots, std::uint32_t sample,
-                       field_fractions* fractions) {
+  /// Adds what fractions learn from in a sample. Call share_use() before, so that results are taken by the
+  /// slots that any rank used.
+  void share_fractions(const Exec& exec, rank_exchange<Exec>& all, array_view<field_slot> slots,
+                       std::uint32_t sample, field_fractions* fractions) {
     if (sums_.size() == 0) return;
     exchange_fractions exchange{slots, sample, fractions, sums_.data(), largest_.data(), false};
     exec.for_each(slots.size(), exchange);
-    ranks_->all_reduce_sum(sums_.view());
-    ranks_->all_reduce_max(largest_.view());
     exchange.back = true;
-    exec.for_each(slots.size(), exchange);
+    all.add(reduction::sum(sums_.view()), [] {});
+    all.add(reduction::max(largest_.view()),
+            [exec, slots, exchange] { exec.for_each(slots.size(), exchange); });
   }
 
  private:

@@ -53,12 +53,18 @@ void field_store<Exec>::begin_sample(const Exec& exec, std::uint32_t sample, std
 }
 
 template <class Exec>
-void field_store<Exec>::end_sample(const Exec& exec, bool recorded, std::uint32_t log2_divisor) {
-  if (ranks_) {
-    ranks_.share_use(exec, table_.view().slots);
-    if (recorded) ranks_.share_fractions(exec, table_.view().slots, schedule_.sample(), pool_.fractions());
-    if (schedule_.counts_rays()) marks_.sum_ranks(exec, ranks_.ranks());
+void field_store<Exec>::share(const Exec& exec, detail::rank_exchange<Exec>& all, bool recorded) {
+  const array_view<field_slot> slots = table_.view().slots;
+  ranks_.share_use(exec, all, slots);
+  if (recorded) {
+    ranks_.share_fractions(exec, all, slots, schedule_.sample(), pool_.fractions());
+    pool_.share(all);
   }
+  if (schedule_.counts_rays()) marks_.share(exec, all);
+}
+
+template <class Exec>
+void field_store<Exec>::end_sample(const Exec& exec, bool recorded, std::uint32_t log2_divisor) {
   if (recorded) pool_.learn(exec, table_.view().slots, schedule_.sample());
   const bool changes = log2_divisor != log2_divisor_;
   if (!schedule_.chooses_bins() && !changes) return;
