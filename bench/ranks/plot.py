@@ -13,9 +13,8 @@ import sys
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 
-from svg import document, line, text
+from svg import COLOURS, Plot, document, line, text
 
-COLOURS = ("#d95f02", "#1b6ca8", "#2a9d5c", "#8e44ad", "#b8860b", "#555555")
 WARM_UP = 32
 MOST_RANKS = 1024
 NETWORK = {"call": 5.0e-6, "mib": 2**20 / 12.5e9}  # seconds, of an assumed network of 100 Gbit/s
@@ -35,43 +34,6 @@ def box(x, y, width, height, fill, *lines):
 def write(path, width, height, parts):
     with open(path, "w") as file:
         file.write(document(width, height, [ARROW_TIP, *parts]))
-
-
-class Plot:
-    """Axes that are linear or logarithmic, with ticks and a title."""
-
-    def __init__(self, left, top, width, height, xs, ys, x_ticks, y_ticks, title, x_title, log_x=False):
-        self.left, self.top, self.width, self.height = left, top, width, height
-        self.xs, self.ys, self.log_x = xs, ys, log_x
-        self.parts = [text(left, top - 12, title, "font-weight='bold'")]
-        for tick in y_ticks:
-            self.parts.append(line(left, self.y(tick), left + width, self.y(tick), "stroke='#e4e4e4'"))
-            self.parts.append(text(left - 6, self.y(tick) + 4, f"{tick:g}", "text-anchor='end' font-size='11'"))
-        for tick in x_ticks:
-            self.parts.append(text(self.x(tick), top + height + 16, f"{tick:,}", "text-anchor='middle' font-size='11'"))
-        self.parts.append(text(left + width / 2, top + height + 34, x_title, "text-anchor='middle' fill='#555'"))
-        self.labels = []
-
-    def x(self, value):
-        low, high = self.xs
-        part = math.log(value / low) / math.log(high / low) if self.log_x else (value - low) / (high - low)
-        return self.left + self.width * part
-
-    def y(self, value):
-        low, high = self.ys
-        return self.top + self.height * (1 - math.log(min(max(value, low), high) / low) / math.log(high / low))
-
-    def curve(self, points, colour, attributes=""):
-        path = " ".join(f"{self.x(x):.1f},{self.y(y):.1f}" for x, y in points)
-        self.parts.append(f"<polyline fill='none' stroke='{colour}' stroke-width='1.8' points='{path}' {attributes}/>")
-
-    def dots(self, points, colour, is_filled=True, radius=3.2):
-        fill = colour if is_filled else "white"
-        self.parts += [f"<circle cx='{self.x(x):.1f}' cy='{self.y(y):.1f}' r='{radius}' fill='{fill}' stroke='{colour}'/>"
-                       for x, y in points]
-
-    def label(self, x, y, content, colour):
-        self.parts.append(text(x, y, content, f"fill='{colour}' font-size='12'"))
 
 
 def draw_how(path):

@@ -1,9 +1,9 @@
 """Tables and figures of docs/performance.md and docs/packages.md: times, memory and compile times."""
-import re
 from typing import Dict, List
 
-from blocks import Results, Rows, block, span, three
+from blocks import Results, Rows, block, per_cent, span, three
 
+from stages_plot import waves_of  # bench/stages_plot.py
 from table import STAGES, compiler_rows, stage_rows  # bench/table.py
 
 EQUAL_TIME, SAMPLES, PROFILE = "cuda-equal-time.json", "cuda-sample-times.json", "cuda-profile.txt"
@@ -109,21 +109,21 @@ def profile_directions(results: Results) -> str:
     return f"{profiled(results, 'Bound registers')['directions'] - profiled(results, 'Build kept')['directions']:.2f} ms"
 
 
-def passes(results: Results) -> List[List[float]]:
-    """The profiled waves: microseconds, MB, registers, sectors, warps active, instructions."""
-    rows = re.findall(r"^ *(\d+\.\d+ +\d+\.\d+ +64 .*)$", results.text(PROFILE), re.MULTILINE)
-    return [[float(cell.replace(",", "")) for cell in row.split()] for row in rows]
-
-
 @block
 def profile_pass(results: Results, what: str) -> str:
     """Of the pass over a wave: its `time`, what it moves in `memory`, or active `warps`."""
-    waves = passes(results)
+    waves = waves_of(results.text(PROFILE))
     if what == "time":
-        return span([w[0] for w in waves], 0) + " µs"
+        return span([w.seconds * 1e6 for w in waves], 0) + " µs"
     if what == "memory":
-        return span([w[1] / 1e3 for w in waves], 2) + " GB"
-    return f"{max(w[4] for w in waves):.0f}%"
+        return span([w.memory * 1e-9 for w in waves], 2) + " GB"
+    return f"{100 * max(w.warps for w in waves):.0f}%"
+
+
+@block
+def profile_roof(results: Results, roof: str) -> str:
+    """What the pass over a wave reaches of the bandwidth of `memory` or of the rate of `instructions`."""
+    return per_cent([wave.part_of(roof) for wave in waves_of(results.text(PROFILE))])
 
 
 @block

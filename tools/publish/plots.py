@@ -7,8 +7,10 @@ from typing import Dict, List, Tuple
 
 from provenance import RESULTS
 
-# Scripts, the result file of each, where it writes in an empty folder, and the plots that it draws there.
+# Scripts, the result file of each, or "" for the folder of all, where it writes in an empty folder, and the plots that it draws there.
 PLOTS: Tuple[Tuple[str, str, str, Tuple[str, ...]], ...] = (
+    ("bench/quality_plots.py", "", "", ("gains.svg", "error-over-time.svg", "single-samples.svg")),
+    ("bench/stages_plot.py", "", "roofline.svg", ("roofline.svg",)),
     ("bench/tuning_plot.py", "tuning.json", "tuning.svg", ("tuning.svg",)),
     ("bench/ranks/plot.py", "ranks.json", "", ("ranks-how.svg", "ranks-traffic.svg", "ranks-scaling.svg")),
 )

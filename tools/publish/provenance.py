@@ -16,7 +16,8 @@ RESULTS = "bench/results"
 INDEX = f"{RESULTS}/index.json"
 # What results depend on. The results themselves, and this program, do not change what is measured.
 SOURCES = ("include", "examples", "bench", "tools", f":!{RESULTS}", ":!tools/publish", ":!tools/upbp_scenes", ":!*.md",
-           ":!bench/table.py", ":!bench/svg.py", ":!bench/tuning_plot.py", ":!bench/ranks/plot.py")
+           ":!bench/table.py", ":!bench/svg.py", ":!bench/quality_plots.py", ":!bench/stages_plot.py", ":!bench/tuning_plot.py",
+           ":!bench/ranks/plot.py")
 
 Entry = Dict[str, Any]
 
