@@ -1,17 +1,20 @@
-// Writes HTML with pictures as base64 (RFC 4648).
+// Writes HTML with pictures as base64.
 #include "page.hpp"
 
+#include "app/html.hpp"
 #include "app/output_files.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
 
 namespace inspect {
 namespace {
+
+using render::base64;
+using render::escaped;
 
 constexpr int least_side = 256;  // pixels, of cells
 constexpr int map_height = 256;
@@ -26,19 +29,6 @@ constexpr const char* style =
     "td+td{font-variant-numeric:tabular-nums}"
     ".note{background:#fff3cd;padding:.5rem 1rem}.bar{width:512px;font-size:.8rem;margin:.5rem 0 1rem}"
     ".bar div{display:flex;justify-content:space-between}";
-
-std::string base64(const std::string& bytes) {
-  static constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t word = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      word = word << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
-    for (std::size_t k = 0; k < 4; ++k)
-      text += i + k <= bytes.size() ? digits[word >> (18 - 6 * k) & 63u] : '=';
-  }
-  return text;
-}
 
 std::string embedded(const picture_folder& folder, const std::string& name, const std::string& about) {
   const std::string path = (folder.path() / name).string();

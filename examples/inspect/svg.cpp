@@ -1,6 +1,8 @@
 // Writes SVG 1.1.
 #include "svg.hpp"
 
+#include "app/html.hpp"
+
 #include <cstdio>
 
 namespace inspect {
@@ -20,13 +22,6 @@ std::string point(vec2 p, const std::string& before, const std::string& after) {
 
 }  // namespace
 
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text)
-    result += c == '<' ? "&lt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
-  return result;
-}
-
 void svg::line(vec2 from, vec2 to, const std::string& attributes) {
   body_ += "<line" + point(from, "", "1") + point(to, "", "2") + " " + attributes + "/>\n";
 }
@@ -36,7 +31,7 @@ void svg::circle(vec2 centre, double radius, const std::string& attributes) {
 }
 
 void svg::text(vec2 at, const std::string& words, const std::string& attributes) {
-  body_ += "<text" + point(at, "", "") + " " + attributes + ">" + escaped(words) + "</text>\n";
+  body_ += "<text" + point(at, "", "") + " " + attributes + ">" + render::escaped(words) + "</text>\n";
 }
 
 std::string svg::content() const {

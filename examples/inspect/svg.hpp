@@ -10,9 +10,6 @@ namespace inspect {
 using wfpg::vec2;
 using wfpg::vec3;
 
-/// Text without markup.
-std::string escaped(const std::string& text);
-
 /// A drawing in pixels, from the upper left. Attributes are SVG's.
 class svg {
  public:

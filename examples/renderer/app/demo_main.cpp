@@ -1,6 +1,7 @@
 // wfpg-demo: shows what guiding gains behind a door, products with glossy BSDFs, vcm in caustics, and paths
 // from both ends in fog. Each is beside path tracing, with equal samples. The output is pictures, a table,
-// and plots of error over time. Open PGL takes part on CPUs if it is installed.
+// plots of error over time, and a page with a slider. Open PGL takes part on CPUs if it is installed.
+#include "app/comparison_page.hpp"
 #include "app/image_io.hpp"
 #include "app/metrics.hpp"
 #include "app/output_files.hpp"
@@ -18,6 +19,7 @@
 #include <filesystem>
 #include <iterator>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -195,14 +197,24 @@ nlohmann::ordered_json row(const method_result& result, const method_result& fir
           {"light_vertex_bytes", report.light_vertex_bytes}};
 }
 
+render::named_picture on_page(const method_result& result, const method_result& first) {
+  char note[64];
+  std::snprintf(note, sizeof note, "error %.2e, gain %.2f", result.error.mse_reinhard,
+                first.error.mse_reinhard / result.error.mse_reinhard);
+  return {result.method, result.rendering.picture, note};
+}
+
+/// Writes a scene's files, and adds its pictures to the page.
 nlohmann::ordered_json run_scene(const demo_scene& demo, const demo_device& on,
-                                 const std::filesystem::path& directory, announcer& announced) {
+                                 const std::filesystem::path& directory, announcer& announced,
+                                 std::vector<render::comparison>& page) {
   const auto path = [&](const std::string& what) { return (directory / (demo.name + what)).string(); };
   const reference truth = make_reference(demo, on, announced);
   render::write_exr(path("-reference.exr"), truth.picture);
   std::vector<image> strip;
   std::vector<method_result> results;
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  render::comparison compared{demo.name, {}};
   render::plot plot{demo.name, "seconds", "mean squared error after c / (1 + c)", {}};
   for (const demo_method& method : methods_on(on, demo)) {
     results.push_back(run_method(demo, on, method, truth, announced));
@@ -210,11 +222,14 @@ nlohmann::ordered_json run_scene(const demo_scene& demo, const demo_device& on,
     render::write_exr(path(std::string("-") + method.name + ".exr"), result.rendering.picture);
     strip.push_back(render::enlarged(result.rendering.picture, on.shown_at));
     rows.push_back(row(result, results.front()));
+    compared.pictures.push_back(on_page(result, results.front()));
     plot.curves.push_back(error_over_time(result, truth));
   }
   strip.push_back(render::enlarged(truth.picture, on.shown_at));
   render::write_png(path(".png"), render::side_by_side(strip, 4));
   render::write_svg(path("-error.svg"), plot);
+  compared.pictures.push_back({"reference", truth.picture, std::string("by ") + demo.reference.name});
+  page.push_back(std::move(compared));
   return {{"scene", demo.name},
           {"shows", demo.shows},
           {"nee", demo.nee},
@@ -258,13 +273,18 @@ void run(const std::filesystem::path& directory, const demo_device& on) {
   render::prepare_folder("DIRECTORY", directory);
   announcer announced(on);
   nlohmann::ordered_json summary = nlohmann::ordered_json::array();
-  for (const demo_scene& demo : demo_scenes()) summary.push_back(run_scene(demo, on, directory, announced));
+  std::vector<render::comparison> compared;
+  for (const demo_scene& demo : demo_scenes())
+    summary.push_back(run_scene(demo, on, directory, announced, compared));
   const std::string table = table_of(summary);
   render::write_file((directory / "table.txt").string(), table);
   render::write_file((directory / "summary.json").string(), summary.dump(2) + '\n');
+  const std::string page = (directory / "index.html").string();
+  render::write_file(page, render::comparison_page("What guiding gains", compared));
   std::printf(
-      "\n%s\nEach PNG shows a scene by its methods in the table's order, and the reference. All files: %s\n",
-      table.c_str(), directory.string().c_str());
+      "\n%s\nEach PNG shows a scene by its methods in the table's order, and the reference. All files: %s\n"
+      "Open %s in a browser: a slider compares the pictures.\n",
+      table.c_str(), directory.string().c_str(), page.c_str());
 }
 
 }  // namespace

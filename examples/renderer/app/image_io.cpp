@@ -1,5 +1,5 @@
-// OpenEXR through its C++ library, PNG through stb_image_write. Their errors become std::runtime_error that
-// begins with the path.
+// OpenEXR through its C++ library, PNG through stb_image and stb_image_write. Their errors become
+// std::runtime_error that begins with the path.
 #include "app/image_io.hpp"
 
 #include "app/output_files.hpp"
@@ -123,19 +123,36 @@ struct noted_file {
   static int is_at_end(void* self) { return static_cast<noted_file*>(self)->stream.eof() ? 1 : 0; }
 };
 
-image read_hdr(const std::string& path) {
+/// Decodes a file by a function of stb_image, and makes its values radiance.
+template <class Value, class ToRadiance>
+image decode(const std::string& path, Value* (*load)(const stbi_io_callbacks*, void*, int*, int*, int*, int),
+             const ToRadiance& radiance) {
   noted_file file{std::ifstream(path, std::ios::binary)};
   if (!file.stream) throw std::runtime_error("cannot be opened");
   const stbi_io_callbacks callbacks{noted_file::read, noted_file::skip, noted_file::is_at_end};
   int width = 0, height = 0, channels = 0;
-  const std::unique_ptr<float, decltype(&stbi_image_free)> pixels(
-      stbi_loadf_from_callbacks(&callbacks, &file, &width, &height, &channels, 3), &stbi_image_free);
+  const std::unique_ptr<Value, decltype(&stbi_image_free)> pixels(
+      load(&callbacks, &file, &width, &height, &channels, 3), &stbi_image_free);
   if (!pixels) throw std::runtime_error(std::string("cannot be decoded: ") + stbi_failure_reason());
   if (file.is_cut_off) throw std::runtime_error("is cut off");
   image picture = make_image(width, height);
   for (std::size_t i = 0; i < picture.pixels.size(); ++i)
-    picture.pixels[i] = {pixels.get()[3 * i], pixels.get()[3 * i + 1], pixels.get()[3 * i + 2]};
+    for (int c = 0; c < 3; ++c) picture.pixels[i][c] = radiance(pixels.get()[3 * i + std::size_t(c)]);
   return picture;
+}
+
+image read_hdr(const std::string& path) {
+  return decode(path, stbi_loadf_from_callbacks, [](float value) { return value; });
+}
+
+image read_png(const std::string& path) {
+  return decode(path, stbi_load_16_from_callbacks,
+                [](stbi_us value) { return srgb_to_linear(static_cast<float>(value) / 65535.0f); });
+}
+
+bool ends_in(const std::string& path, const std::string& extension) {
+  return path.size() > extension.size() &&
+         path.compare(path.size() - extension.size(), extension.size(), extension) == 0;
 }
 
 void write_exr_pixels(std::ostream& out, const std::string& path, const image& picture) {
@@ -186,9 +203,16 @@ image read_exr(const std::string& path) try {
   throw with_path(path, reason);
 }
 
+image read_picture(const std::string& path) try {
+  if (!ends_in(path, ".exr") && !ends_in(path, ".png"))
+    throw std::runtime_error("is no picture that can be read; expected a name that ends in .exr or .png");
+  return ends_in(path, ".png") ? read_png(path) : read_exr_pixels(path);
+} catch (const std::exception& reason) {
+  throw with_path(path, reason);
+}
+
 environment_map read_environment(const std::string& path) try {
-  const bool is_hdr = path.size() > 4 && path.compare(path.size() - 4, 4, ".hdr") == 0;
-  const image picture = is_hdr ? read_hdr(path) : read_exr_pixels(path);
+  const image picture = ends_in(path, ".hdr") ? read_hdr(path) : read_exr_pixels(path);
   for (const vec3& p : picture.pixels) {
     for (int c = 0; c < 3; ++c)
       if (!(p[c] >= 0.0f) || std::isinf(p[c]))

@@ -1,4 +1,4 @@
-// Pictures in memory and in files: reads and writes OpenEXR, writes PNG.
+// Pictures in memory and in files: reads and writes OpenEXR, reads and writes PNG.
 #pragma once
 
 #include "scene/scene.hpp"
@@ -21,6 +21,10 @@ image make_image(int width, int height);
 /// Reads the R, G and B channels, half or float, of a single-part OpenEXR file. Other channels are ignored.
 /// Throws std::runtime_error that names the path and the reason.
 image read_exr(const std::string& path);
+
+/// Reads a picture of an OpenEXR or PNG file (.exr, .png). A PNG's values are sRGB, and become linear ones in
+/// [0, 1]. Throws std::runtime_error that names the path and the reason.
+image read_picture(const std::string& path);
 
 /// Reads the environment of an OpenEXR or Radiance HDR (.hdr) file, of any aspect ratio. Throws
 /// std::runtime_error that names the path and the reason, also for negative or not finite radiance.

@@ -26,8 +26,9 @@ std::string lower_case(std::string text) {
 void check_extension(const named_file& output) {
   if (output.extension.empty() || lower_case(fs::path(output.path).extension().string()) == output.extension)
     return;
+  const bool is_picture = output.extension == ".exr" || output.extension == ".png";
   refuse(output.option, "expected a name that ends in " + output.extension + ", not " + output.path +
-                            " (pictures are .exr by --output and .png by --png)");
+                            (is_picture ? " (pictures are .exr by --output and .png by --png)" : ""));
 }
 
 /// The absolute name of the file behind links. It need not exist.

@@ -1,6 +1,7 @@
 // Writes SVG: a frame, decades as grid lines, curves with names at their ends.
 #include "app/plot.hpp"
 
+#include "app/html.hpp"
 #include "app/output_files.hpp"
 
 #include <algorithm>
@@ -61,12 +62,6 @@ std::string number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.1f", value);
   return text;
-}
-
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) result += c == '<' ? "&lt;" : c == '&' ? "&amp;" : std::string(1, c);
-  return result;
 }
 
 std::string line(double x0, double y0, double x1, double y1) {
