@@ -13,13 +13,14 @@ import sys
 from typing import Any, Dict, Iterable, List, Tuple
 
 from svg import COLOURS, Plot, document, line, text
-from table import errors_at
+from table import errors_at, three
 
 MEASURE = "mse_reinhard"
 FIRST_SAMPLES = 4  # of curves; before that all methods are alike
 ORANGE, BLUE, GREEN, PURPLE, GOLD, GREY = COLOURS
 
 Scene = Dict[str, Any]
+Errors = Dict[str, Dict[str, float]]
 Points = List[Tuple[float, float]]
 
 
@@ -31,11 +32,6 @@ def scenes_of(folder: pathlib.Path, *names: str) -> List[Scene]:
 def short(scene: Scene) -> str:
     """A scene's name without its folder, ending and options."""
     return scene["scene"].split("/")[-1].split(" ")[0].replace(".glb", "")
-
-
-def three(value: float) -> str:
-    """A number with three digits at most, and two decimals at most."""
-    return f"{value:.{2 if value < 9.995 else 1 if value < 99.95 else 0}f}"
 
 
 # --- gains -----------------------------------------------------------------------------------------------------------
@@ -72,12 +68,12 @@ class Bars:
         for i, group in enumerate(groups):
             bar = min(34.0, 0.84 * width / len(group.bars))
             middle = self.plot.left + (i + 0.5) * width
-            for k, (gain, colour, is_pale) in enumerate(group.bars):
-                x, end = middle + (k - len(group.bars) / 2) * bar, self.plot.y(gain)
+            for k, (value, colour, is_pale) in enumerate(group.bars):
+                x, end = middle + (k - len(group.bars) / 2) * bar, self.plot.y(value)
                 self.plot.parts.append(f"<rect x='{x + 1:.1f}' y='{min(base, end):.1f}' width='{bar - 2:.1f}' "
                                        f"height='{max(abs(base - end), 0.5):.1f}' fill='{colour}' opacity='{0.45 if is_pale else 1}'/>")
-                y = end - 4 if gain >= 1 else end + 12
-                self.plot.parts.append(text(x + bar / 2, y, three(gain), "text-anchor='middle' font-size='10' fill='#333'"))
+                y = end - 4 if value >= 1 else end + 12
+                self.plot.parts.append(text(x + bar / 2, y, three(value), "text-anchor='middle' font-size='10' fill='#333'"))
             for k, name in enumerate(group.names):
                 look = "font-size='12'" if k == 0 else "font-size='11' fill='#555'"
                 self.plot.parts.append(text(middle, self.bottom + 16 + 14 * k, name, f"text-anchor='middle' {look}"))
@@ -85,14 +81,19 @@ class Bars:
         return self.plot.parts
 
 
-def gain_of(errors: Dict[str, Dict[str, float]], method: str) -> float:
+def gain(errors: Errors, method: str, measure: str = MEASURE) -> float:
     """Path tracing's error over the method's."""
-    return errors["pt"][MEASURE] / errors[method][MEASURE]
+    return errors["pt"][measure] / errors[method][measure]
+
+
+def equal_time(errors: Errors, method: str, measure: str = MEASURE) -> float:
+    """The gain where both take as long: errors fall with the inverse of time."""
+    return gain(errors, method, measure) * errors["pt"]["seconds"] / errors[method]["seconds"]
 
 
 def last_gain(scene: Scene, method: str) -> float:
     """A method's gain at the scene's last budget."""
-    return gain_of(errors_at({"summary": scene["summary"]}, scene["summary"][-1]["budget"]), method)
+    return gain(errors_at({"summary": scene["summary"]}, scene["summary"][-1]["budget"]), method)
 
 
 def openpgl_group(scene: Scene) -> Group:
@@ -100,8 +101,7 @@ def openpgl_group(scene: Scene) -> Group:
     errors = errors_at(scene, "256 samples")
     bars = []
     for method, colour in (("wfpg", BLUE), ("vmm-1000", ORANGE)):
-        gain = gain_of(errors, method)
-        bars += [(gain, colour, False), (gain * errors["pt"]["seconds"] / errors[method]["seconds"], colour, True)]
+        bars += [(gain(errors, method), colour, False), (equal_time(errors, method), colour, True)]
     return Group([short(scene)], bars)
 
 

@@ -4,7 +4,7 @@
 usage: bench/stages_plot.py bench/results OUT.svg
 
 It reads cuda-stages.json and cuda-profile.txt. Source of the roofline by instructions: Ding & Williams 2019, "An
-Instruction Roofline Model for GPUs". The roofs are an NVIDIA H200's, whose data sheet has its bandwidth and clock.
+Instruction Roofline Model for GPUs". The roofs are an NVIDIA H200's: its data sheet's bandwidth, and its highest clock.
 """
 import json
 import pathlib

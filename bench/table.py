@@ -46,6 +46,16 @@ def stage_rows(benchmarks):
     return rows
 
 
+def three(value, least_decimals=0):
+    """A number with three digits that matter: 0.94, 9.43, 10.7, 125. Empty for None."""
+    if value is None:
+        return ""
+    for decimals, limit in ((2, 9.995), (1, 99.95)):
+        if abs(value) < limit:
+            return f"{value:.{max(decimals, least_decimals)}f}"
+    return f"{value:.{least_decimals}f}"
+
+
 def ratio(value):
     return "" if value is None else f"{value:.2f}"
 

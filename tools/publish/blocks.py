@@ -7,12 +7,14 @@ import json
 import pathlib
 import re
 import sys
-from typing import Any, Callable, Dict, List, Optional, Union
+from typing import Any, Callable, Dict, List, Union
 
 from provenance import RESULTS, provenance, read_index
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "bench"))
+
+from table import three  # noqa: E402,F401, bench/table.py; blocks import it from here
 
 Rows = List[List[str]]
 Block = Callable[..., Union[Rows, str]]
@@ -62,16 +64,6 @@ def block(function: Block) -> Block:
     """Registers a function. Underscores of its name are hyphens in markers."""
     BLOCKS[function.__name__.replace("_", "-")] = function
     return function
-
-
-def three(value: Optional[float], least_decimals: int = 0) -> str:
-    """A number with three digits that matter: 0.94, 9.43, 10.7, 125. Empty for None."""
-    if value is None:
-        return ""
-    for decimals, limit in ((2, 9.995), (1, 99.95)):
-        if abs(value) < limit:
-            return f"{value:.{max(decimals, least_decimals)}f}"
-    return f"{value:.{least_decimals}f}"
 
 
 def span(values: List[float], digits: int = 1) -> str:

@@ -4,19 +4,8 @@ from typing import Any, Dict, List
 
 from blocks import Results, Rows, block, span, three
 
+from quality_plots import Errors, equal_time, gain, short  # bench/quality_plots.py
 from table import errors_at  # bench/table.py
-
-Errors = Dict[str, Dict[str, float]]
-
-
-def gain(errors: Errors, method: str, measure: str = "mse_reinhard") -> float:
-    """Path tracing's error over the method's."""
-    return errors["pt"][measure] / errors[method][measure]
-
-
-def equal_time(errors: Errors, method: str, measure: str = "mse_reinhard") -> float:
-    """The gain where both take as long: errors fall with the inverse of time."""
-    return gain(errors, method, measure) * errors["pt"]["seconds"] / errors[method]["seconds"]
 
 
 def pair(errors: Errors, method: str) -> str:
@@ -27,11 +16,6 @@ def pair(errors: Errors, method: str) -> str:
 def triple(errors: Errors, method: str) -> str:
     """Gain in MSE; in relative MSE, and at equal time."""
     return pair(errors, method)[:-1] + f"; {three(equal_time(errors, method))})"
-
-
-def short(scene: Dict[str, Any]) -> str:
-    """A scene's name without its folder, ending and options."""
-    return scene["scene"].split("/")[-1].split(" ")[0].replace(".glb", "")
 
 
 def last_errors(scene: Dict[str, Any]) -> Errors:

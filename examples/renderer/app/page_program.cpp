@@ -68,7 +68,7 @@ void write_page(const arguments& given) {
   std::vector<source> sources;
   for (const std::string& text : given.pictures) sources.push_back(parsed(text));
   check_files(sources, given.output);
-  comparison shown{given.title, {}};
+  comparison shown{"the page", {}};
   for (const source& s : sources) shown.pictures.push_back({s.name, read_picture(s.path)});
   require_comparable(shown);
   named_picture& reference = shown.pictures.back();
@@ -85,7 +85,8 @@ int run_page_program(int argc, const char* const* argv, std::ostream& out, std::
   report_in_one_line(app, "wfpg-page");
   app.add_option("PICTURES", given.pictures,
                  "OpenEXR or PNG, FILE or NAME=FILE, at least two of one size; the last is the reference")
-      ->required();
+      ->required()
+      ->expected(2, 1 << 16);
   app.add_option("-o,--output", given.output, "the page, .html")->required()->transform(file_path());
   app.add_option("--title", given.title, "the page's title");
   try {
