@@ -10,7 +10,7 @@ import json
 import math
 import pathlib
 import sys
-from typing import Any, Dict, Iterable, List, Tuple
+from typing import Any, Dict, Iterable, List, NamedTuple, Tuple
 
 from svg import COLOURS, Plot, document, line, text
 from table import errors_at, three
@@ -36,49 +36,63 @@ def short(scene: Scene) -> str:
 
 # --- gains -----------------------------------------------------------------------------------------------------------
 
-class Group:
-    """Bars of one scene: gains with a colour each. Pale ones are drawn lighter. Each name has a line below."""
+class Look(NamedTuple):
+    """How a method's bars look. Pale ones are drawn lighter."""
+    name: str
+    colour: str
+    is_pale: bool = False
 
-    def __init__(self, names: Iterable[str], bars: Iterable[Tuple[float, str, bool]]) -> None:
-        self.names, self.bars = list(names), list(bars)
+
+class Group(NamedTuple):
+    """A scene's gains, one for each look, and the lines below them."""
+    lines: List[str]
+    gains: List[float]
 
 
-class Bars:
-    """A panel of groups of bars, from the line of path tracing up where a method gains, and down where it loses."""
+class Place(NamedTuple):
+    """Of a panel, in pixels."""
+    left: float
+    top: float
+    width: float
+    height: float
 
-    def __init__(self, left: float, top: float, width: float, height: float, ends: Tuple[float, float], title: str) -> None:
-        ticks = [t for t in (0.5, 1, 2, 5, 10, 20) if ends[0] <= t <= ends[1]]
-        self.plot = Plot(left, top, width, height, (0, 1), ends, (), ticks, "", "")
-        self.plot.parts.append(text(left, top - 32, title, "font-weight='bold'"))
-        self.bottom = top + height
 
-    def legend(self, items: Iterable[Tuple[str, str, bool]]) -> None:
-        """Names of bars, below the title."""
-        x = self.plot.left
-        for name, colour, is_pale in items:
-            self.plot.parts.append(f"<rect x='{x:.1f}' y='{self.plot.top - 23}' width='11' height='11' fill='{colour}' "
-                                   f"opacity='{0.45 if is_pale else 1}'/>")
-            self.plot.label(x + 16, self.plot.top - 13, name, "#333")
-            x += 34 + 6.4 * len(name)
+def rectangle(x: float, y: float, width: float, height: float, look: Look) -> str:
+    """A bar."""
+    return (f"<rect x='{x:.1f}' y='{y:.1f}' width='{width:.1f}' height='{height:.1f}' fill='{look.colour}' "
+            f"opacity='{0.45 if look.is_pale else 1}'/>")
 
-    def draw(self, groups: List[Group]) -> List[str]:
-        """All groups, with the gain at the end of each bar."""
-        width = self.plot.width / len(groups)
-        base = self.plot.y(1)
-        for i, group in enumerate(groups):
-            bar = min(34.0, 0.84 * width / len(group.bars))
-            middle = self.plot.left + (i + 0.5) * width
-            for k, (value, colour, is_pale) in enumerate(group.bars):
-                x, end = middle + (k - len(group.bars) / 2) * bar, self.plot.y(value)
-                self.plot.parts.append(f"<rect x='{x + 1:.1f}' y='{min(base, end):.1f}' width='{bar - 2:.1f}' "
-                                       f"height='{max(abs(base - end), 0.5):.1f}' fill='{colour}' opacity='{0.45 if is_pale else 1}'/>")
-                y = end - 4 if value >= 1 else end + 12
-                self.plot.parts.append(text(x + bar / 2, y, three(value), "text-anchor='middle' font-size='10' fill='#333'"))
-            for k, name in enumerate(group.names):
-                look = "font-size='12'" if k == 0 else "font-size='11' fill='#555'"
-                self.plot.parts.append(text(middle, self.bottom + 16 + 14 * k, name, f"text-anchor='middle' {look}"))
-        self.plot.parts.append(line(self.plot.left, base, self.plot.left + self.plot.width, base, "stroke='#333'"))
-        return self.plot.parts
+
+def draw_legend(place: Place, title: str, looks: List[Look]) -> List[str]:
+    """A panel's title, and the names of its bars in a line below."""
+    parts, x = [text(place.left, place.top - 32, title, "font-weight='bold'")], place.left
+    for look in looks:
+        parts.append(rectangle(x, place.top - 23, 11, 11, look))
+        parts.append(text(x + 16, place.top - 13, look.name, "font-size='12' fill='#333'"))
+        x += 34 + 6.4 * len(look.name)
+    return parts
+
+
+def draw_bars(place: Place, title: str, looks: List[Look], groups: List[Group]) -> List[str]:
+    """Bars from the line of path tracing up where a method gains, and down where it loses; the gain is at their ends."""
+    values = [g for group in groups for g in group.gains]
+    ends = (0.7 * min([0.9, *values]), 1.5 * max([1.1, *values]))
+    ticks = [t for t in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500) if ends[0] <= t <= ends[1]]
+    plot = Plot(*place, (0, 1), ends, (), ticks, "", "")
+    plot.parts += draw_legend(place, title, looks)
+    width, base = place.width / len(groups), plot.y(1)
+    for i, group in enumerate(groups):
+        bar, middle = min(34.0, 0.84 * width / len(looks)), place.left + (i + 0.5) * width
+        for k, (value, look) in enumerate(zip(group.gains, looks)):
+            x, end = middle + (k - len(looks) / 2) * bar, plot.y(value)
+            plot.parts.append(rectangle(x + 1, min(base, end), bar - 2, max(abs(base - end), 0.5), look))
+            plot.parts.append(text(x + bar / 2, end - 4 if value >= 1 else end + 12, three(value),
+                                   "text-anchor='middle' font-size='10' fill='#333'"))
+        for k, words in enumerate(group.lines):
+            size = "font-size='12'" if k == 0 else "font-size='11' fill='#555'"
+            plot.parts.append(text(middle, place.top + place.height + 16 + 14 * k, words, f"text-anchor='middle' {size}"))
+    plot.parts.append(line(place.left, base, place.left + place.width, base, "stroke='#333'"))
+    return plot.parts
 
 
 def gain(errors: Errors, method: str, measure: str = MEASURE) -> float:
@@ -91,49 +105,47 @@ def equal_time(errors: Errors, method: str, measure: str = MEASURE) -> float:
     return gain(errors, method, measure) * errors["pt"]["seconds"] / errors[method]["seconds"]
 
 
-def last_gain(scene: Scene, method: str) -> float:
-    """A method's gain at the scene's last budget."""
-    return gain(errors_at({"summary": scene["summary"]}, scene["summary"][-1]["budget"]), method)
+def budget_of(scene: Scene) -> str:
+    """The last budget, such as "64 samples"."""
+    return scene["summary"][-1]["budget"]
 
 
 def openpgl_group(scene: Scene) -> Group:
-    """wfpg and Open PGL after 256 samples, and at equal time."""
-    errors = errors_at(scene, "256 samples")
-    bars = []
-    for method, colour in (("wfpg", BLUE), ("vmm-1000", ORANGE)):
-        bars += [(gain(errors, method), colour, False), (equal_time(errors, method), colour, True)]
-    return Group([short(scene)], bars)
+    """wfpg and Open PGL at equal samples and at equal time."""
+    errors = errors_at(scene, budget_of(scene))
+    return Group([short(scene)], [of(errors, method) for method in ("wfpg", "vmm-1000") for of in (gain, equal_time)])
 
 
-def last_group(scene: Scene, methods: Dict[str, Tuple[str, bool]], *more: str) -> Group:
+def last_group(scene: Scene, methods: Iterable[str], *more: str) -> Group:
     """Gains at the last budget, below them the scene's name and more lines."""
-    return Group([short(scene), *more], [(last_gain(scene, method), *look) for method, look in methods.items()])
+    errors = errors_at({"summary": scene["summary"]}, budget_of(scene))
+    return Group([short(scene), *more], [gain(errors, method) for method in methods])
 
 
 def draw_gains(folder: pathlib.Path) -> str:
     """Bars of gains: Open PGL, guides without next-event estimation, records, and the paper's own method."""
-    rates = {"wfpg": (BLUE, False), "sarsa-hemisphere": (ORANGE, False), "monte-carlo-hemisphere": (GOLD, False), "records": (GREEN, False)}
-    parts: List[str] = []
-    panel = Bars(46, 58, 800, 170, (0.5, 36), "Beside Open PGL: 256 samples, with next-event estimation")
-    panel.legend([("wfpg, equal samples", BLUE, False), ("wfpg, equal time", BLUE, True),
-                  ("Open PGL, equal samples", ORANGE, False), ("Open PGL, equal time", ORANGE, True)])
-    parts += panel.draw([openpgl_group(s) for s in scenes_of(folder, "quality-openpgl.json")])
+    found = scenes_of(folder, "quality-openpgl.json")
+    looks = [Look("wfpg, equal samples", BLUE), Look("wfpg, equal time", BLUE, True), Look("Open PGL, equal samples", ORANGE),
+             Look("Open PGL, equal time", ORANGE, True)]
+    parts = draw_bars(Place(46, 58, 800, 170), f"Beside Open PGL: {budget_of(found[0])}, with next-event estimation", looks,
+                      [openpgl_group(s) for s in found])
 
-    panel = Bars(46, 316, 800, 150, (0.7, 24), "Beside other guides: one second on a GPU, without next-event estimation")
-    panel.legend([("wfpg", BLUE, False), ("SARSA", ORANGE, False), ("Monte Carlo", GOLD, False), ("irradiance records", GREEN, False)])
-    parts += panel.draw([last_group(s, rates) for s in scenes_of(folder, "quality-sarsa.json", "quality-sarsa-more.json")])
+    found = scenes_of(folder, "quality-sarsa.json", "quality-sarsa-more.json")
+    by_method = {"wfpg": Look("wfpg", BLUE), "sarsa-hemisphere": Look("SARSA", ORANGE),
+                 "monte-carlo-hemisphere": Look("Monte Carlo", GOLD), "records": Look("irradiance records", GREEN)}
+    parts += draw_bars(Place(46, 316, 800, 150),
+                       f"Beside other guides: {budget_of(found[0])} on a GPU, without next-event estimation", list(by_method.values()), [last_group(s, by_method) for s in found])
 
-    panel = Bars(46, 556, 480, 150, (0.7, 32), "Beside records: 30 samples; next-event estimation on or off")
-    panel.legend([("wfpg", BLUE, False), ("SARSA", ORANGE, False), ("irradiance records", GREEN, False)])
     found = sorted(scenes_of(folder, "quality-records.json"), key=lambda s: short(s) != "cornell-wall")
-    looks = {"wfpg": (BLUE, False), "sarsa": (ORANGE, False), "records": (GREEN, False)}
-    parts += panel.draw([last_group(s, looks, "off" if "--nee off" in s["scene"] else "on") for s in found])
+    by_method = {"wfpg": Look("wfpg", BLUE), "sarsa": Look("SARSA", ORANGE), "records": Look("irradiance records", GREEN)}
+    parts += draw_bars(Place(46, 556, 480, 150), f"Beside records: {budget_of(found[0])}; next-event estimation on or off",
+                       list(by_method.values()), [last_group(s, by_method, "on" if s["nee"] else "off") for s in found])
 
-    panel = Bars(586, 556, 260, 150, (0.5, 20), "Beside the paper's method")
-    panel.legend([("wfpg", BLUE, False), ("product", BLUE, True), ("paper", PURPLE, False), ("product", PURPLE, True)])
-    looks = {"wfpg": (BLUE, False), "wfpg-product": (BLUE, True), "paper": (PURPLE, False), "paper-product": (PURPLE, True)}
     found = scenes_of(folder, "quality-paper-veach-ajar.json", "quality-paper-bathroom.json")
-    parts += panel.draw([last_group(s, looks, s["summary"][-1]["budget"]) for s in found])
+    by_method = {"wfpg": Look("wfpg", BLUE), "wfpg-product": Look("product", BLUE, True), "paper": Look("paper", PURPLE),
+                 "paper-product": Look("product", PURPLE, True)}
+    parts += draw_bars(Place(586, 556, 260, 150), "Beside the paper's method", list(by_method.values()),
+                       [last_group(s, by_method, budget_of(s)) for s in found])
     return document(866, 748, parts)
 
 
@@ -165,8 +177,9 @@ def draw_errors_of(scene: Scene, methods: Dict[str, Tuple[str, str]], left: floa
     curves = {method: error_curve(scene, method) for method in methods}
     points = [p for curve in curves.values() for p in curve]
     xs, ys = nice_ends([x for x, _ in points]), nice_ends([y for _, y in points])
-    plot = Plot(left, top, 212, 130, xs, ys, [int(t) if t >= 1 else t for t in ticks_between(xs)], ticks_between(ys), short(scene), "", True)
-    plot.parts += [line(plot.x(x), top, plot.x(x), top + 130, "stroke='#e4e4e4'") for x in ticks_between(xs)]
+    x_ticks = [int(t) if t >= 1 else t for t in ticks_between(xs)]
+    plot = Plot(left, top, 212, 130, xs, ys, x_ticks, ticks_between(ys), short(scene), "", True)
+    plot.parts += [line(plot.x(x), top, plot.x(x), top + 130, "stroke='#e4e4e4'") for x in x_ticks]
     plot.parts += [line(left, top + 130, left + 212, top + 130, "stroke='#999'"), line(left, top, left, top + 130, "stroke='#999'")]
     for method, curve in curves.items():
         plot.curve(curve, methods[method][1])
@@ -176,15 +189,16 @@ def draw_errors_of(scene: Scene, methods: Dict[str, Tuple[str, str]], left: floa
 
 def draw_error_over_time(folder: pathlib.Path) -> str:
     """Errors over seconds: the built-in scenes, and those of the literature beside Open PGL."""
-    series = (("builtin-scenes.json", "Built-in scenes, two cores, to 64 samples",
+    series = (("builtin-scenes.json", "Built-in scenes",
                {"pt": ("path tracing", GREY), "wfpg-transient-oriented": ("wfpg, transient", GOLD), "wfpg": ("wfpg", BLUE),
                 "wfpg-product": ("wfpg-product", GREEN)}),
-              ("quality-openpgl.json", "Scenes of the literature, fifteen cores, to 256 samples",
+              ("quality-openpgl.json", "Scenes of the literature",
                {"pt": ("path tracing", GREY), "vmm-1000": ("Open PGL", ORANGE), "wfpg": ("wfpg", BLUE)}))
     parts: List[str] = []
     for block, (name, title, methods) in enumerate(series):
         scenes, top = scenes_of(folder, name), 60 + 408 * block
-        parts.append(text(14, top - 38, title, "font-weight='bold' fill='#555'"))
+        threads = json.loads((folder / name).read_text(encoding="utf-8"))["machine"]["threads"]
+        parts.append(text(14, top - 38, f"{title}: {threads} threads, to {budget_of(scenes[0])}", "font-weight='bold' fill='#555'"))
         for i, scene in enumerate(scenes):
             parts += draw_errors_of(scene, methods, 66 + 276 * (i % 3), top + 184 * (i // 3))
         left, y = 66 + 276 * 2, top + 184

@@ -99,6 +99,15 @@ TEST_CASE("a page has all pictures in their order, and needs no other file", "[r
   CHECK(contains(page, "<title>two &lt;scenes></title>"));
   for (const std::string outside : {"http", "src=", "href=", "@import", "url("})
     CHECK_FALSE(contains(page, outside));
+  // The script asks for elements by names that the page has.
+  std::size_t asked = 0;
+  for (std::size_t at = page.find("by(\""); at != std::string::npos;
+       at = page.find("by(\"", at + 1), ++asked) {
+    const std::string id = page.substr(at + 4, page.find('"', at + 4) - at - 4);
+    INFO(id);
+    CHECK(contains(page, "id=\"" + id + "\""));
+  }
+  CHECK(asked > 10);
   const json data = data_of(page);
   CHECK(decoded(data["heat"].get<std::string>()).size() == 3 * 256);
   REQUIRE(data["comparisons"].size() == 2);

@@ -16,6 +16,7 @@ class Series(NamedTuple):
     keeps_runs: bool = True  # each rendering's errors on the way, which pages seldom need
 
 
+OVER_TIME = ("builtin-scenes.json", "quality-openpgl.json")  # of which errors on the way are shown
 QUALITY = "wfpg-quality --cache cache --output results"
 LITERATURE = ('"scenes/veach-ajar.glb --size 320x180" "scenes/bathroom.glb --size 240x240" "scenes/staircase2.glb --size 240x240" '
               '"scenes/cornell-box.glb --size 240x240" "scenes/veach-mis.glb --size 320x240"')
@@ -26,7 +27,7 @@ SMALL = ('"scenes/veach-ajar.glb --size 80x45" "scenes/bathroom.glb --size 64x64
 def quality(name: str, needs: Tuple[str, ...], minutes: int, scenes: str, rest: str) -> Series:
     """A series of wfpg-quality. On a GPU, unless methods name it themselves."""
     device = " --device cuda" if "gpu" in needs and "--device cuda" not in rest else ""
-    return Series(name, (f"{QUALITY}{device} --scenes {scenes} {rest}",), needs, minutes, keeps_runs="openpgl.json" in name)
+    return Series(name, (f"{QUALITY}{device} --scenes {scenes} {rest}",), needs, minutes, keeps_runs=name in OVER_TIME)
 
 
 def methods(base: str, named: Dict[str, str]) -> str:
