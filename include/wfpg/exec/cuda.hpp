@@ -2,7 +2,12 @@
 // Include it in files that nvcc compiles.
 // No call waits for the device, but copies to the host and trim().
 // The host therefore runs ahead of the device.
+// Errors of kernels come with a later call.
 // Sorts are CUB's radix sorts; scans and reductions are Thrust's.
+//
+// Errors are those of exec/cuda_error.hpp, which this header includes.
+// Memory comes from a pool of the policy's own, unless a caller brings a resource.
+// Values that ranks exchange through the host pass through page-locked memory.
 //
 // Cost: one kernel launch a loop, and two or more for a sort.
 // Loops over blocks launch at most 16 blocks a multiprocessor, which stride over the indices.
@@ -15,6 +20,8 @@
 
 #include <wfpg/base/error.hpp>
 #include <wfpg/exec/buffer.hpp>
+#include <wfpg/exec/cuda_error.hpp>
+#include <wfpg/exec/detail/cuda_memory.hpp>
 #include <wfpg/exec/policy.hpp>
 #include <wfpg/exec/support/cuda_block.hpp>
 #include <wfpg/exec/support/thrust.hpp>
@@ -26,118 +33,12 @@
 
 #include <cstddef>
 #include <memory>
-#include <mutex>
-#include <new>
 #include <type_traits>
 #include <utility>
 
 namespace wfpg {
 
-/// Thrown where a call of the CUDA runtime failed.
-/// An error that an earlier kernel left behind is reported by the next call, which need not be its cause.
-/// Where Thrust makes that call, a thrust::system_error comes instead.
-/// Both are std::runtime_error.
-/// The message holds the call's name, the error's text and its code.
-class cuda_error : public device_error {
- public:
-  /// `call`: the name of the failed function.
-  /// `code`: what it returned.
-  cuda_error(const char* call, cudaError_t code)
-      : device_error(static_cast<int>(code), cudaGetErrorString(code), call) {}
-  /// Returns the runtime's error code.
-  cudaError_t code() const noexcept { return static_cast<cudaError_t>(device_error::code()); }
-};
-
-/// Throws cuda_error unless `code` is cudaSuccess.
-/// Clears the runtime's last error first, so that the next call does not report it again.
-/// Sticky errors, such as an illegal address, stay with the device all the same.
-/// `call` becomes part of the message; it is kept nowhere.
-inline void check_cuda(cudaError_t code, const char* call) {
-  if (code == cudaSuccess) return;
-  // Reading the last error clears it.
-  cudaGetLastError();
-  throw cuda_error(call, code);
-}
-
 namespace detail {
-
-/// Device memory from a pool of its own on the current device, ordered on a stream.
-/// The pool keeps what is freed, since the driver takes milliseconds for new memory.
-/// Blocks in use keep the resource alive.
-/// Safe for concurrent calls.
-/// Allocation and release follow the stream's order, and do not wait for the device.
-class stream_resource : public memory_resource, public std::enable_shared_from_this<stream_resource> {
- public:
-  /// Creates the pool on the current device.
-  /// Throws cuda_error.
-  /// Objects must be owned by a std::shared_ptr, as std::make_shared makes one.
-  explicit stream_resource(cudaStream_t stream) : stream_(stream) {
-    // A pool of its own, so that the settings of the device's default pool stay the host's.
-    cudaMemPoolProps properties{};
-    properties.allocType = cudaMemAllocationTypePinned;
-    properties.location.type = cudaMemLocationTypeDevice;
-    check_cuda(cudaGetDevice(&properties.location.id), "cudaGetDevice");
-    check_cuda(cudaMemPoolCreate(&pool_, &properties), "cudaMemPoolCreate");
-    // The threshold above which the pool would give memory back at each synchronisation: never.
-    std::uint64_t kept = ~std::uint64_t(0);
-    const cudaError_t code = cudaMemPoolSetAttribute(pool_, cudaMemPoolAttrReleaseThreshold, &kept);
-    // No destructor runs where a constructor throws.
-    if (code != cudaSuccess) cudaMemPoolDestroy(pool_);
-    check_cuda(code, "cudaMemPoolSetAttribute");
-  }
-  /// Not copyable: the pool has one owner.
-  stream_resource(const stream_resource&) = delete;
-  stream_resource& operator=(const stream_resource&) = delete;
-  /// Waits for the stream, and destroys the pool.
-  /// Some drivers crash where a pool ends before the stream has given its memory back.
-  ~stream_resource() override {
-    // Errors are ignored, as destructors must not throw.
-    cudaStreamSynchronize(stream_);
-    cudaMemPoolDestroy(pool_);
-  }
-
-  /// Waits for the stream, and gives unused memory back to the device.
-  /// Throws cuda_error.
-  /// Blocks in use stay where they are.
-  void trim() {
-    check_cuda(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
-    check_cuda(cudaMemPoolTrimTo(pool_, 0), "cudaMemPoolTrimTo");
-  }
-
- private:
-  /// CUDA aligns blocks to 256 bytes or more, whatever was asked for.
-  void* do_allocate(std::size_t bytes, std::size_t) override {
-    void* block = nullptr;
-    const cudaError_t code = cudaMallocFromPoolAsync(&block, bytes, pool_, stream_);
-    if (code == cudaErrorMemoryAllocation) {
-      // Running out of memory is no error of the device: later calls must not see it.
-      cudaGetLastError();
-      throw std::bad_alloc();
-    }
-    check_cuda(code, "cudaMallocFromPoolAsync");
-    const std::lock_guard<std::mutex> lock(guard_);
-    // The first block ties the resource to itself, until the last one is freed.
-    if (blocks_++ == 0) self_ = shared_from_this();
-    return block;
-  }
-  /// Enqueues the release. Kernels before it may still use the block.
-  /// The pool keeps the block for later requests.
-  void do_deallocate(void* block, std::size_t, std::size_t) override {
-    cudaFreeAsync(block, stream_);
-    // Declared before the lock, so that it ends after the lock: it may destroy this object and its mutex.
-    std::shared_ptr<stream_resource> last;
-    const std::lock_guard<std::mutex> lock(guard_);
-    if (--blocks_ == 0) last.swap(self_);
-  }
-  bool do_is_equal(const memory_resource& other) const noexcept override { return this == &other; }
-
-  cudaStream_t stream_;
-  cudaMemPool_t pool_ = nullptr;
-  /// Protects the two members below.
-  std::mutex guard_;
-  std::size_t blocks_ = 0;                 // in use
-  std::shared_ptr<stream_resource> self_;  // while there are any
-};
 
 /// Returns the number of iterations of a loop whose length the host knows.
 inline __device__ std::size_t count_of(std::size_t n) {
@@ -248,12 +149,20 @@ class cuda {
         pool_(resource ? nullptr : std::make_shared<wfpg::detail::stream_resource>(stream)),
         resource_(resource ? resource : pool_.get()) {}
 
-  /// Returns the source of device memory. Never null.
+  /// Returns the source of device memory, which a buffer keeps.
+  /// Never null.
   memory_resource* resource() const { return resource_; }
   /// Returns a policy on this stream that allocates from `resource`.
   /// Null: it makes a new pool.
   /// Buffers made by this policy keep their own resource.
   cuda with_resource(memory_resource* resource) const { return cuda(stream_, resource); }
+  /// Returns the source of page-locked host memory, for values that ranks send: copies need no stop there.
+  /// Never null; safe for concurrent calls; lives as long as the process.
+  /// Each allocation takes a call of the driver.
+  static memory_resource* staging_memory() {
+    static wfpg::detail::page_locked_resource resource;
+    return &resource;
+  }
   /// Waits for the work before it, and gives the pool's unused memory back to the device.
   /// Does nothing where the memory comes from a caller's resource.
   /// Throws cuda_error.

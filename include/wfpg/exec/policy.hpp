@@ -9,6 +9,8 @@
 //                                void copy_to_host(void* to, const void* from, std::size_t bytes) const;
 //                                void copy_from_host(void* to, const void* from, std::size_t bytes) const;
 //                                void fill_bytes(void* to, unsigned char value, std::size_t bytes) const;
+//      and where ranks that share a sample pass values through the host, optionally
+//                                static memory_resource* staging_memory();
 //   2. who sorts and scans:      auto thrust() const;  a Thrust policy whose temporaries come from resource()
 //                                void sort_pairs(n, bits, const K* keys, const V* values, K* sorted_keys,
 //                                                V* sorted_values) const;

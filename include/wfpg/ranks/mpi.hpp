@@ -3,7 +3,7 @@
 // It needs an MPI 3 and its C interface alone.
 // The CMake target wfpg::mpi brings both.
 //
-// Values pass through host memory, piece by piece.
+// Values pass through host memory, piece by piece: page-locked where the policy has such.
 // Any MPI serves any policy, also an MPI that knows nothing of GPUs.
 // Messages that are still in flight after a failure point to no memory of a guider.
 //
@@ -15,6 +15,7 @@
 #include <wfpg/base/error.hpp>
 #include <wfpg/ranks/communicator.hpp>
 #include <wfpg/ranks/detail/same_call.hpp>
+#include <wfpg/ranks/detail/staging.hpp>
 
 #include <mpi.h>
 
@@ -103,8 +104,8 @@ class mpi_communicator final : public communicator {
     detail::check_mpi(MPI_Comm_size(ranks, &size), "MPI_Comm_size");
     rank_ = static_cast<std::uint32_t>(rank);
     size_ = static_cast<std::uint32_t>(size);
-    messages_ = std::make_unique<message_memory>();
-    messages_->piece = std::make_unique<std::uint64_t[]>(options.piece_bytes / sizeof(std::uint64_t));
+    messages_ = std::make_unique<message_memory>(exec);
+    messages_->piece.fit(options.piece_bytes);
     // A duplication that does not block, so that it has a time limit, too.
     MPI_Request request = MPI_REQUEST_NULL;
     start(MPI_Comm_idup(ranks, &messages_->ranks, &request), "MPI_Comm_idup");
@@ -167,12 +168,14 @@ class mpi_communicator final : public communicator {
   /// MPI cannot take back a collective.
   /// So this memory is never freed after a failure.
   struct message_memory {
+    explicit message_memory(const Exec& exec) : piece(exec) {}
+
     /// The duplicate.
     MPI_Comm ranks = MPI_COMM_NULL;
     /// What ranks compare before each exchange.
     std::uint64_t call[detail::rank_call::word_count] = {};
     /// Values on their way, of any type.
-    std::unique_ptr<std::uint64_t[]> piece;
+    detail::staging<Exec> piece;
   };
 
   /// Reduces one array.
@@ -216,7 +219,7 @@ class mpi_communicator final : public communicator {
         options_.piece_bytes / sizeof(std::uint64_t) * (sizeof(std::uint64_t) / sizeof(T));
     for (std::size_t first = 0; first < values.size(); first += most) {
       const std::size_t count = std::min(most, values.size() - first);
-      void* const piece = messages_->piece.get();
+      void* const piece = messages_->piece.fit(options_.piece_bytes);
       exec_.copy_to_host(piece, values.data() + first, count * sizeof(T));
       exchange(piece, static_cast<int>(count));
       exec_.copy_from_host(values.data() + first, piece, count * sizeof(T));

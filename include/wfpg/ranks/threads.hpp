@@ -10,10 +10,12 @@
 //
 // Source: wfpg's own.
 // Cost: a call copies the values to the host and back, and adds them under one lock. It waits for the
-// policy's work. Memory: a host copy of the values of the two last calls, and one more a rank.
+// policy's work. Memory: a host copy of the values of the two last calls, and one more a rank,
+// page-locked where the policy has such.
 #pragma once
 
 #include <wfpg/ranks/communicator.hpp>
+#include <wfpg/ranks/detail/staging.hpp>
 
 #include <atomic>
 #include <chrono>
@@ -106,7 +108,7 @@ class thread_communicator final : public communicator {
   /// Rank `rank` of `ranks`, each of which is made once. `exec`: the policy of the guider. Throws
   /// std::invalid_argument where there is no such rank.
   thread_communicator(const Exec& exec, thread_ranks& ranks, std::uint32_t rank)
-      : exec_(exec), ranks_(ranks), rank_(rank) {
+      : exec_(exec), ranks_(ranks), rank_(rank), host_(exec) {
     if (rank >= ranks.size())
       throw std::invalid_argument("wfpg: rank is " + std::to_string(rank) + ", but must be less than " +
                                   std::to_string(ranks.size()));
@@ -142,17 +144,17 @@ class thread_communicator final : public communicator {
   template <class T>
   void meet(reduction what, array_view<T> values, std::uint32_t root = 0) {
     const std::size_t bytes = values.size() * sizeof(T);
-    host_.resize(bytes);
-    if (bytes > 0) exec_.copy_to_host(host_.data(), values.data(), bytes);
-    ranks_.meet(rank_, {what, bytes, root}, host_.data());
-    if (bytes > 0) exec_.copy_from_host(values.data(), host_.data(), bytes);
+    auto* const host = static_cast<unsigned char*>(host_.fit(bytes));
+    if (bytes > 0) exec_.copy_to_host(host, values.data(), bytes);
+    ranks_.meet(rank_, {what, bytes, root}, host);
+    if (bytes > 0) exec_.copy_from_host(values.data(), host, bytes);
   }
 
   // As the constructor got it.
   Exec exec_;  // copies between the policy's memory and the host's
   thread_ranks& ranks_;
   std::uint32_t rank_;
-  std::vector<unsigned char> host_;  // values of the last call
+  detail::staging<Exec> host_;  // values of the last call
 };
 
 }  // namespace wfpg
