@@ -25,7 +25,7 @@ import tempfile
 HERE = os.path.dirname(os.path.abspath(__file__))
 WARM_UP = 32  # samples
 PACKING = re.compile(r"call_packed_step|count_queued|exchange_(origin|use|fractions)|invert_wanted|number_builds|write_origins|"
-                     r"(take|put)_counts|write_path_words|keep_path_words|field_ranks<|bin_ranks<|rank_counters<|packed_sums<")
+                     r"(take|put)_counts|write_path_words|keep_path_words|field_ranks<|bin_ranks<|rank_counters<|rank_exchange<|packed_sums<")
 COPIES = re.compile(r"mem(cpy|move|set)")  # of libc, which keeps no frame: its caller's caller is the next one
 CARRIERS = re.compile(r"sum_of_ranks|mpi_communicator<|share_|end_sample|value_queue<")
 MPI = re.compile(r"libmpi|libopen-|mca_|mpi_calls")

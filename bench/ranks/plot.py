@@ -4,7 +4,7 @@
 usage: bench/ranks/plot.py bench/results/ranks.json FOLDER
 
 FOLDER receives ranks-how.svg, ranks-traffic.svg and ranks-scaling.svg. Scenes, sizes and numbers of ranks are those of
-the file: "processes" as measure.py writes them, "scenes" with seconds of GPUs.
+the file: "processes" as measure.py writes them, "gpus" as gpus.py does.
 """
 import json
 import math
@@ -125,7 +125,7 @@ def models(results):
 
 def gpu_series(results):
     """Scene, split and mean seconds by number of GPUs."""
-    for scene, splits in results.get("scenes", {}).items():
+    for scene, splits in results.get("gpus", {}).get("scenes", {}).items():
         for split in ("samples", "tiles"):
             runs = {int(n): sum(s) / len(s) for n, s in sorted(splits.get(split, {}).items(), key=lambda item: int(item[0]))}
             if len(runs) > 1:

@@ -25,7 +25,7 @@ class Place:
 
     def lacks(self, series: Series) -> List[str]:
         """What a series needs and this machine does not have."""
-        has = {"gpu": lambda: bool(gpu_and_driver()), "scenes": lambda: self.scenes is not None, "Open PGL": self.has_openpgl}
+        has = {"gpu": lambda: bool(gpu_and_driver()), "several GPUs": lambda: "\n" in gpu_and_driver(), "scenes": lambda: self.scenes is not None, "Open PGL": self.has_openpgl}
         return [need for need in series.needs if not (has[need]() if need in has else shutil.which(need))]
 
     def has_openpgl(self) -> bool:

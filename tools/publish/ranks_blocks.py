@@ -5,7 +5,7 @@ from typing import Any, Dict, List, Tuple
 from blocks import ROOT, Results, Rows, block, span, three
 
 sys.path.append(str(ROOT / "bench" / "ranks"))
-from plot import NETWORK, WARM_UP, WAVE, Model, fit, gpu_series, models, reduction  # noqa: E402, bench/ranks/plot.py
+from plot import NETWORK, WARM_UP, WAVE, Model, fit, models, reduction  # noqa: E402, bench/ranks/plot.py
 
 FILE = "ranks.json"
 GPUS = ("1", "2", "4", "8")
@@ -104,18 +104,38 @@ def ranks_beyond(results: Results, what: str) -> str:
     return f"{model.seconds(1, NETWORK, samples) / model.seconds(1024, NETWORK, samples):.0f} times"
 
 
+def renderings(results: Results, kind: str) -> List[Tuple[str, int, Dict[str, float]]]:
+    """Scene, samples and mean seconds by number of GPUs, of the long or the `short` renderings."""
+    return [(scene, found["spp"], {n: sum(s) / len(s) for n, s in found["samples"].items()})
+            for scene, found in results.json(FILE, "gpus", kind).items()]
+
+
+def faster(seconds: Dict[str, float]) -> str:
+    """How many times as fast as one GPU the others are."""
+    return ", ".join(f"{seconds['1'] / s:.2f}" for n, s in seconds.items() if n != "1")
+
+
 @block
 def ranks_gpus(results: Results) -> Rows:
-    """Seconds of renderings by 1, 2, 4 and 8 GPUs, and the model that fits the long ones."""
-    rows = [["scene", "samples", *(f"{n} GPU" if n == "1" else n for n in GPUS), "times as fast as 1, and model"]]
+    """Seconds of renderings by number of GPUs, and the model that fits the long ones."""
+    numbers = [str(n) for n in results.json(FILE, "gpus", "numbers")]
+    rows = [["scene", "samples", *(f"{n} GPU" if n == "1" else n for n in numbers), "times as fast as 1, and model"]]
+    for kind in ("scenes", "short"):
+        for scene, spp, seconds in renderings(results, kind):
+            divided, alone = fit({int(n): s for n, s in seconds.items()})
+            model = f"; {divided:.1f} / n + {alone:.2f}" if kind == "scenes" else ""
+            rows.append([scene, str(spp), *(three(seconds[n]) for n in numbers), faster(seconds) + model])
+    return rows
+
+
+@block
+def ranks_eight(results: Results) -> Rows:
+    """Seconds by eight GPUs, which were measured before."""
+    rows = [["scene", "samples", "1 GPU", "8", "times as fast"]]
     for kind in ("scenes", "short"):
         for scene, found in results.json(FILE, kind).items():
-            seconds = [sum(found["samples"][n]) / len(found["samples"][n]) for n in GPUS]
-            faster = ", ".join(f"{seconds[0] / s:.2f}" for s in seconds[1:])
-            if kind == "scenes":
-                divided, alone = fit({int(n): s for n, s in zip(GPUS, seconds)})
-                faster += f"; {divided:.1f} / n + {alone:.2f}"
-            rows.append([scene, str(found["spp"]), *map(three, seconds), faster])
+            seconds = {n: sum(found["samples"][n]) / len(found["samples"][n]) for n in ("1", "8")}
+            rows.append([scene, str(found["spp"]), *map(three, seconds.values()), faster(seconds)])
     return rows
 
 
@@ -123,10 +143,9 @@ def ranks_gpus(results: Results) -> Rows:
 def ranks_gpu_model(results: Results) -> str:
     """The largest difference of the model from what was measured."""
     most = 0.0
-    for _, split, runs in gpu_series({"scenes": results.json(FILE, "scenes")}):
-        divided, alone = fit(runs)
-        if split == "samples":
-            most = max([most, *(abs((divided / n + alone) / s - 1) for n, s in runs.items())])
+    for _, _, seconds in renderings(results, "scenes"):
+        divided, alone = fit({int(n): s for n, s in seconds.items()})
+        most = max([most, *(abs((divided / int(n) + alone) / s - 1) for n, s in seconds.items())])
     return f"{100 * most:.0f}%"
 
 
@@ -137,29 +156,24 @@ def ranks_joining(results: Results) -> str:
 
 
 @block
-def ranks_wave(results: Results) -> str:
-    """Milliseconds of a wave of ajar by 8 GPUs: seconds over waves of 8 samples."""
-    return f"{1e3 * results.json(FILE, 'stages', 'ajar', '8', 'total') / (results.json(FILE, 'scenes', 'ajar', 'spp') / 8):.0f} ms"
-
-
-@block
 def ranks_ends(results: Results, gpus: str) -> str:
     """Part of a rendering of ajar that ends of samples take."""
-    stages = results.json(FILE, "stages", "ajar", gpus)
+    stages = results.json(FILE, "gpus", "stages", "ajar", gpus)
     return f"{100 * stages['update'] / stages['total']:.0f}%"
 
 
 @block
 def ranks_tiles(results: Results) -> str:
-    """Seconds of ajar with one sample a wave."""
-    tiles = results.json(FILE, "scenes", "ajar", "tiles")
-    return "{:.1f}, {:.1f}, {:.1f} and {:.1f} s".format(*(tiles[n][0] for n in GPUS))
+    """Samples of ajar with one a wave, and seconds by number of GPUs."""
+    found = results.json(FILE, "gpus", "scenes", "ajar")
+    *first, last = (f"{seconds[0]:.1f}" for seconds in found["tiles"].values())
+    return f"{found['tiles_spp']} samples of ajar take {', '.join(first)} and {last} s"
 
 
 @block
 def ranks_alone(results: Results) -> str:
     """Seconds of ajar by one GPU without ranks."""
-    return f"{results.json(FILE, 'scenes', 'ajar', 'alone', 0):.1f} s"
+    return f"{results.json(FILE, 'gpus', 'scenes', 'ajar', 'alone', 0):.1f} s"
 
 
 @block

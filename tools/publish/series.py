@@ -74,6 +74,8 @@ ALL: Tuple[Series, ...] = (
     Series("ranks.json#processes", tuple(f"measure.py bin/wfpg-render {scene} 640x360 {n} 40 ranks.json"
                                          for scene in ("ajar", "scenes/bathroom.glb") for n in (1, 2, 4, 8)),
            ("scenes", "mpirun", "perf"), 30, "ranks.json"),
+    Series("ranks.json#gpus", ("gpus.py bin/wfpg-render ranks.json 2 ajar=3072 scenes/bathroom.glb=1536",),
+           ("scenes", "several GPUs"), 10, "ranks.json"),
     quality("quality-openpgl.json", ("scenes", "Open PGL"), 120, LITERATURE,
             "--spp 256 --seeds 1 --reference-spp 8192 --reference-chunk 4096 --methods pt,wfpg "
             '--method "vmm-1000=--method openpgl-vmm --samples-per-leaf 1000"'),
