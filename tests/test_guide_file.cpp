@@ -317,9 +317,9 @@ TEST_CASE("truncated, altered and foreign guide files have different errors", "[
   for (const std::string& foreign : {std::string(), std::string("\x89PNG\r\n\x1a\n................"),
                                      std::string(1000, '\0'), std::string("glTF"), bytes.substr(1)})
     CHECK(fault(foreign, options) == "wfpg: the guide is not a guide file");
-  CHECK(fault(with_version(bytes, 7), options) ==
-        "wfpg: the guide is of version 7, expected 6 or older: a newer wfpg wrote it");
-  CHECK(fault(with_version(bytes, 2), options) == "wfpg: the guide is of version 2, expected 6");
+  CHECK(fault(with_version(bytes, 8), options) ==
+        "wfpg: the guide is of version 8, expected 7 or older: a newer wfpg wrote it");
+  CHECK(fault(with_version(bytes, 2), options) == "wfpg: the guide is of version 2, expected 7");
   for (const std::size_t at : {8u, 11u, 12u}) {
     std::string altered = bytes;
     altered[at] = static_cast<char>(altered[at] ^ 1);

@@ -206,6 +206,66 @@ WFPG_TEST_CASE("rest: a host that gives pixels other indices in each sample is n
   CHECK(guider.statistics().rested_samples == 0);
 }
 
+/// Records paths whose gain is 1. One of 500 is so bright that it holds most of the variance.
+struct record_bright_paths {
+  wfpg::path_recorder_view recorder;
+  std::uint32_t sample, seed;
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const auto path = static_cast<std::uint32_t>(i);
+    const wall_path at = wall_path::of(path);
+    const vec2 u = wfpg::unit_vec2(wfpg::hash(wfpg::hash(wfpg::hash(3u, seed), sample), path));
+    recorder.vertex(i, 0, at.position, at.normal, 1.0f);
+    recorder.radiance(i, 0, at.mean * (u.x < 0.002f ? 12.0f : 0.8f + 0.4f * u.y));
+  }
+};
+
+/// Gains of the first comparison, their errors, and how many guiders of `seeds` seeds guide all paths at some
+/// time in 16 samples. `by_gain`: how many would by their gains alone.
+struct bright_gains {
+  std::vector<double> logarithms, errors;
+  std::uint32_t guide_all = 0, by_gain = 0;
+};
+template <class Exec>
+bright_gains gains_of_bright_paths(const Exec& exec, std::uint32_t seeds) {
+  bright_gains result;
+  for (std::uint32_t seed = 0; seed < seeds; ++seed) {
+    wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), rest_options());
+    bool guides_all = false, gains = false;
+    for (std::uint32_t sample = 1; sample <= 16; ++sample) {
+      guider.begin_sample();
+      guides_all |= guider.guided() && !guider.probing();
+      exec.for_each(path_count, record_bright_paths{guider.recorder(), sample, seed});
+      guider.end_sample();
+      const guiding_gain gain = guider.statistics().gain;
+      gains |= sample >= 4 && gain.typical_value() >= 1.25;
+      if (sample != 4) continue;
+      result.logarithms.push_back(std::log(gain.typical_value()));
+      result.errors.push_back(gain.typical_error);
+    }
+    result.guide_all += guides_all;
+    result.by_gain += gains;
+  }
+  return result;
+}
+
+WFPG_TEST_CASE("rest: a gain's error is known, and few bright paths let no guide take part", "[rest]") {
+  constexpr std::uint32_t seeds = 40;
+  const bright_gains found = gains_of_bright_paths(Exec(), seeds);
+  double square = 0.0, expected = 0.0;
+  for (std::size_t i = 0; i < found.errors.size(); ++i) {
+    square += found.logarithms[i] * found.logarithms[i] / seeds;
+    expected += found.errors[i] * found.errors[i] / seeds;
+  }
+  // Of 40 seeds the standard deviation is known to 11%.
+  INFO("deviation " << std::sqrt(square) << ", error " << std::sqrt(expected));
+  CHECK(square > 0.02);
+  CHECK(std::abs(std::sqrt(square / expected) - 1.0) < 0.3);
+  INFO(found.guide_all << " guide all paths, " << found.by_gain << " by their gains alone");
+  CHECK(found.by_gain > seeds / 4);
+  CHECK(found.guide_all <= seeds / 10);
+}
+
 template <class Exec, class Options>
 numbers guided_of_40(const Exec& exec, const Options& options, chances p, std::uint32_t* rested = nullptr) {
   using guide = wfpg::octree_guide_for<Exec, Options>;

@@ -120,6 +120,47 @@ TEST_CASE("rest: a guide takes part in few paths until it is known whether guidi
   CHECK(again.probes(9));
 }
 
+/// As calm_gain_of(), with a variance of `noise` times the square of the mean.
+guiding_gain noisy_gain_of(double value, double noise) {
+  guiding_gain gain = calm_gain_of(value);
+  gain.typical_guided = gain.typical_guided * noise / gain.typical_unguided;
+  gain.typical_unguided = noise;
+  gain.unguided_mean = gain.guided_mean = 1.0;
+  return gain;
+}
+
+/// As calm_gain_of(), with an error of its logarithm.
+guiding_gain doubtful_gain_of(double value, double error) {
+  guiding_gain gain = calm_gain_of(value);
+  gain.typical_error = error;
+  return gain;
+}
+
+TEST_CASE("rest: a gain in doubt guides few paths, and none once guides are settled", "[rest]") {
+  const double lowered = std::exp(-0.6);  // by an error of 0.3
+  const auto taken_part = [](std::uint32_t sample, const guiding_gain& gain, double before = 0.0) {
+    rest_schedule schedule(2.0f, 1);
+    if (before > 0.0) schedule.decide(4, calm_gain_of(before));
+    schedule.decide(sample, gain);
+    return schedule.resting() ? 0 : schedule.probes(sample + 1) ? 1 : 2;
+  };
+  for (const std::uint32_t sample : {4u, 8u, 16u, 64u}) {
+    INFO("sample " << sample);
+    const int in_doubt = sample < 16 ? 1 : 0;
+    for (const double before : {0.0, 3.0}) {  // also where all paths were guided
+      CHECK(taken_part(sample, doubtful_gain_of(2.01 / lowered, 0.3), before) == 2);
+      CHECK(taken_part(sample, doubtful_gain_of(2.0, 0.4), before) == in_doubt);
+      CHECK(taken_part(sample, doubtful_gain_of(2.01, 0.1), before) == 2);
+    }
+    CHECK(taken_part(sample, doubtful_gain_of(1.99 / lowered, 0.3)) == in_doubt);
+    CHECK(taken_part(sample, doubtful_gain_of(0.9, 0.9)) == 0);
+  }
+  guiding_gain little_light = noisy_gain_of(1.0, 60.0);  // few paths do not measure it
+  little_light.typical_error = 0.9;
+  CHECK(taken_part(16, little_light) == 2);
+  CHECK(doubtful_gain_of(2.0, 0.2).mean_with(doubtful_gain_of(2.0, 0.4)).typical_error == Approx(0.3));
+}
+
 TEST_CASE("rest: a guide rests between comparisons, and only where its gain is known and too small",
           "[rest]") {
   rest_schedule schedule(1.25f, 1);
@@ -148,15 +189,6 @@ TEST_CASE("rest: a guide rests between comparisons, and only where its gain is k
   CHECK(by_chance.is_known());
   by_chance.paths *= 100;
   CHECK(!by_chance.is_known());
-}
-
-/// As calm_gain_of(), with a variance of `noise` times the square of the mean.
-guiding_gain noisy_gain_of(double value, double noise) {
-  guiding_gain gain = calm_gain_of(value);
-  gain.typical_guided = gain.typical_guided * noise / gain.typical_unguided;
-  gain.typical_unguided = noise;
-  gain.unguided_mean = gain.guided_mean = 1.0;
-  return gain;
 }
 
 TEST_CASE("rest: in noise less is asked for than of typical paths, but no less than guiding costs",

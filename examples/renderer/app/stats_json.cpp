@@ -49,8 +49,11 @@ json rest_of(const rest_report& rest) {
               {"guided_variance", gain.guided_variance},
               {"unguided_vertices", gain.unguided_vertices},
               {"guided_vertices", gain.guided_vertices},
-              {"gain", nullptr}};
-  if (gain.is_known()) result["gain"] = gain.typical_value();
+              {"gain", nullptr},
+              {"gain_error", nullptr}};
+  if (!gain.is_known()) return result;
+  result["gain"] = gain.typical_value();
+  result["gain_error"] = gain.typical_error;
   return result;
 }
 

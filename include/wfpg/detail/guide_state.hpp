@@ -51,7 +51,7 @@ struct state_access {
   static auto numbers_of(Gain& gain) {
     return std::array{&gain.unguided_mean,     &gain.guided_mean,      &gain.unguided_variance,
                       &gain.guided_variance,   &gain.typical_unguided, &gain.typical_guided,
-                      &gain.unguided_vertices, &gain.guided_vertices};
+                      &gain.unguided_vertices, &gain.guided_vertices,  &gain.typical_error};
   }
   static void put_gain(const guiding_gain& gain, section_writer& bytes) {
     bytes.put(gain.paths);

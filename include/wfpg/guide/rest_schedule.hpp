@@ -5,9 +5,9 @@
 // The first two samples are not guided. In the next ones the guide probes: it takes part in few paths, which
 // are compared with those of unguided samples. Samples 3, 4, 8, 16 and so on are compared, also with each
 // other. From sample 4 on each comparison lets the guide take part in all paths, or lets it rest until the
-// next one. A guide that goes on probing leaves out samples 5 and 9, so that the variance of unguided paths
-// is known better. A guide that rests probes in the samples that are compared. Comparisons are at most 512
-// samples apart.
+// next one. A gain that a few bright paths may have made by chance is not enough. A guide that goes on
+// probing leaves out samples 5 and 9, so that the variance of unguided paths is known better. A guide that
+// rests probes in the samples that are compared. Comparisons are at most 512 samples apart.
 //
 // Source: wfpg's own. Costs of guiding are weighed against what it saves in Rath et al., "EARS" (2022), too.
 // Samples are weighed by their variance in Müller, "Path Guiding in Production" (2019), too.
@@ -17,6 +17,7 @@
 #include <wfpg/base/math.hpp>
 #include <wfpg/guide/statistics.hpp>
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -43,6 +44,11 @@ struct rest_constants {
   static constexpr double little_light = 50.0;
   /// A guide rests in noise where its gain is so much less than what lets it take part.
   static constexpr float slack_in_noise = 0.05f;
+  /// Standard error of a gain's logarithm for which the limits above are made.
+  static constexpr double small_error = 0.1;
+  /// The logarithm of a gain is lowered by so many times what its error exceeds small_error by. Where few
+  /// bright paths decide, the error is often too small where the gain is too large.
+  static constexpr double errors_of_doubt = 3.0;
   /// Most samples between two comparisons, a power of two: what the camera sees may change.
   static constexpr std::uint32_t longest_rest = 512;
   /// least_gain of policies whose blocks have several warps. On an H200 a guided vertex takes 1.3 times an
@@ -130,25 +136,26 @@ class rest_schedule {
                  rest_constants::most_in_noise);
   }
   /// Takes what was measured in a sample, which decides from the next one on. The guide takes part in all
-  /// paths where the gain is not known, or at least least_gain. It rests where the gain is less than
-  /// threshold(). Between them it takes part in as many as before, and in few where it rested. Noisy paths
-  /// have limits of their own: enough_in_noise(), and slack_in_noise below it where that is less than
-  /// threshold(). Nothing is decided before the
-  /// first comparison. Precondition: compares(sample).
+  /// paths where the gain is not known, or surely at least least_gain. It rests where the gain is less than
+  /// threshold(), from settled_samples on also where it is not surely as much. Between them it takes part in
+  /// as many as before, and in few where it rested or the gain is in doubt. Noisy paths have limits of their
+  /// own: enough_in_noise(), and slack_in_noise below it where that is less than threshold(). Nothing is
+  /// decided before the first comparison. Precondition: compares(sample).
   void decide(std::uint32_t sample, const guiding_gain& measured) {
     if (age_of(sample) < rest_constants::first_comparison) return;
     weight_ = weight_of(measured);
     const double gain = measured.typical_value(), mean = measured.unguided_mean;
     const auto varies = [&](double times) { return measured.typical_unguided > times * mean * mean; };
-    const bool is_noisy = varies(rest_constants::much_noise);
-    const float in_noise = enough_in_noise(varies(rest_constants::little_light)),
-                enough = is_noisy ? in_noise : least_gain_,
+    const bool is_noisy = varies(rest_constants::much_noise),
+               finds_little = varies(rest_constants::little_light);
+    const double sure = finds_little ? gain : sure_gain(measured);
+    const float in_noise = enough_in_noise(finds_little), enough = is_noisy ? in_noise : least_gain_,
                 least = min(threshold(sample), is_noisy ? in_noise - rest_constants::slack_in_noise : enough);
-    if (!measured.is_known() || gain >= enough)
+    if (!measured.is_known() || sure >= enough)
       takes_part_ = part::in_all;
-    else if (gain < least)
+    else if ((is_settled(sample) ? sure : gain) < least)
       takes_part_ = part::in_none;
-    else if (resting())
+    else if (resting() || sure < least)
       takes_part_ = part::in_few;
   }
   /// Weight of a guided sample in the picture, over an unguided one's: the gain of the last comparison, from
@@ -216,6 +223,12 @@ class rest_schedule {
   // In how many paths the guide takes part. Numbers are those of the file.
   enum class part : std::uint32_t { in_none = 0, in_few = 1, in_all = 2 };
 
+  bool is_settled(std::uint32_t sample) const { return age_of(sample) >= rest_constants::settled_samples; }
+  // The gain of typical paths without what chance may have added.
+  static double sure_gain(const guiding_gain& measured) {
+    const double doubt = max(measured.typical_error - rest_constants::small_error, 0.0);
+    return measured.typical_value() * std::exp(-rest_constants::errors_of_doubt * doubt);
+  }
   std::uint32_t age_of(std::uint32_t sample) const { return sample - unguided_ + 1; }
   static float weight_of(const guiding_gain& measured) {
     if (measured.paths < guiding_gain::least_paths) return 1.0f;

@@ -70,6 +70,7 @@ struct guiding_gain {
   double typical_guided = 0.0;     ///< guided_variance without bright paths
   double unguided_vertices = 0.0;  ///< mean surfaces of a path that samples its BSDFs
   double guided_vertices = 0.0;    ///< mean surfaces of a guided path
+  double typical_error = 0.0;      ///< standard error of typical_value()'s logarithm
 
   /// Whether value() means something: paths are enough, and unguided ones miss no light but by chance.
   bool is_known() const {
@@ -85,7 +86,8 @@ struct guiding_gain {
     const double gain = ratio(typical_unguided, typical_guided);
     return guided_vertices > 0.0 ? gain * unguided_vertices / guided_vertices : gain;
   }
-  /// Mean with an earlier comparison, if it had paths: few bright paths decide less.
+  /// Mean with an earlier comparison, if it had paths: few bright paths decide less. So is the error, since
+  /// comparisons share unguided paths.
   guiding_gain mean_with(const guiding_gain& before) const {
     if (before.paths == 0) return *this;
     const auto mean = [](double a, double b) { return 0.5 * (a + b); };
@@ -97,7 +99,8 @@ struct guiding_gain {
             mean(typical_unguided, before.typical_unguided),
             mean(typical_guided, before.typical_guided),
             mean(unguided_vertices, before.unguided_vertices),
-            mean(guided_vertices, before.guided_vertices)};
+            mean(guided_vertices, before.guided_vertices),
+            mean(typical_error, before.typical_error)};
   }
 
  private:

@@ -7,7 +7,8 @@
 // Differences are relative to what the cache expects of the path's first surface, and the mean of the scene.
 // Dark and bright parts then count alike, and no part without light counts much. Squares count up to 8, and
 // larger differences linearly (Huber 1964), since a few bright paths would decide alone. The means of both
-// kinds of paths show where unguided ones miss light: a path counts 8 at most.
+// kinds of paths show where unguided ones miss light: a path counts 8 at most. The gain's standard error
+// follows from the squares of what paths add to both variances.
 //
 // Source: wfpg's own. Cost: a look-up and O(vertices) a path, over at most 65,536 paths, and a reduction.
 // Memory: 28 bytes a path, at most 1.75 MiB. With ranks 12 a path more.
@@ -72,6 +73,8 @@ class gain_meter {
 
   // Variances and means from the sums over paths.
   static guiding_gain gain_of(const detail::path_sums& sums);
+  // Standard error of the logarithm of the gain of typical paths.
+  static double error_of(const detail::path_sums& sums);
   // Sum of what measure(i) adds, for i in [0, n).
   template <class Measure>
   static detail::path_sums sum(const Exec& exec, std::size_t n, const Measure& measure);

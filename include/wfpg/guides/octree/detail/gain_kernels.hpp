@@ -47,6 +47,22 @@ struct path_losses {
   }
 };
 
+/// Products of a path's typical losses, which the standard error of a gain is made of. In units of 2^-32.
+struct loss_products {
+  std::uint64_t unguided = 0;  ///< squares of unguided losses
+  std::uint64_t guided = 0;    ///< squares of guided losses
+  std::uint64_t both = 0;      ///< products of both
+
+  /// Products of losses in units of 2^-36, each less than 2^6.
+  WFPG_HD static loss_products of(std::uint64_t unguided, std::uint64_t guided) {
+    const std::uint64_t u = unguided >> 20, g = guided >> 20;
+    return {u * u, g * g, u * g};
+  }
+  WFPG_HD loss_products operator+(const loss_products& other) const {
+    return {unguided + other.unguided, guided + other.guided, both + other.both};
+  }
+};
+
 /// Sums over at most 2^17 paths. Integers, so that any order of additions gives the same bits. Values are in
 /// units of 2^-30, losses in units of 2^-36.
 struct path_sums {
@@ -57,6 +73,7 @@ struct path_sums {
   path_losses guided_losses;            ///< losses of differences of guided paths from earlier guided ones
   std::uint64_t unguided_vertices = 0;  ///< surfaces of unguided paths
   std::uint64_t guided_vertices = 0;    ///< surfaces of guided paths
+  loss_products products;               ///< of typical losses
 
   WFPG_HD path_sums operator+(const path_sums& other) const {
     return {paths + other.paths,
@@ -65,7 +82,8 @@ struct path_sums {
             unguided_losses + other.unguided_losses,
             guided_losses + other.guided_losses,
             unguided_vertices + other.unguided_vertices,
-            guided_vertices + other.guided_vertices};
+            guided_vertices + other.guided_vertices,
+            products + other.products};
   }
 };
 
@@ -191,13 +209,16 @@ struct measure_path {
     }
     if (n < 2) return {};
     const std::uint32_t pairs = n * (n - 1);
+    const path_losses unguided{of_pairs.all / pairs, of_pairs.typical / pairs},
+        guided = losses((before.guided - now.radiance) / scale);
     return {1,
             units(value / static_cast<float>(n)),
             units(min(now.radiance / scale, most)),
-            {of_pairs.all / pairs, of_pairs.typical / pairs},
-            losses((before.guided - now.radiance) / scale),
+            unguided,
+            guided,
             before.vertices,
-            now.vertices};
+            now.vertices,
+            loss_products::of(unguided.typical, guided.typical)};
   }
 
  private:

@@ -10,6 +10,8 @@
 #include <thrust/iterator/counting_iterator.h>
 #include <thrust/transform_reduce.h>
 
+#include <cmath>
+
 namespace wfpg {
 
 template <class Exec>
@@ -52,6 +54,19 @@ guiding_gain gain_meter<Exec>::gain(const Exec& exec, const path_recorder<Exec>&
   return gain_of(sums);
 }
 
+// By the delta method: log(u / g) is linear in small changes of the sums u and g of losses. Paths are
+// independent, since each has its own random numbers. Both losses of one path are not.
+template <class Exec>
+double gain_meter<Exec>::error_of(const detail::path_sums& sums) {
+  const auto u = 0x1p-36 * static_cast<double>(sums.unguided_losses.typical),
+             g = 0x1p-36 * static_cast<double>(sums.guided_losses.typical);
+  if (!(u > 0.0) || !(g > 0.0)) return 0.0;
+  const auto of = [](std::uint64_t products) { return 0x1p-32 * static_cast<double>(products); };
+  const double square = of(sums.products.unguided) / (u * u) + of(sums.products.guided) / (g * g) -
+                        2.0 * of(sums.products.both) / (u * g);
+  return std::sqrt(max(square, 0.0));
+}
+
 // The mean loss of differences of two paths of a kind is about twice the kind's variance.
 template <class Exec>
 guiding_gain gain_meter<Exec>::gain_of(const detail::path_sums& sums) {
@@ -69,6 +84,7 @@ guiding_gain gain_meter<Exec>::gain_of(const detail::path_sums& sums) {
   result.typical_guided = variance(sums.guided_losses.typical);
   result.unguided_vertices = static_cast<double>(sums.unguided_vertices) / n;
   result.guided_vertices = static_cast<double>(sums.guided_vertices) / n;
+  result.typical_error = error_of(sums);
   return result;
 }
 
