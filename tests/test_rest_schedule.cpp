@@ -150,7 +150,7 @@ TEST_CASE("rest: a gain in doubt guides few paths, and none once guides are sett
     for (const double before : {0.0, 3.0}) {  // also where all paths were guided
       CHECK(taken_part(sample, doubtful_gain_of(2.01 / lowered, 0.3), before) == 2);
       CHECK(taken_part(sample, doubtful_gain_of(2.0, 0.4), before) == in_doubt);
-      CHECK(taken_part(sample, doubtful_gain_of(2.01, 0.1), before) == 2);
+      CHECK(taken_part(sample, doubtful_gain_of(2.01, 0.15), before) == 2);
     }
     CHECK(taken_part(sample, doubtful_gain_of(1.99 / lowered, 0.3)) == in_doubt);
     CHECK(taken_part(sample, doubtful_gain_of(0.9, 0.9)) == 0);

@@ -45,10 +45,10 @@ struct rest_constants {
   /// A guide rests in noise where its gain is so much less than what lets it take part.
   static constexpr float slack_in_noise = 0.05f;
   /// Standard error of a gain's logarithm for which the limits above are made.
-  static constexpr double small_error = 0.1;
+  static constexpr double small_error = 0.15;
   /// The logarithm of a gain is lowered by so many times what its error exceeds small_error by. Where few
   /// bright paths decide, the error is often too small where the gain is too large.
-  static constexpr double errors_of_doubt = 3.0;
+  static constexpr double errors_of_doubt = 4.0;
   /// Most samples between two comparisons, a power of two: what the camera sees may change.
   static constexpr std::uint32_t longest_rest = 512;
   /// least_gain of policies whose blocks have several warps. On an H200 a guided vertex takes 1.3 times an
