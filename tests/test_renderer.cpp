@@ -11,6 +11,7 @@
 #include <wfpg/exec/omp.hpp>
 #include <wfpg/exec/seq.hpp>
 #include <wfpg/exec/tbb.hpp>
+#include <wfpg/guides/octree/kept_guide.hpp>
 #include <wfpg/path_guider.hpp>
 
 #include <tbb/global_control.h>
@@ -162,6 +163,29 @@ TEST_CASE("a batch caster gives the pictures of an inline one", "[renderer]") {
                       trace<exec_policy, batch_caster>(scene, with, guided())));
     }
   }
+}
+
+TEST_CASE("samples in which a guide rests have the bits of their waves", "[renderer]") {
+  using exec_policy = wfpg::exec::tbb;
+  using guider = wfpg::path_guider<exec_policy, wfpg::kept_guide<exec_policy>>;
+  const scene scene = make_builtin_scene("cornell-box");
+  const device_scene<exec_policy> geometry(exec_policy(), scene);
+  const setup with{96, 5, true, 5, 24};
+  wfpg::kept_guide_options options;
+  options.octree_resolution = 32;
+  options.kept.resolution = 16;
+  options.max_paths = 96 * 96;
+  options.max_depth = 5;
+  options.least_gain = 1e6f;
+  const auto make = [&] {
+    const wfpg::triangle_mesh_view mesh{geometry.view().positions, geometry.view().triangles};
+    return guider(exec_policy(), mesh, options);
+  };
+  guider rests = make();
+  // A batch caster's paths wait for each other in all samples.
+  CHECK(same_bits(trace<exec_policy, embree_caster, guider&>(scene, with, rests),
+                  trace<exec_policy, batch_caster>(scene, with, make())));
+  CHECK(rests.resting());
 }
 
 TEST_CASE("one seed gives one picture on any number of threads", "[renderer]") {

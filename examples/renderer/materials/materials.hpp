@@ -46,10 +46,10 @@ struct bsdf {
       return pair.exists ? lobes(pair.side).eval(pair.outgoing, pair.incident) : vec3(0.0f);
     }
     if (is_delta() || !reflects(outgoing, incident)) return vec3(0.0f);
+    if (kind == material_kind::lambert) return colour * (glm::dot(incident, normal) / pi);
     const frame local(normal);
     const vec3 wo = local.to_local(outgoing);
     const vec3 wi = local.to_local(incident);
-    if (kind == material_kind::lambert) return colour * (wi.z / pi);
     if (kind == material_kind::smooth_plastic) return colour * (below_coat(wo.z, wi.z) * wi.z / pi);
     const vec3 h = glm::normalize(wo + wi);
     const float facets = ggx{alpha}.eval(wo, wi, h);
@@ -113,6 +113,11 @@ struct bsdf {
     if (is_delta() || is_black()) return {};
     if (coat && kind == material_kind::smooth_plastic) return sample_mirror(outgoing);
     const frame local(normal);
+    if (kind == material_kind::lambert) {
+      if (glm::dot(outgoing, normal) <= 0.0f) return {};
+      const vec3 incident = glm::normalize(local.to_world(cosine_hemisphere(u)));
+      return {incident, pdf_part(false, outgoing, incident)};
+    }
     vec3 wo = local.to_local(outgoing), wi;
     if (has_all_lobes()) {
       const float side = side_of(wo.z);

@@ -11,6 +11,7 @@
 #include <wfpg/exec/buffer.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace render {
@@ -127,8 +128,7 @@ struct scene_view {
     point.material = triangle_materials[hit.triangle];
     point.position = w * a + hit.u * b + hit.v * c;
     // Rounding errors are relative to the corners' coordinates, not to the point's own.
-    const vec3 largest = glm::max(glm::abs(a), glm::max(glm::abs(b), glm::abs(c)));
-    point.offset = 1e-5f * glm::max(largest.x, glm::max(largest.y, largest.z));
+    point.offset = 1e-5f * glm::max(largest_of(a), glm::max(largest_of(b), largest_of(c)));
     point.geometric_normal = glm::normalize(glm::cross(b - a, c - a));
     point.normal = point.geometric_normal;
     if (!normals.empty()) {
@@ -174,8 +174,9 @@ struct scene_view {
     return m.opacity * alpha < m.alpha_cutoff;
   }
 
-  /// The surface at `hit` seen along `outgoing` (unit length, away from the surface).
-  WFPG_HD hit_surface surface(triangle_hit hit, vec3 outgoing) const {
+  /// The surface at `hit` seen along `outgoing` (unit length, away from the surface). Its BSDF has a value
+  /// only where paths go on.
+  WFPG_HD hit_surface surface(triangle_hit hit, vec3 outgoing, bool goes_on = true) const {
     const surface_point at = point(hit);
     const material& scatters = materials[at.material];
     const bool front = glm::dot(at.geometric_normal, outgoing) >= 0.0f;
@@ -189,6 +190,10 @@ struct scene_view {
       result.emission = emitted(scatters, at.uv);
       result.emitted_luminance = emitted_luminances[at.material];
     }
+    result.surface.position = at.position;
+    result.surface.outgoing = outgoing;
+    result.surface.geometric_normal = at.geometric_normal;
+    if (!goes_on) return result;
     bsdf& f = result.surface.bsdf;
     f.kind = scatters.kind;
     set_lobes(scatters, at.uv, f);
@@ -196,10 +201,8 @@ struct scene_view {
     f.colour = scatters.base_color;
     if (scatters.base_texture.index >= 0) f.colour *= vec3(texel(scatters.base_texture, at.uv));
     f.ior = scatters.ior;
-    result.surface.position = at.position;
     result.surface.geometric_normal = f.geometric_normal;
     result.surface.normal = f.normal;
-    result.surface.outgoing = outgoing;
     return result;
   }
 
@@ -214,6 +217,11 @@ struct scene_view {
     f.factors.transmission = unorm8(scatters.transmission);
     f.factors.diffuse_transmission = unorm8(scatters.diffuse_transmission);
     f.transmitted_colour = unorm8x3(scatters.transmitted_color);
+  }
+
+  // glm::abs() branches on a CPU.
+  WFPG_HD static float largest_of(vec3 v) {
+    return glm::max(std::abs(v.x), glm::max(std::abs(v.y), std::abs(v.z)));
   }
 
   static constexpr float least_alpha = 1e-3f;

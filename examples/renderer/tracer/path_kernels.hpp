@@ -30,9 +30,11 @@ struct path_lights {
   bool next_event = true;
   wfpg::light_guide_view guide = {};  ///< empty: lights are chosen by power
 
-  /// Chooses the group of lights for a vertex, from u in [0, 1).
-  WFPG_HD wfpg::light_choice choose(const path_vertex& vertex, float u) const {
-    return guide.empty() ? choose_by_power(u) : guide.choose(row(vertex), u);
+  /// Chooses the group of lights for a vertex. draw() returns a number in [0, 1) where there is a choice.
+  template <class Draw>
+  WFPG_HD wfpg::light_choice choose(const path_vertex& vertex, const Draw& draw) const {
+    if (!guide.empty()) return guide.choose(row(vertex), draw());
+    return lights.groups.size() < 2 ? wfpg::light_choice() : choose_by_power(draw());
   }
   /// The probability of a group at a vertex, over its probability by power.
   WFPG_HD float preference(const path_vertex& vertex, std::uint32_t group) const {
@@ -42,7 +44,6 @@ struct path_lights {
  private:
   // Lights may be in groups also in a sample without a guide.
   WFPG_HD wfpg::light_choice choose_by_power(float u) const {
-    if (lights.groups.size() < 2) return {};
     std::uint32_t group = 0;
     while (group + 1 < lights.groups.size() && u >= lights.groups[group].share)
       u -= lights.groups[group++].share;
@@ -151,7 +152,7 @@ struct trace_paths {
       gather(id, path.throughput * sky * environment_weight(id, path));
       return end(id);
     }
-    const hit_surface found = world.scene.surface(hit, -path.direction);
+    const hit_surface found = world.scene.surface(hit, -path.direction, !at.is_last());
     const wfpg::surface<bsdf>& surface = found.surface;
     const vec3 before = path.throughput, throughput = before * absorb(id, path, found);
     recorder.vertex(id, at.depth, surface.position, surface.outgoing, throughput);
@@ -230,7 +231,8 @@ struct query_lights {
     const path_vertex& vertex = vertices[path];
     const bsdf scatters = vertex.bsdf();
     if (scatters.is_delta()) return {};
-    const wfpg::light_choice choice = world.choose(vertex, at.draw(path, dimension::light_group).x);
+    const wfpg::light_choice choice =
+        world.choose(vertex, [&] { return at.draw(path, dimension::light_group).x; });
     const light_sample light = world.lights.sample(world.scene, vertex.position, choice,
                                                    [&](std::uint32_t use) { return at.draw(path, use); });
     const light_query nothing(choice.key);
@@ -284,8 +286,9 @@ struct shade_paths {
     if (!queries.empty()) add_light(slot, id);
     recorder.scatter(id, at.depth, directions[slot]);
     paths.update(id, [&](path_state& path) {
-      const bool goes_on = scatter(vertices[id], directions[slot], path) &&
-                           survive_roulette(path, at.draw(id, dimension::roulette).x);
+      const bool goes_on =
+          scatter(vertices[id], directions[slot], path) &&
+          (at.depth < roulette_depth || survive_roulette(path, at.draw(id, dimension::roulette).x));
       path.active = goes_on ? 1 : 0;
     });
   }
@@ -315,7 +318,9 @@ struct shade_paths {
                               : scatters.eval_rgb(vertex.outgoing, drawn.direction) / drawn.pdf;
     if (!(wfpg::luminance(weight) > 0.0f)) return false;
     path.throughput *= weight;
-    path.reflectance *= scatters.reflectance(vertex.outgoing, drawn.direction, delta);
+    // Paths that roulette never ends need no reflectance.
+    if (at.max_depth > roulette_depth + 1)
+      path.reflectance *= scatters.reflectance(vertex.outgoing, drawn.direction, delta);
     path.pdf = delta ? 0.0f : drawn.pdf;
     path.origin = leave_surface(vertex.position, vertex.geometric_normal, drawn.direction, vertex.offset);
     path.direction = drawn.direction;
@@ -324,8 +329,7 @@ struct shade_paths {
 
   // Uses the throughput that the path would have if BSDFs had sampled all its directions. The real one is low
   // where guiding is certain of a direction, and those paths matter most.
-  WFPG_HD bool survive_roulette(path_state& path, float u) const {
-    if (at.depth < roulette_depth) return true;
+  WFPG_HD static bool survive_roulette(path_state& path, float u) {
     const float probability = glm::min(1.0f, path.reflectance / spared_reflectance);
     if (!(u < probability)) return false;
     path.throughput /= probability;

@@ -1,21 +1,35 @@
-// The path tracer. One sample of all pixels is one wave that goes from vertex to vertex as a whole.
+// The path tracer. One sample of all pixels is one wave that goes from vertex to vertex as a whole. On a CPU,
+// paths without a guide do not wait for each other.
 #pragma once
 
 #include "tracer/path_film.hpp"
 #include "tracer/path_kernels.hpp"
 #include "tracer/stage_clock.hpp"
 #include "tracer/technique_set.hpp"
+#include "tracer/unguided.hpp"
 #include "tracer/wave_share.hpp"
+#include "tracer/whole_paths.hpp"
 
 #include <wfpg/bins/partitioner.hpp>
 #include <wfpg/exec/buffer.hpp>
+#include <wfpg/exec/cpu_policy.hpp>
 #include <wfpg/host/ray_caster.hpp>
 #include <wfpg/host/wave.hpp>
 
 #include <algorithm>
 #include <cstdint>
+#include <type_traits>
+#include <utility>
 
 namespace render {
+
+/// Whether a guider says that its guide rests in a sample: then it records nothing, and BSDFs draw all
+/// directions.
+template <class Guider, class = void>
+inline constexpr bool can_rest_v = false;
+template <class Guider>
+inline constexpr bool can_rest_v<Guider, std::void_t<decltype(std::declval<const Guider&>().resting())>> =
+    true;
 
 struct tracer_settings {
   int width = 512;              ///< pixels, positive
@@ -89,14 +103,10 @@ class path_tracer {
     clock_.measure("update", [&] { guider.begin_sample(); });
     if (settings_.weighs_by_gain) weight *= guider.sample_weight();
     world_.guide = guider.lights();
-    for (path_queue queue{{}, true}; at.depth < at.max_depth; ++at.depth) {
-      trace(guider, at, queue);
-      if (at.is_last()) break;
-      queue = sort_by_material();
-      if (world_.next_event) query(at, queue);
-      sample_directions(guider, at, queue);
-      shade(guider, at, queue);
-    }
+    if (follows_whole_paths(guider))
+      clock_.measure("paths", [&] { follow_whole_paths(at); });
+    else
+      follow_by_stages(guider, at);
     clock_.measure("update", [&] { guider.end_sample(); });
     clock_.measure("film", [&] { film_.add(radiance_.view(), weight, samples); });
     wfpg::read_element(exec_, radiance_.data());  // waits, so that a look at the time sees the whole sample
@@ -114,6 +124,76 @@ class path_tracer {
 
  private:
   static constexpr bool is_inline = wfpg::is_inline_caster_v<Caster>;
+  static constexpr bool may_follow =
+      is_inline && std::is_base_of_v<wfpg::exec::cpu_policy<Exec, Exec::warp_width>, Exec>;
+
+  // On a CPU, paths of a sample without a guide, or whose guide rests, need not wait for each other.
+  template <class Guider>
+  static bool follows_whole_paths(const Guider& guider) {
+    if constexpr (!may_follow)
+      return false;
+    else if constexpr (std::is_same_v<Guider, unguided<Exec>>)
+      return true;
+    else if constexpr (can_rest_v<Guider>)
+      return guider.resting();
+    else
+      return false;
+  }
+
+  void follow_whole_paths(const wave_position& at) {
+    if constexpr (may_follow) {
+      if (world_.next_event)
+        follow_with(at, wfpg::density_queries{queued_light_directions{queries_.view()}, densities_.view()});
+      else
+        follow_with(at, wfpg::no_queries());
+    }
+  }
+
+  template <class Queries>
+  void follow_with(const wave_position& at, const Queries& queries) {
+    using stages = path_stages<Caster, Queries>;
+    const path_queue all{{}, true};
+    const inline_answers<Caster> answers{caster_};
+    const decltype(stages::trace) trace{at,
+                                        world_,
+                                        answers,
+                                        {},
+                                        all,
+                                        paths_.view(),
+                                        vertices_.view(),
+                                        keys_.view(),
+                                        radiance_.view(),
+                                        film_.segment_counts(),
+                                        film_.light_hit_counts(),
+                                        wfpg::partitioner<Exec>::excluded};
+    const decltype(stages::query) query{at, world_, answers, all, vertices_.view(), queries_.view()};
+    const decltype(stages::sample) sample{
+        {{all, vertices_.view()}, {all, at.random, 0}, queries, directions_.view()}, {}};
+    const decltype(stages::shade) shade{at,
+                                        {},
+                                        all,
+                                        vertices_.view(),
+                                        queries_.view(),
+                                        densities_.view(),
+                                        directions_.view(),
+                                        paths_.view(),
+                                        radiance_.view(),
+                                        world_.guide,
+                                        settings_.roulette_depth};
+    exec_.for_each_run(count_, follow_paths<Caster, Queries>{{trace, query, sample, shade}});
+  }
+
+  template <class Guider>
+  void follow_by_stages(Guider& guider, wave_position at) {
+    for (path_queue queue{{}, true}; at.depth < at.max_depth; ++at.depth) {
+      trace(guider, at, queue);
+      if (at.is_last()) break;
+      queue = sort_by_material();
+      if (world_.next_event) query(at, queue);
+      sample_directions(guider, at, queue);
+      shade(guider, at, queue);
+    }
+  }
 
   template <class Guider>
   void trace(Guider& guider, const wave_position& at, const path_queue& queue) {
