@@ -5,11 +5,12 @@
 #include "support/ranks.hpp"
 #include "support/scenes.hpp"
 
-#include <wfpg/exec/support/rank_exchange.hpp>
+#include <wfpg/exec/support/rank_counters.hpp>
 
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -54,12 +55,13 @@ class counting_communicator final : public wfpg::communicator {
   }
 
   void all_reduce(wfpg::array_view<const wfpg::reduction> arrays) override {
-    ++calls;
+    if (++calls == failing) throw std::bad_alloc();
     communicator::all_reduce(arrays);
   }
 
   std::size_t bytes = 0;
-  std::size_t calls = 0;  // of all_reduce()
+  std::size_t calls = 0;    // of all_reduce()
+  std::size_t failing = 0;  // the call for which there is no memory, from 1; 0: none
 
  private:
   wfpg::communicator& to_;
@@ -143,7 +145,7 @@ std::vector<keyed_value> scattered_values(std::size_t n) {
 struct exchanged {
   std::vector<taken_sum> taken;     // of the first and last key of each queue
   std::vector<std::uint32_t> sums;  // of the arrays
-  std::size_t takes = 0;            // of the arrays' results
+  std::size_t takes = 0;            // results that were read: the sum, and the largest value times 100
   std::size_t calls = 0, calls_after_two = 0;
 
   bool operator==(const exchanged& other) const {
@@ -185,8 +187,8 @@ exchanged exchange_of(wfpg::communicator& joins) {
   exchanged result;
   wfpg::detail::rank_exchange<one_policy> all(counting);
   for (wfpg::detail::value_queue<one_policy>& queue : queues) all.add(queue);
-  all.add(wfpg::reduction::sum(sum.view()), [&] { result.takes += 1; });
-  all.add(wfpg::reduction::max(most.view()), [&] { result.takes += 2; });
+  all.add(wfpg::reduction::sum(sum.view()), [&] { result.takes += sum.to_host(exec)[0]; });
+  all.add(wfpg::reduction::max(most.view()), [&] { result.takes += 100 * most.to_host(exec)[0]; });
   all.run(exec);
   for (wfpg::detail::value_queue<one_policy>& queue : queues) queue.sum(exec);
   result.calls = counting.calls;
@@ -196,6 +198,41 @@ exchanged exchange_of(wfpg::communicator& joins) {
   queues[2].sum(exec);
   result.calls_after_two = counting.calls;
   return result;
+}
+
+/// Counts, queues a value, and ends a sample; once more where memory runs out in between.
+void count_and_exchange(const one_policy& exec, counting_communicator& ranks, std::uint32_t n,
+                        const wfpg::buffer<std::uint32_t, one_policy>& counter,
+                        wfpg::detail::rank_counters<one_policy, std::uint32_t>& shared,
+                        wfpg::detail::value_queue<one_policy>& queue) {
+  std::uint32_t* const at = counter.data();
+  exec.for_each(1, [=] WFPG_HD(std::size_t) { *at += n; });
+  queue_ones(exec, queue.view(), 1, false);
+  for (bool again = true; again;) {
+    wfpg::detail::rank_exchange<one_policy> all(ranks);
+    all.add(queue);
+    shared.add_to(exec, all, wfpg::detail::counters_in_a_row<std::uint32_t>{at});
+    again = false;
+    try {
+      all.run(exec);
+    } catch (const std::bad_alloc&) {
+      again = true;
+    }
+  }
+}
+
+/// A counter to which each rank adds 10 and then 1, where the first call of the second exchange passes and
+/// its call `failing` does not.
+std::uint32_t count_twice(wfpg::communicator& joins, std::size_t failing) {
+  const one_policy exec;
+  counting_communicator ranks(joins);
+  const wfpg::buffer<std::uint32_t, one_policy> counter(exec, std::vector<std::uint32_t>{0});
+  wfpg::detail::rank_counters<one_policy, std::uint32_t> shared(exec, 1);
+  wfpg::detail::value_queue<one_policy> queue(exec, 8, 8, &ranks);
+  count_and_exchange(exec, ranks, 10, counter, shared, queue);
+  ranks.failing = failing > 0 ? ranks.calls + failing : 0;
+  count_and_exchange(exec, ranks, 1, counter, shared, queue);
+  return counter.to_host(exec)[0];
 }
 
 }  // namespace
@@ -277,6 +314,18 @@ TEST_CASE("Several queues and arrays take five reductions, and have the sums of 
       ranks, limit, [&](wfpg::communicator& joins) { found[joins.rank()] = exchange_of(joins); });
   CHECK(errors == std::vector<std::string>(ranks));
   // Keys have a value of each rank, and key 0 has two of rank 0.
-  const exchanged expected{{{4.0, 4}, {3.0, 3}, {4.0, 4}, {3.0, 3}, {0.0, 0}, {0.0, 0}}, {6, 3}, 3, 5, 6};
+  const exchanged expected{{{4.0, 4}, {3.0, 3}, {4.0, 4}, {3.0, 3}, {0.0, 0}, {0.0, 0}}, {6, 3}, 306, 5, 6};
   for (const exchanged& of_rank : found) CHECK((of_rank == expected));
+}
+
+TEST_CASE("Counters count once where an exchange is made again", "[packed_sums]") {
+  constexpr std::uint32_t ranks = 2;
+  for (const std::size_t failing : {0, 1, 2, 4}) {
+    CAPTURE(failing);
+    std::vector<std::uint32_t> found(ranks);
+    const std::vector<std::string> errors = run_ranks<one_policy>(
+        ranks, limit, [&](wfpg::communicator& joins) { found[joins.rank()] = count_twice(joins, failing); });
+    CHECK(errors == std::vector<std::string>(ranks));
+    CHECK(found == std::vector<std::uint32_t>{22, 22});
+  }
 }

@@ -139,7 +139,8 @@ TEST_CASE("NCCL: ranks of the host find a GPU that disagrees, or ends", "[ranks]
         if (!several_are_right(ranks, policy, 1000)) throw std::runtime_error("several arrays");
         const bool is_last = host.rank() + 1 == size;
         if (is_last && last_one == "ends") throw std::runtime_error("the last one ends");
-        sums_are_right<std::uint32_t>(ranks, policy, is_last && last_one == "disagrees" ? 6 : 5);
+        if (!sums_are_right<std::uint32_t>(ranks, policy, is_last && last_one == "disagrees" ? 6 : 5))
+          throw std::runtime_error("32-bit sums");
       });
   if (last_one == "agrees") CHECK(errors == std::vector<std::string>(size));
   if (last_one == "disagrees") CHECK_THAT(errors[0], WFPG_TEST_CONTAINS("with 5 values, ranks have 5 to 6"));
@@ -184,7 +185,7 @@ TEST_CASE("NCCL: one thread may destroy all communicators of a process", "[ranks
   int current = 0;
   cudaGetDevice(&current);
   CHECK(current == 1);
-  // A GPU that there is not: the error leaves no group open.
+  // A GPU that there is not is found before any rank joins.
   CHECK_THROWS_AS(nccl_communicator::join_devices({{0, first}, {1000, second}}), wfpg::device_error);
   CHECK(nccl_communicator::join_devices({{0, first}, {1, second}}).size() == 2);
   cudaSetDevice(0);

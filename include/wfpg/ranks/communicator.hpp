@@ -68,7 +68,8 @@ class communicator {
   /// As above, of 64 bits.
   virtual void all_reduce_max(array_view<std::uint64_t> values) = 0;
   /// Makes several reductions, whose arrays must not overlap. All ranks have equal kinds and numbers of
-  /// values in the same order. Here it makes one call after the other; adapters make one exchange of all.
+  /// values in the same order. Here it makes one call after the other. NCCL makes one exchange of all, and
+  /// MPI compares calls once.
   virtual void all_reduce(array_view<const reduction> arrays) {
     for (const reduction& one : arrays) reduce_one(one);
   }

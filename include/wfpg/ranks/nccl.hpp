@@ -40,14 +40,14 @@
 namespace wfpg {
 
 /// Options of nccl_communicator.
-/// All ranks must have the same.
+/// All ranks must have the same `seconds`, and all of them a `host` or none.
 struct nccl_options {
   /// Seconds after which a rank that waits for others throws rank_error, in (0, 1e6].
   /// Work of the rank's own stream does not count.
   double seconds = 30.0;
-  /// Ranks of the host's memory, with equal numbers, by which calls are compared; null: NCCL compares them.
-  /// thread_communicator for GPUs of one process, or mpi_communicator.
-  /// It must outlive the communicator, and its time limit counts in calls.
+  /// Ranks of the host's memory, of the same rank and size, by which calls are compared; null: NCCL compares
+  /// them. thread_communicator for GPUs of one process, or mpi_communicator. It must outlive the
+  /// communicator, and its time limit counts in calls.
   communicator* host = nullptr;
 };
 
@@ -106,6 +106,8 @@ class nccl_communicator final : public communicator {
     require(rank < size, "rank", rank, "less than the number of ranks");
     require(options.seconds > 0.0 && options.seconds <= 1.0e6, "seconds", options.seconds,
             "above 0, up to 1e6");
+    require(!options.host || (options.host->rank() == rank && options.host->size() == size), "host",
+            options.host ? options.host->rank() : 0, "the rank and size of this communicator");
     try {
       begin(id);
       wait_to_join("ncclCommInitRankConfig");
@@ -155,22 +157,22 @@ class nccl_communicator final : public communicator {
     std::vector<std::unique_ptr<nccl_communicator>> all(devices.size());
     std::vector<std::exception_ptr> errors(devices.size());
     // Each call of joining waits for all ranks.
-    std::vector<std::thread> threads;
-    for (std::size_t rank = 0; rank < devices.size(); ++rank)
-      threads.emplace_back([&, rank] {
-        try {
-          detail::check_runtime(cudaSetDevice(devices[rank].device), "cudaSetDevice");
-          all[rank] =
-              std::make_unique<nccl_communicator>(devices[rank].exec, static_cast<std::uint32_t>(rank),
-                                                  static_cast<std::uint32_t>(devices.size()), id, options);
-          all[rank]->is_of_one_thread_ = true;
-        } catch (...) {
-          errors[rank] = std::current_exception();
-        }
-      });
-    for (std::thread& thread : threads) thread.join();
-    for (const std::exception_ptr& error : errors)
-      if (error) std::rethrow_exception(error);
+    {
+      detail::joined_threads threads;
+      for (std::size_t rank = 0; rank < devices.size(); ++rank)
+        threads.begin([&, rank] {
+          try {
+            detail::check_runtime(cudaSetDevice(devices[rank].device), "cudaSetDevice");
+            all[rank] =
+                std::make_unique<nccl_communicator>(devices[rank].exec, static_cast<std::uint32_t>(rank),
+                                                    static_cast<std::uint32_t>(devices.size()), id, options);
+            all[rank]->is_of_one_thread_ = true;
+          } catch (...) {
+            errors[rank] = std::current_exception();
+          }
+        });
+    }
+    detail::rethrow_cause(errors);
     return all;
   }
 
@@ -244,6 +246,7 @@ class nccl_communicator final : public communicator {
   ncclResult_t begin_group(array_view<const reduction> arrays) {
     detail::nccl_group group;
     for (const reduction& one : arrays) {
+      if (one.count == 0) continue;  // it may have no address
       const ncclResult_t taken = begin_one(one);
       if (taken != ncclSuccess && taken != ncclInProgress) return taken;
     }

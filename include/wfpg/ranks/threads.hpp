@@ -47,10 +47,10 @@ class thread_ranks {
   friend class thread_communicator;
 
   // What a call does with the values of all ranks.
-  enum class reduction { sum32, sum64, max32, max64, broadcast };
+  enum class operation { sum32, sum64, max32, max64, broadcast };
   // What the ranks do together in one turn.
   struct call {
-    reduction what;
+    operation what;
     std::size_t bytes;   // of each rank's values
     std::uint32_t root;  // of a broadcast
 
@@ -124,25 +124,25 @@ class thread_communicator final : public communicator {
   std::uint32_t size() const override { return ranks_.size(); }
   /// Replaces each value by its sum over the ranks; waits for all of them. Each of these calls throws
   /// rank_error where the ranks do not meet within the limit.
-  void all_reduce_sum(array_view<std::uint32_t> values) override { meet(reduction::sum32, values); }
+  void all_reduce_sum(array_view<std::uint32_t> values) override { meet(operation::sum32, values); }
   /// As above, of 64 bits.
-  void all_reduce_sum(array_view<std::uint64_t> values) override { meet(reduction::sum64, values); }
+  void all_reduce_sum(array_view<std::uint64_t> values) override { meet(operation::sum64, values); }
   /// Replaces each value by the largest.
-  void all_reduce_max(array_view<std::uint32_t> values) override { meet(reduction::max32, values); }
+  void all_reduce_max(array_view<std::uint32_t> values) override { meet(operation::max32, values); }
   /// As above, of 64 bits.
-  void all_reduce_max(array_view<std::uint64_t> values) override { meet(reduction::max64, values); }
+  void all_reduce_max(array_view<std::uint64_t> values) override { meet(operation::max64, values); }
   /// Replaces the bytes by those of the rank `root`.
   void broadcast(array_view<unsigned char> bytes, std::uint32_t root) override {
-    meet(reduction::broadcast, bytes, root);
+    meet(operation::broadcast, bytes, root);
   }
 
  private:
   // As thread_ranks names them.
-  using reduction = thread_ranks::reduction;
+  using operation = thread_ranks::operation;
 
   // Takes the values to the host, where the ranks meet, and the result back.
   template <class T>
-  void meet(reduction what, array_view<T> values, std::uint32_t root = 0) {
+  void meet(operation what, array_view<T> values, std::uint32_t root = 0) {
     const std::size_t bytes = values.size() * sizeof(T);
     auto* const host = static_cast<unsigned char*>(host_.fit(bytes));
     if (bytes > 0) exec_.copy_to_host(host, values.data(), bytes);

@@ -274,6 +274,7 @@ class value_queue {
     if (ranks_) exec.fill_bytes(pending_.data(), 0, pending_.bytes());
     exec.fill_bytes(units_.data(), 0, units_.bytes());
     empty(exec);
+    is_summed_ = false;
   }
   /// Adds the queued values to their keys' sums, for take(), and empties the queue.
   /// O(values + keys / 512), and with several ranks O(values + keys).

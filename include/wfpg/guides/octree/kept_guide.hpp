@@ -106,7 +106,7 @@ class kept_guide : public octree_scene<Exec> {
   /// nodes + cells of the fields used).
   void update(const sample_context<Exec>& at) {
     // First, since the cache and fields learn from what all ranks found.
-    scene::exchange(at, [&](auto& all) { store_.share(at.exec, all, scene::has_deposits()); });
+    scene::exchange(at, true, [&](auto& all) { store_.share(at.exec, all, scene::has_deposits()); });
     const bool recorded = scene::update_cache(at);
     if (recorded) store_.aim(at.exec, scene::cache());
     store_.end_sample(at.exec, recorded, at.guided_next.log2_divisor());

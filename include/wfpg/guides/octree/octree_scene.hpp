@@ -74,7 +74,7 @@ class octree_scene : public guide_base {
   void begin_rest(const sample_context<Exec>& at) { begin_scene_sample(at); }
   /// Ends a sample without the guide: light choices learn from it.
   void end_rest(const sample_context<Exec>& at) {
-    exchange(at, [](const auto&) {});
+    exchange(at, false, [](const auto&) {});
     end_scene_sample(at);
   }
 
@@ -158,14 +158,14 @@ class octree_scene : public guide_base {
   /// Gives all ranks what each has found in the sample, and what they counted, for statistics and files.
   /// Call it before the cache and choices of lights change; without ranks it does nothing.
   ///
-  /// `more`: (rank_exchange&), adds what a derived guide has, in an order that all ranks share. Waits for the
-  /// work before it. Throws rank_error.
+  /// `deposits`: whether update_cache() follows. `more`: (rank_exchange&), adds what a derived guide has, in
+  /// an order that all ranks share. Waits for the work before it. Throws rank_error.
   template <class More>
-  void exchange(const sample_context<Exec>& at, const More& more) {
+  void exchange(const sample_context<Exec>& at, bool deposits, const More& more) {
     if (!options_.ranks) return;
     // Ranks add the parts in this order.
     detail::rank_exchange<Exec> all(*options_.ranks);
-    cache_.share(at.exec, all, has_deposits());
+    cache_.share(at.exec, all, deposits && has_deposits());
     lights_.share(all);
     shared_counts_.add_to(at.exec, all, detail::rays_of_depth{counts_.data()});
     more(all);
@@ -205,8 +205,8 @@ class octree_scene : public guide_base {
  private:
   friend struct detail::guide_sections;
 
-  // Which paths are recorded: those of `deposits_per_leaf` times the leaves vertices a sample, or all where
-  // the option is unset.
+  // The paths that are recorded: as many as yield `deposits_per_leaf` vertices a leaf. All where that is
+  // unset.
   detail::recorded_fraction recorded() const {
     return {options_, std::uint64_t(options_.deposits_per_leaf.value_or(0)) * octree_.leaf_count()};
   }

@@ -107,7 +107,7 @@ class transient_guide : public octree_scene<Exec> {
   /// Updates the cache and the choices of lights. Call after each sample, recorded or not. O(deposits +
   /// nodes).
   void update(const sample_context<Exec>& at) {
-    scene::exchange(at, [](const auto&) {});
+    scene::exchange(at, true, [](const auto&) {});
     scene::update_cache(at);
     scene::end_scene_sample(at);
   }

@@ -1,5 +1,6 @@
 // Calls of NCCL and of CUDA's runtime as exceptions. Owners of a CUDA event, of memory and of a group
-// of NCCL's calls. A keeper of the current device. Cost: one comparison a call. Memory: that which they own.
+// of NCCL's calls. Threads that join GPUs. A keeper of the current device. Cost: one comparison a call.
+// Memory: that which they own.
 #pragma once
 
 #include <wfpg/base/error.hpp>
@@ -10,7 +11,10 @@
 #include <nccl.h>
 
 #include <cstdint>
+#include <exception>
 #include <string>
+#include <thread>
+#include <vector>
 
 static_assert(NCCL_VERSION_CODE >= NCCL_VERSION(2, 18, 0), "wfpg/ranks/nccl.hpp needs NCCL 2.18 or later");
 
@@ -48,12 +52,43 @@ class nccl_group {
     is_open_ = false;
     return ncclGroupEnd();
   }
-  /// As above. Throws rank_error.
-  void end() { check_nccl(finish(), "ncclGroupEnd"); }
 
  private:
   bool is_open_ = true;
 };
+
+/// Threads that are waited for at the end of their owner.
+class joined_threads {
+ public:
+  joined_threads() = default;
+  /// Not copyable: threads have one owner.
+  joined_threads(const joined_threads&) = delete;
+  joined_threads& operator=(const joined_threads&) = delete;
+  /// Waits for them.
+  ~joined_threads() {
+    for (std::thread& thread : threads_) thread.join();
+  }
+  /// Begins a thread that calls f(), which must not throw. Throws std::system_error.
+  template <class F>
+  void begin(const F& f) {
+    threads_.emplace_back(f);
+  }
+
+ private:
+  std::vector<std::thread> threads_;
+};
+
+/// Throws the first error that is no rank_error, or else the first one: other ranks only say that they
+/// waited. Null: no error.
+inline void rethrow_cause(const std::vector<std::exception_ptr>& errors) {
+  std::exception_ptr first;
+  for (const std::exception_ptr& error : errors) try {
+      if (error) std::rethrow_exception(error);
+    } catch (const rank_error&) {
+      if (!first) first = error;
+    }
+  if (first) std::rethrow_exception(first);
+}
 
 /// Makes the device current again that was current before.
 class device_keeper {

@@ -20,6 +20,10 @@ namespace wfpg::detail {
 /// The first four are numbered as reduction::kind.
 enum class rank_function : std::uint32_t { sum32, sum64, max32, max64, all, broadcast, meeting };
 
+static_assert(static_cast<std::uint32_t>(rank_function::max64) ==
+                  static_cast<std::uint32_t>(reduction::kind::max64),
+              "rank_call::of() takes kinds as functions");
+
 /// Returns the function's name, for messages.
 inline const char* name_of(rank_function function) {
   if (function == rank_function::broadcast) return "broadcast";

@@ -87,15 +87,15 @@ inline void thread_ranks::wait_for_turn(std::unique_lock<std::mutex>& lock, std:
 inline void thread_ranks::combine(std::uint32_t rank, const call& now, const unsigned char* data,
                                   std::vector<unsigned char>& result) {
   switch (now.what) {
-    case reduction::sum32:
+    case operation::sum32:
       return detail::add_values<std::uint32_t>(data, result);
-    case reduction::sum64:
+    case operation::sum64:
       return detail::add_values<std::uint64_t>(data, result);
-    case reduction::max32:
+    case operation::max32:
       return detail::raise_values<std::uint32_t>(data, result);
-    case reduction::max64:
+    case operation::max64:
       return detail::raise_values<std::uint64_t>(data, result);
-    case reduction::broadcast:
+    case operation::broadcast:
       if (rank == now.root && now.bytes > 0) std::memcpy(result.data(), data, now.bytes);
   }
 }
