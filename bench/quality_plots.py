@@ -212,6 +212,17 @@ def draw_error_over_time(folder: pathlib.Path) -> str:
 
 # --- single samples --------------------------------------------------------------------------------------------------
 
+def linear_plot(left: float, top: float, curves: Dict[str, Points], title: str, along: str, names_below: bool) -> Plot:
+    """A plot of errors over sample numbers, with room for names of curves below or above them."""
+    values = [y for curve in curves.values() for _, y in curve]
+    low, high = min(values), max(values)
+    low, high = (low - 0.22 * (high - low), high) if names_below else (low, high + 0.35 * (high - low))
+    step = 0.05 if high - low < 0.4 else 0.1
+    ticks = [round(step * i, 2) for i in range(math.ceil(low / step), math.floor(high / step) + 1)]
+    last = int(max(x for curve in curves.values() for x, _ in curve))
+    return Plot(left, top, 350, 190, (1, last), (low, high), (1, 2, 4, 8, 16, 32, 64), ticks, title, along, True, False)
+
+
 def draw_single_samples(folder: pathlib.Path) -> str:
     """Each sample's own error over path tracing's, and combined samples' over that of the plain mean."""
     alone = {"pt": ("path tracing", GREY), "paper": ("the paper's method", PURPLE), "wfpg-transient-oriented": ("transient, oriented", GOLD),
@@ -222,19 +233,19 @@ def draw_single_samples(folder: pathlib.Path) -> str:
         found, noise, top = scene["single_samples"], scene["reference"]["noise"][MEASURE], 46 + 270 * row
         pt = found["pt"]["alone"][MEASURE]
         mean = sum(pt) / len(pt) - noise
-        one = Plot(58, top, 350, 190, (1, len(pt)), (0.53, 1.15), (1, 2, 4, 8, 16, 32, 64), (0.6, 0.7, 0.8, 0.9, 1, 1.1),
-                   f"{short(scene)}: each sample alone", "sample", True, False)
+        curves = {m: [(i + 1, (e - noise) / mean) for i, e in enumerate(found[m]["alone"][MEASURE])] for m in alone}
+        one = linear_plot(58, top, curves, f"{short(scene)}: each sample alone", "sample", True)
         for method, (_, colour) in alone.items():
-            one.curve([(i + 1, (e - noise) / mean) for i, e in enumerate(found[method]["alone"][MEASURE])], colour)
+            one.curve(curves[method], colour)
         for k, (name, colour) in enumerate(alone.values()):
             one.label(one.left + 70 + 130 * (k % 2), one.top + one.height - 24 + 15 * (k // 2), name, colour)
         all_ways = found["wfpg"]["combined"]
         plain = all_ways["constant"][MEASURE]
-        other = Plot(476, top, 350, 190, (1, len(plain)), (0.88, 1.22), (1, 2, 4, 8, 16, 32, 64), (0.9, 0.95, 1, 1.05, 1.1, 1.15, 1.2),
-                     f"{short(scene)}: samples of kept fields combined", "samples", True, False)
+        curves = {way: [(i + 1, (e - noise) / (p - noise)) for i, (e, p) in enumerate(zip(all_ways[way][MEASURE], plain)) if e is not None]
+                  for way in ways}
+        other = linear_plot(476, top, curves, f"{short(scene)}: samples of kept fields combined", "samples", False)
         for way, colour in ways.items():
-            errors = zip(all_ways[way][MEASURE], plain)
-            other.curve([(i + 1, (e - noise) / (p - noise)) for i, (e, p) in enumerate(errors) if e is not None], colour)
+            other.curve(curves[way], colour)
         for k, (way, colour) in enumerate(ways.items()):
             other.label(other.left + 160 + 100 * (k % 2), other.top + 14 + 15 * (k // 2), way, colour)
         parts += one.parts + other.parts

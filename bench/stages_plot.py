@@ -39,7 +39,9 @@ class Wave(NamedTuple):
 
 def waves_of(profile: str) -> List[Wave]:
     """The waves of cuda-profile.txt: microseconds, MB, registers, sectors, active warps, instructions."""
-    rows = [line.replace(",", "").split() for line in re.findall(r"^ *\d+\.\d+ +\d+\.\d+ +64 .*$", profile, re.MULTILINE)]
+    rows = [line.replace(",", "").split() for line in re.findall(r"^ *\d+\.\d+ +\d+\.\d+ +\d+ +\d.*$", profile, re.MULTILINE)]
+    if not rows:
+        raise ValueError("cuda-profile.txt has no waves")
     return [Wave(float(r[0]) * 1e-6, float(r[1]) * 1e6, float(r[3]) * SECTOR, float(r[4]) / 100, float(r[5])) for r in rows]
 
 

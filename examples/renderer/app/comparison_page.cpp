@@ -88,8 +88,27 @@ void require_comparable(const comparison& shown) {
   }
 }
 
+namespace {
+
+/// Throws std::invalid_argument where a browser could not read the page. Firefox and Chromium hold texts of
+/// less than 2^29 characters.
+void require_readable(const std::vector<comparison>& comparisons) {
+  constexpr std::size_t most_pixels = 45'000'000;  // 8 bytes each, which take 32 / 3 characters
+  std::size_t pixels = 0;
+  for (const comparison& shown : comparisons)
+    for (const named_picture& p : shown.pictures) pixels += p.picture.pixels.size();
+  if (pixels > most_pixels)
+    throw std::invalid_argument("the pictures have " + std::to_string(pixels / 1'000'000) +
+                                " million pixels in all, and browsers read pages of up to " +
+                                std::to_string(most_pixels / 1'000'000) +
+                                " million: compare fewer or smaller ones");
+}
+
+}  // namespace
+
 std::string comparison_page(const std::string& title, const std::vector<comparison>& comparisons) {
   if (comparisons.empty()) throw std::invalid_argument("there are no pictures to compare");
+  require_readable(comparisons);
   json data{{"heat", base64(heat_bytes())}, {"comparisons", json::array()}};
   for (const comparison& shown : comparisons) {
     require_comparable(shown);
