@@ -49,6 +49,8 @@ struct rest_constants {
   /// The logarithm of a gain is lowered by so many times what its error exceeds small_error by. Where few
   /// bright paths decide, the error is often too small where the gain is too large.
   static constexpr double errors_of_doubt = 4.0;
+  /// From this sample on a guide rests while its gain is in doubt. More unguided samples change little.
+  static constexpr std::uint32_t last_doubt = 8;
   /// Most samples between two comparisons, a power of two: what the camera sees may change.
   static constexpr std::uint32_t longest_rest = 512;
   /// least_gain of policies whose blocks have several warps. On an H200 a guided vertex takes 1.3 times an
@@ -137,8 +139,8 @@ class rest_schedule {
   }
   /// Takes what was measured in a sample, which decides from the next one on. The guide takes part in all
   /// paths where the gain is not known, or surely at least least_gain. It rests where the gain is less than
-  /// threshold(), from settled_samples on also where it is not surely as much. Between them it takes part in
-  /// as many as before, and in few where it rested or the gain is in doubt. Noisy paths have limits of their
+  /// threshold(), from last_doubt on also where it is not surely as much. Between them it takes part in as
+  /// many as before, and in few where it rested or the gain is in doubt. Noisy paths have limits of their
   /// own: enough_in_noise(), and slack_in_noise below it where that is less than threshold(). Nothing is
   /// decided before the first comparison. Precondition: compares(sample).
   void decide(std::uint32_t sample, const guiding_gain& measured) {
@@ -153,7 +155,7 @@ class rest_schedule {
                 least = min(threshold(sample), is_noisy ? in_noise - rest_constants::slack_in_noise : enough);
     if (!measured.is_known() || sure >= enough)
       takes_part_ = part::in_all;
-    else if ((is_settled(sample) ? sure : gain) < least)
+    else if ((age_of(sample) < rest_constants::last_doubt ? gain : sure) < least)
       takes_part_ = part::in_none;
     else if (resting() || sure < least)
       takes_part_ = part::in_few;
@@ -223,7 +225,6 @@ class rest_schedule {
   // In how many paths the guide takes part. Numbers are those of the file.
   enum class part : std::uint32_t { in_none = 0, in_few = 1, in_all = 2 };
 
-  bool is_settled(std::uint32_t sample) const { return age_of(sample) >= rest_constants::settled_samples; }
   // The gain of typical paths without what chance may have added.
   static double sure_gain(const guiding_gain& measured) {
     const double doubt = max(measured.typical_error - rest_constants::small_error, 0.0);
