@@ -241,8 +241,9 @@ TEST_CASE("choices of groups change the lights' densities, not their radiance", 
   CHECK(found == Approx(expected).epsilon(0.02));
   // In a sample without a guide, groups are chosen by power.
   const path_lights without_guide{geometry.view(), parts.view()};
-  const double by_power = irradiance(
-      parts, [&](std::uint32_t i) { return without_guide.choose(path_vertex{}, numbers(i, 20).x); });
+  const double by_power = irradiance(parts, [&](std::uint32_t i) {
+    return without_guide.choose(path_vertex{}, [=] { return numbers(i, 20).x; });
+  });
   CHECK(by_power == Approx(expected).epsilon(0.02));
 }
 

@@ -54,7 +54,7 @@ class Wfpg:
 
     def __init__(self, program: pathlib.Path, scene: pathlib.Path, job: Job, cores: int, method: str = "pt") -> None:
         self.name, self._cores = method, cores
-        self._command = [str(program), str(scene), "--method", method, "--size", job.size, "--max-depth", str(job.depth),
+        self._command = [str(program.resolve()), str(scene), "--method", method, "--size", job.size, "--max-depth", str(job.depth),
                          "--roulette-depth", LARGEST_DEPTH]
 
     def render(self, samples: int, seed: int, picture: Optional[pathlib.Path] = None) -> Times:
