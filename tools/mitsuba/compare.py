@@ -32,6 +32,7 @@ from speed import measure  # noqa: E402
 from tiles import compared, is_equal, tile_means  # noqa: E402
 
 Json = Dict[str, Any]
+METHODS = ("pt", "bpt", "wfpg", "wfpg-product", "sarsa")  # of wfpg-render, without bias
 
 
 def size(text: str) -> str:
@@ -48,6 +49,22 @@ def at_least(least: int) -> Callable[[str], int]:
             raise argparse.ArgumentTypeError(f"{text} is no whole number from {least}")
         return int(text)
     return read
+
+
+def words(*known: str) -> Callable[[str], List[str]]:
+    """A list with commas between its words, which are known unless none are."""
+    def read(text: str) -> List[str]:
+        found = text.split(",")
+        for word in found:
+            if not word or (known and word not in known):
+                raise argparse.ArgumentTypeError(f"'{word}' is not one of {', '.join(known)}" if known else "a word is missing")
+        return found
+    return read
+
+
+def numbers(text: str) -> List[int]:
+    """Whole numbers from 1, with commas between them."""
+    return [at_least(1)(word) for word in text.split(",")]
 
 
 def grid(text: str) -> Tuple[int, int]:
@@ -74,7 +91,7 @@ def parser() -> argparse.ArgumentParser:
     both.add_argument("--depth", type=at_least(2), default=8, help="segments of a path (default: %(default)s)")
     tiles = commands.add_parser("tiles", parents=[both], help="compare means of tiles, and HDR-FLIP",
                                 description="Compares means of tiles. Exits with 1 where one deviates by more than the limit.")
-    tiles.add_argument("--methods", default="pt,wfpg", help="of wfpg-render (default: %(default)s)")
+    tiles.add_argument("--methods", type=words(*METHODS), default="pt,wfpg", help="of wfpg-render (default: %(default)s)")
     tiles.add_argument("--samples", type=at_least(1), default=256, help="a pixel and rendering (default: %(default)s)")
     tiles.add_argument("--runs", type=at_least(4), default=16, help="renderings of each (default: %(default)s)")
     tiles.add_argument("--tiles", type=grid, default=(8, 8), metavar="COLUMNSxROWS", help="(default: 8x8)")
@@ -83,8 +100,8 @@ def parser() -> argparse.ArgumentParser:
     times.add_argument("--samples", type=at_least(2), default=16, help="a pixel and rendering on one core; N cores render N times as many "
                        "(default: %(default)s)")
     times.add_argument("--pairs", type=at_least(1), default=21, help="(default: %(default)s)")
-    times.add_argument("--cores", help="numbers of cores (default: 1,2 and all)")
-    times.add_argument("--variants", default="scalar_rgb", help="of Mitsuba, such as scalar_rgb,llvm_ad_rgb (default: %(default)s)")
+    times.add_argument("--cores", type=numbers, help="numbers of cores (default: 1,2 and all)")
+    times.add_argument("--variants", type=words(), default="scalar_rgb", help="of Mitsuba, such as scalar_rgb,llvm_ad_rgb (default: %(default)s)")
     return top
 
 
@@ -104,7 +121,7 @@ def check(given: argparse.Namespace) -> None:
         raise ComparisonError(f"--program {given.program}: is no program")
     for scene in given.scenes:
         read_gltf(scene)
-    check_mitsuba(given.python)
+    check_mitsuba(given.python, getattr(given, "variants", []))
     if given.command == "tiles":
         columns, rows = given.tiles
         width, height = map(int, given.size.split("x"))
@@ -181,7 +198,7 @@ def flips(pictures: Dict[str, List[pathlib.Path]], folder: pathlib.Path, python:
 
 def compare_scene(scene: Prepared, given: argparse.Namespace, folder: pathlib.Path) -> Json:
     """Tiles and HDR-FLIP of a scene."""
-    cores, job, methods = len(os.sched_getaffinity(0)), Job(given.size, given.depth), given.methods.split(",")
+    cores, job, methods = len(os.sched_getaffinity(0)), Job(given.size, given.depth), given.methods
     theirs = Mitsuba(given.python, "scalar_rgb", scene.xml, job, cores)
     pictures = {"mitsuba": render_runs(theirs, scene.name, given, folder)}
     for method in methods:
@@ -205,7 +222,7 @@ def compare_scene(scene: Prepared, given: argparse.Namespace, folder: pathlib.Pa
 def time_scene(scene: Prepared, given: argparse.Namespace, cores: List[int]) -> Json:
     """Times of a scene by variant and number of cores."""
     job, rows = Job(given.size, given.depth), []
-    for variant in given.variants.split(","):
+    for variant in given.variants:
         for count in cores:
             try:
                 theirs = Mitsuba(given.python, variant, scene.xml, job, count)
@@ -239,7 +256,7 @@ def main() -> int:
         return 0
     check(given)
     have = len(os.sched_getaffinity(0))
-    cores = [int(c) for c in given.cores.split(",")] if getattr(given, "cores", None) else sorted({1, min(2, have), have})
+    cores = getattr(given, "cores", None) or sorted({1, min(2, have), have})
     check_cores(cores)
     settings = {key: getattr(given, key) for key in ("size", "depth", "samples")}
     settings["pairs" if given.command == "times" else "runs"] = given.pairs if given.command == "times" else given.runs

@@ -126,15 +126,19 @@ class Mitsuba:
         self._errors.close()
 
 
-def check_mitsuba(python: str) -> None:
-    """Throws ComparisonError where a Python cannot be run or has no Mitsuba 3."""
+def check_mitsuba(python: str, variants: List[str]) -> None:
+    """Throws ComparisonError where a Python cannot be run, has no Mitsuba 3, or one without such variants."""
     try:
-        done = subprocess.run([python, "-c", "import drjit, mitsuba; print(mitsuba.__version__)"], capture_output=True, text=True,
+        done = subprocess.run([python, "-c", "import drjit, mitsuba; print(mitsuba.__version__, *mitsuba.variants())"], capture_output=True, text=True,
                               check=False)
     except OSError as reason:
         raise ComparisonError(f"--python {python}: {reason.strerror}") from reason
     if done.returncode != 0 or not done.stdout.startswith("3."):
         raise ComparisonError(f"{python} has no Mitsuba 3: give --python one that has, after PYTHON -m pip install mitsuba")
+    known = done.stdout.split()[1:]
+    for variant in variants:
+        if variant not in known:
+            raise ComparisonError(f"--variants {variant}: Mitsuba has {', '.join(known)}")
 
 
 def check_cores(cores: List[int]) -> None:
