@@ -25,13 +25,20 @@ class Place:
 
     def lacks(self, series: Series) -> List[str]:
         """What a series needs and this machine does not have."""
-        has = {"gpu": lambda: bool(gpu_and_driver()), "several GPUs": lambda: "\n" in gpu_and_driver(), "scenes": lambda: self.scenes is not None, "Open PGL": self.has_openpgl}
+        has = {"gpu": lambda: bool(gpu_and_driver()), "several GPUs": lambda: "\n" in gpu_and_driver(),
+               "scenes": lambda: self.scenes is not None, "Open PGL": self.has_openpgl, "Mitsuba": has_mitsuba}
         return [need for need in series.needs if not (has[need]() if need in has else shutil.which(need))]
 
     def has_openpgl(self) -> bool:
         """Whether the renderer has Open PGL: without it, the program names no such library."""
         program = self.programs / "wfpg-render"
         return program.exists() and b"libopenpgl" in program.read_bytes()
+
+
+def has_mitsuba() -> bool:
+    """Whether the python3 of PATH has Mitsuba."""
+    done = subprocess.run(["python3", "-c", "import mitsuba"], capture_output=True, check=False)
+    return done.returncode == 0
 
 
 def compiler(programs: pathlib.Path) -> str:
@@ -102,7 +109,7 @@ def run(place: Place, series: Series, again: bool) -> pathlib.Path:
         link(folder / "scenes", place.scenes.resolve())
     if "#" in series.name and (place.root / RESULTS / name).exists():
         shutil.copy(place.root / RESULTS / name, folder / name)  # the commands replace their part of it
-    paths = [place.programs, place.root / "bench", place.root / "bench" / "ranks"]
+    paths = [place.programs, place.root / "bench", place.root / "bench" / "ranks", place.root / "tools" / "mitsuba"]
     environment: Dict[str, str] = {**os.environ, "PATH": os.pathsep.join([*map(str, paths), os.environ["PATH"]])}
     for command in series.commands:
         print(f"  {command}", flush=True)

@@ -16,6 +16,7 @@ from typing import Dict, List, Set
 
 import bidirectional_blocks  # registers its blocks
 import host_blocks  # registers its blocks
+import mitsuba_blocks  # registers its blocks
 import option_blocks  # registers its blocks
 import performance_blocks  # registers its blocks
 import quality_blocks  # registers its blocks

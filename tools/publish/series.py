@@ -42,6 +42,7 @@ def sarsa_methods(updates: Dict[str, Tuple[str, ...]]) -> str:
                     for update, samplers in updates.items() for s in samplers)
 
 
+DIFFUSE = " ".join(f"scenes/{name}.glb" for name in ("cornell-box", "staircase2", "veach-ajar"))
 DEEP = "--max-depth 16 --roulette-depth 8"
 WITHOUT_NEE = methods("--nee off", {"pt": "--method pt", "wfpg": "--method wfpg", "records": "--method records"})
 ALL_SAMPLERS = ("sphere", "hemisphere", "rejection", "mixed")
@@ -70,6 +71,10 @@ ALL: Tuple[Series, ...] = (
     Series("room.json", (f"wfpg-room --methods {ROOM} --json room.json",), ("Open PGL",), 20, "room.json"),
     Series("room-64.json", ("wfpg-room --methods wfpg,openpgl-pavmm --samples 64 --json room-64.json",), ("Open PGL",), 10,
            "room-64.json"),
+    Series("mitsuba-tiles.json", (f"compare.py tiles {DIFFUSE} -o mitsuba-tiles.json --program bin/wfpg-render --size 64x64",),
+           ("scenes", "Mitsuba"), 30, "mitsuba-tiles.json"),
+    Series("mitsuba-times.json", ("compare.py times scenes/cornell-box.glb scenes/staircase2.glb -o mitsuba-times.json "
+                                  "--program bin/wfpg-render --size 256x256",), ("scenes", "Mitsuba"), 10, "mitsuba-times.json"),
     Series("compile-time.json", ("compile_time.py compile-time.json 10",), ("clang++",), 10, "compile-time.json"),
     Series("ranks.json#processes", tuple(f"measure.py bin/wfpg-render {scene} 640x360 {n} 40 ranks.json"
                                          for scene in ("ajar", "scenes/bathroom.glb") for n in (1, 2, 4, 8)),
