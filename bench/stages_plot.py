@@ -3,7 +3,7 @@
 
 usage: bench/stages_plot.py bench/results OUT.svg
 
-It reads cuda-stages.json and cuda-profile.txt. Source of the roofline by instructions: Ding & Williams 2019, "An
+It reads cuda-stages.json, cuda-casting.json and cuda-profile.txt. Source of the roofline by instructions: Ding & Williams 2019, "An
 Instruction Roofline Model for GPUs". The roofs are an NVIDIA H200's: its data sheet's bandwidth, and its highest clock.
 """
 import json
@@ -13,13 +13,13 @@ import sys
 from typing import Any, Dict, List, NamedTuple, Tuple
 
 from svg import COLOURS, Plot, document, line, text
-from table import FLOORS
+from table import FLOORS, with_casting
 
 BYTES = 4.8e12  # a second, of the GPU's memory
 INSTRUCTIONS = 132 * 4 * 1.98e9  # of warps, a second: multiprocessors, schedulers, and the highest clock
 SECTOR = 32  # bytes, of the second-level cache
 ORANGE, BLUE, GREEN = COLOURS[:3]
-KINDS = {"copies of memory": BLUE, "sorts": GREEN, "OptiX's rays": ORANGE}  # of floors
+KINDS = {"copies of memory": BLUE, "sorts": GREEN, "rays, connections": ORANGE}  # of floors
 ENDS = (0.01, 4.0)  # of parts of the floor's speed
 ROW, LEFT, TOP, WIDTH = 19, 296, 62, 230
 
@@ -48,7 +48,9 @@ def waves_of(profile: str) -> List[Wave]:
 def kind_of(stage: str) -> str:
     """What a stage's floor is made of."""
     floor = FLOORS[stage]
-    return "OptiX's rays" if "OptiX" in floor else "sorts" if "sort" in floor else "copies of memory"
+    if "rays" in floor or "connections" in floor:
+        return "rays, connections"
+    return "sorts" if "sort" in floor else "copies of memory"
 
 
 def name_of(benchmark: Dict[str, Any]) -> Tuple[str, str]:
@@ -105,7 +107,9 @@ def draw_roofs(waves: List[Wave]) -> List[str]:
 def main(folder: str, out: str) -> None:
     """Draws the plot."""
     results = pathlib.Path(folder)
-    benchmarks = json.loads((results / "cuda-stages.json").read_text(encoding="utf-8"))["benchmarks"]
+    benchmarks, casting = (json.loads((results / name).read_text(encoding="utf-8"))["benchmarks"]
+                           for name in ("cuda-stages.json", "cuda-casting.json"))
+    benchmarks = with_casting(benchmarks, casting)
     waves = waves_of((results / "cuda-profile.txt").read_text(encoding="utf-8"))
     height = TOP + ROW * len(benchmarks) + 30
     pathlib.Path(out).write_text(document(886, height, draw_floors(benchmarks) + draw_roofs(waves)), encoding="utf-8")

@@ -36,6 +36,11 @@ def print_table(rows):
         print(f"| {' | '.join(row)} |")
 
 
+def with_casting(benchmarks, casting):
+    """Stages, with those of `casting` in place of what a build without OptiX measured beside copies."""
+    return [b for b in benchmarks if not b["name"].startswith("casting/")] + casting
+
+
 def stage_rows(benchmarks):
     rows = [["stage", "floor", "floor, ms", "measured, ms", "ratio"]]
     for b in benchmarks:

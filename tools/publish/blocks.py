@@ -100,5 +100,5 @@ def generate(results: Results, name: str, page: str) -> str:
     made = BLOCKS[word](results, *arguments)
     if isinstance(made, str):
         return made
-    sources = "; ".join(source(results.root, file, page) for file in results.read)
+    sources = "; ".join(dict.fromkeys(source(results.root, file, page) for file in results.read))  # parts of a file may be alike
     return f"{table(made)}\n\n*{sources}.*"
