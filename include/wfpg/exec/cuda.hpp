@@ -160,8 +160,9 @@ class cuda {
   /// Never null; safe for concurrent calls; lives as long as the process.
   /// Each allocation takes a call of the driver.
   static memory_resource* staging_memory() {
-    static wfpg::detail::page_locked_resource resource;
-    return &resource;
+    // Never destroyed: communicators of static storage may end later.
+    static memory_resource* const resource = new wfpg::detail::page_locked_resource;
+    return resource;
   }
   /// Waits for the work before it, and gives the pool's unused memory back to the device.
   /// Does nothing where the memory comes from a caller's resource.

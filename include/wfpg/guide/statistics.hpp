@@ -70,7 +70,7 @@ struct guiding_gain {
   double typical_guided = 0.0;     ///< guided_variance without bright paths
   double unguided_vertices = 0.0;  ///< mean surfaces of a path that samples its BSDFs
   double guided_vertices = 0.0;    ///< mean surfaces of a guided path
-  double typical_error = 0.0;      ///< standard error of typical_value()'s logarithm
+  double typical_error = 0.0;      ///< standard error of the logarithm of the ratio of typical variances
 
   /// Whether value() means something: paths are enough, and unguided ones miss no light but by chance.
   bool is_known() const {
@@ -86,8 +86,8 @@ struct guiding_gain {
     const double gain = ratio(typical_unguided, typical_guided);
     return guided_vertices > 0.0 ? gain * unguided_vertices / guided_vertices : gain;
   }
-  /// Mean with an earlier comparison, if it had paths: few bright paths decide less. So is the error, since
-  /// comparisons share unguided paths.
+  /// Mean with an earlier comparison, if it had paths: few bright paths decide less. The error
+  /// is then an upper bound, since comparisons share unguided paths.
   guiding_gain mean_with(const guiding_gain& before) const {
     if (before.paths == 0) return *this;
     const auto mean = [](double a, double b) { return 0.5 * (a + b); };

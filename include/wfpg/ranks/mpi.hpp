@@ -68,7 +68,7 @@ inline void require_mpi() {
 }  // namespace detail
 
 /// The ranks of an MPI communicator.
-/// Exec is the policy in whose memory arrays lie.
+/// Exec is the policy in whose memory arrays lie, whose stream must outlive this.
 /// One of a CPU policy serves all CPU policies, whose memory is the host's.
 ///
 /// After rank_error, further calls throw at once.
@@ -93,7 +93,7 @@ class mpi_communicator final : public communicator {
   /// Throws std::invalid_argument for options out of range.
   /// Cost: one duplication, a few messages a rank.
   mpi_communicator(const Exec& exec, MPI_Comm ranks, const mpi_options& options = {})
-      : exec_(exec), options_(options) {
+      : exec_(exec), piece_(exec), options_(options) {
     require(options.seconds > 0.0 && options.seconds <= 1.0e6, "seconds", options.seconds,
             "above 0, up to 1e6");
     require(options.piece_bytes >= 64 && options.piece_bytes <= std::size_t(1) << 30, "piece_bytes",
@@ -104,8 +104,8 @@ class mpi_communicator final : public communicator {
     detail::check_mpi(MPI_Comm_size(ranks, &size), "MPI_Comm_size");
     rank_ = static_cast<std::uint32_t>(rank);
     size_ = static_cast<std::uint32_t>(size);
-    messages_ = std::make_unique<message_memory>(exec);
-    messages_->piece.fit(options.piece_bytes);
+    messages_ = std::make_unique<message_memory>();
+    piece_.fit(options.piece_bytes);
     // A duplication that does not block, so that it has a time limit, too.
     MPI_Request request = MPI_REQUEST_NULL;
     start(MPI_Comm_idup(ranks, &messages_->ranks, &request), "MPI_Comm_idup");
@@ -168,14 +168,10 @@ class mpi_communicator final : public communicator {
   /// MPI cannot take back a collective.
   /// So this memory is never freed after a failure.
   struct message_memory {
-    explicit message_memory(const Exec& exec) : piece(exec) {}
-
     /// The duplicate.
     MPI_Comm ranks = MPI_COMM_NULL;
     /// What ranks compare before each exchange.
     std::uint64_t call[detail::rank_call::word_count] = {};
-    /// Values on their way, of any type.
-    detail::staging<Exec> piece;
   };
 
   /// Reduces one array.
@@ -219,7 +215,7 @@ class mpi_communicator final : public communicator {
         options_.piece_bytes / sizeof(std::uint64_t) * (sizeof(std::uint64_t) / sizeof(T));
     for (std::size_t first = 0; first < values.size(); first += most) {
       const std::size_t count = std::min(most, values.size() - first);
-      void* const piece = messages_->piece.fit(options_.piece_bytes);
+      void* const piece = piece_.fit(options_.piece_bytes);
       exec_.copy_to_host(piece, values.data() + first, count * sizeof(T));
       exchange(piece, static_cast<int>(count));
       exec_.copy_from_host(values.data() + first, piece, count * sizeof(T));
@@ -266,10 +262,15 @@ class mpi_communicator final : public communicator {
 
   /// Gives up the messages in flight, and returns their memory, which stays.
   /// Later calls see that there is none.
-  message_memory& abandon() { return *messages_.release(); }
+  message_memory& abandon() {
+    piece_.give_up();
+    return *messages_.release();
+  }
 
   /// The policy whose copies reach the values.
   Exec exec_;
+  /// Values on their way, of any type.
+  detail::staging<Exec> piece_;
   /// As given; ranks are not asked whether they have the same.
   mpi_options options_;
   std::uint32_t rank_ = 0, size_ = 0;

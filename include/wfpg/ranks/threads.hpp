@@ -101,6 +101,7 @@ class thread_ranks {
 };
 
 /// One rank's communicator, for arrays in the memory of `Exec`. Its thread makes it, uses it and destroys it.
+/// The policy's stream must outlive it.
 /// Neither movable nor copyable.
 template <class Exec>
 class thread_communicator final : public communicator {

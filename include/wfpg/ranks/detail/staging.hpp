@@ -6,8 +6,6 @@
 // Memory: the largest number of bytes that was asked for.
 #pragma once
 
-#include <wfpg/base/config.hpp>
-
 #include <cstddef>
 #include <memory_resource>
 #include <type_traits>
@@ -21,8 +19,8 @@ struct has_staging_memory : std::false_type {};
 template <class Exec>
 struct has_staging_memory<Exec, std::void_t<decltype(Exec::staging_memory())>> : std::true_type {};
 
-/// Owns the memory. Copies from it may still be under way when it is used again, since copies are ordered.
-/// Not copyable.
+/// Owns the memory. It waits for the policy's work at its end, so that a stream must outlive it. Copies from
+/// it may still be under way when it is used again, since copies are ordered. Not copyable.
 template <class Exec>
 class staging {
  public:
@@ -38,6 +36,11 @@ class staging {
     }
   }
 
+  /// Gives the memory up for good, to messages that cannot be taken back.
+  void give_up() {
+    memory_ = nullptr;
+    bytes_ = 0;
+  }
   /// Returns room for `bytes` bytes, aligned for any number. What was there may be lost.
   /// Throws std::bad_alloc or the policy's error for memory.
   void* fit(std::size_t bytes) {
