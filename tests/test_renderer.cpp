@@ -70,8 +70,15 @@ class batch_caster {
 };
 static_assert(!wfpg::is_inline_caster_v<batch_caster>);
 
+/// A picture, and what its film and clock counted.
+struct traced {
+  std::vector<vec3> picture;
+  std::uint64_t segments = 0, light_hits = 0;
+  bool has_whole_paths = false;
+};
+
 template <class Exec, class Caster = embree_caster, class Guider = unguided<Exec>>
-std::vector<vec3> trace(const scene& scene, const setup& with, Guider guider = Guider(Exec())) {
+traced trace_all(const scene& scene, const setup& with, Guider guider = Guider(Exec())) {
   const Exec exec;
   const device_scene<Exec> geometry(exec, scene);
   const light_distribution<Exec> lights(exec, scene);
@@ -80,7 +87,13 @@ std::vector<vec3> trace(const scene& scene, const setup& with, Guider guider = G
                                    {geometry.view(), lights.view(), with.nee}, accelerated.caster());
   const pinhole camera(scene.view, with.side, with.side);
   for (std::uint32_t i = 0; i < with.samples; ++i) tracer.render_sample(guider, camera, i, 1.0f);
-  return tracer.film().picture();
+  traced result{tracer.film().picture(), tracer.film().segments(), tracer.film().light_hits()};
+  for (const auto& stage : tracer.seconds()) result.has_whole_paths |= stage.first == std::string("paths");
+  return result;
+}
+template <class Exec, class Caster = embree_caster, class Guider = unguided<Exec>>
+std::vector<vec3> trace(const scene& scene, const setup& with, Guider guider = Guider(Exec())) {
+  return trace_all<Exec, Caster, Guider>(scene, with, std::forward<Guider>(guider)).picture;
 }
 
 /// Means of independent pictures, and the z score of the difference between two sets.
@@ -145,7 +158,11 @@ TEST_CASE("a batch caster gives the pictures of an inline one", "[renderer]") {
   const device_scene<exec_policy> geometry(exec_policy(), scene);
   for (const bool nee : {false, true}) {
     const setup with{32, 6, nee, 5, 6};
-    CHECK(same_bits(trace<exec_policy>(scene, with), trace<exec_policy, batch_caster>(scene, with)));
+    const traced whole = trace_all<exec_policy>(scene, with),
+                 waves = trace_all<exec_policy, batch_caster>(scene, with);
+    CHECK((whole.has_whole_paths && !waves.has_whole_paths));
+    CHECK(same_bits(whole.picture, waves.picture));
+    CHECK((whole.segments == waves.segments && whole.light_hits == waves.light_hits));
     for (const wfpg_test::field_lifetime lifetime :
          {wfpg_test::field_lifetime::kept, wfpg_test::field_lifetime::transient}) {
       wfpg_test::guider_options options;
@@ -170,7 +187,6 @@ TEST_CASE("samples in which a guide rests have the bits of their waves", "[rende
   using guider = wfpg::path_guider<exec_policy, wfpg::kept_guide<exec_policy>>;
   const scene scene = make_builtin_scene("cornell-box");
   const device_scene<exec_policy> geometry(exec_policy(), scene);
-  const setup with{96, 5, true, 5, 24};
   wfpg::kept_guide_options options;
   options.octree_resolution = 32;
   options.kept.resolution = 16;
@@ -181,11 +197,17 @@ TEST_CASE("samples in which a guide rests have the bits of their waves", "[rende
     const wfpg::triangle_mesh_view mesh{geometry.view().positions, geometry.view().triangles};
     return guider(exec_policy(), mesh, options);
   };
+  const setup with{96, 5, true, 5, 24};
   guider rests = make();
+  const traced whole = trace_all<exec_policy, embree_caster, guider&>(scene, with, rests);
   // A batch caster's paths wait for each other in all samples.
-  CHECK(same_bits(trace<exec_policy, embree_caster, guider&>(scene, with, rests),
-                  trace<exec_policy, batch_caster>(scene, with, make())));
+  const traced waves = trace_all<exec_policy, batch_caster>(scene, with, make());
   CHECK(rests.resting());
+  CHECK(whole.has_whole_paths);
+  CHECK(!waves.has_whole_paths);
+  CHECK(same_bits(whole.picture, waves.picture));
+  CHECK(whole.segments == waves.segments);
+  CHECK(whole.light_hits == waves.light_hits);
 }
 
 TEST_CASE("one seed gives one picture on any number of threads", "[renderer]") {

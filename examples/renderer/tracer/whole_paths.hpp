@@ -7,6 +7,9 @@
 
 #include <wfpg/guide/sample_rays.hpp>
 
+#include <cstddef>
+#include <type_traits>
+
 namespace render {
 
 /// The stages of paths that no guide samples. `Queries` is wfpg::density_queries, or wfpg::no_queries without
@@ -36,8 +39,8 @@ struct path_stages {
 };
 
 /// Follows each path of a run by itself. Each path then computes what it does in a wave, from the same random
-/// numbers, so that the picture has the same bits. A path's state stays in a CPU's nearest cache, there is no
-/// sort, and threads wait for each other once a sample.
+/// numbers, so that the picture has the same bits where compilers do not contract products and sums. A path's
+/// state stays in a CPU's nearest cache, there is no sort, and threads wait for each other once a sample.
 template <class Caster, class Queries>
 struct follow_paths {
   path_stages<Caster, Queries> stages;
@@ -46,6 +49,7 @@ struct follow_paths {
   [[gnu::flatten]] void operator()(const Run& run) const {
     path_stages<Caster, Queries> s = stages;
     const wave_position at = s.trace.at;
+    // Said again, so that the compiler leaves out look-ups in queues.
     s.trace.queue.all = s.query.queue.all = s.shade.queue.all = true;
     s.sample.sampler.surfaces.queue.all = s.sample.sampler.random.queue.all = true;
     run.for_each([&](std::size_t path, int) { s.follow(path, at); });
