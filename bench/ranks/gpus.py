@@ -4,8 +4,9 @@
 usage: bench/ranks/gpus.py PROGRAM RESULTS.json RUNS SCENE=SAMPLES...
 
 PROGRAM is wfpg-render with CUDA and NCCL. A scene is rendered by 1, 2, 4, ... GPUs, as many as there are, with SAMPLES a
-pixel and eight of them a wave; the first scene with one a wave, too. Several GPUs take RUNS runs. Then follow renderings of
-192 samples, and as many whose guides are compared: other bytes are an error. Results replace "gpus" in RESULTS.json.
+pixel and eight of them a wave; the first scene with one a wave, too. Several GPUs take RUNS runs. Before them guides and
+pictures of 192 samples are compared: other bytes are an error. After them follow times of 192 samples. Results replace
+"gpus" in RESULTS.json.
 
 Seconds are all but start-up, reading the scene, joining GPUs, and writing files. NVLink multicast is off.
 """

@@ -106,6 +106,7 @@ def rests_gpu_loss(results: Results) -> str:
 
 @block
 def rests_cpu_loss(results: Results, samples: str) -> str:
-    """What guiding costs on a CPU where it does not pay, without veach-mis."""
-    losses = [1 - g[0] for s, g in at_equal_time(results, "cpu", samples).items() if g[0] < 1.0 and s != "veach-mis.glb"]
-    return per_cent(losses)
+    """The most that guiding costs on a CPU in scenes whose guides rest."""
+    scenes = results.json(REST, "cpu", "scenes")
+    lost = [1 - scene[samples]["equal_time"] for scene in scenes.values() if all(scene["64"]["rested"])]
+    return f"{100 * max(lost):.0f}%"

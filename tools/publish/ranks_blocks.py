@@ -1,4 +1,5 @@
 """Tables and figures of docs/ranks.md: what ranks send, what it costs, and how they scale."""
+import math
 import sys
 from typing import Any, Dict, List, Tuple
 
@@ -146,7 +147,7 @@ def ranks_gpu_model(results: Results) -> str:
     for _, _, seconds in renderings(results, "scenes"):
         divided, alone = fit({int(n): s for n, s in seconds.items()})
         most = max([most, *(abs((divided / int(n) + alone) / s - 1) for n, s in seconds.items())])
-    return f"{100 * most:.0f}%"
+    return f"{math.ceil(100 * most)}%"
 
 
 @block
