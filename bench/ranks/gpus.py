@@ -19,6 +19,9 @@ import tempfile
 
 from measure import formatted
 
+sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
+from programs import gpu_and_driver  # noqa: E402, bench/programs.py
+
 SIZE, WAVE, SHORT = "1920x1080", 8, 192
 SAMPLES = ["--split", "samples", "--samples-a-wave", str(WAVE)]
 TILES = ["--split", "tiles"]
@@ -26,7 +29,7 @@ TILES = ["--split", "tiles"]
 
 def numbers_of_gpus():
     """1, 2, 4, ... up to what there is."""
-    found = subprocess.run(["nvidia-smi", "-L"], check=True, stdout=subprocess.PIPE, text=True).stdout.count("GPU ")
+    found = len(gpu_and_driver().splitlines())
     return [n for n in (1, 2, 4, 8, 16) if n <= found]
 
 
@@ -77,7 +80,20 @@ def require_equal(renderer, scene, numbers):
 
 def main(program, results, runs, *scenes):
     numbers = numbers_of_gpus()
-    wanted = [(scene, int(spp)) for scene, spp in (argument.rsplit("=", 1) for argument in scenes)]
+    if not numbers:
+        sys.exit("gpus.py: nvidia-smi finds no GPU here")
+    if not os.access(program, os.X_OK):
+        sys.exit(f"gpus.py: {program} is no program; build it by the preset cuda")
+    wanted = []
+    for argument in scenes:
+        scene, _, spp = argument.rpartition("=")
+        if not scene or not spp.isdecimal() or int(spp) < 2:
+            sys.exit(f"gpus.py: {argument} is not SCENE=SAMPLES")
+        if scene.endswith((".glb", ".gltf")) and not os.path.exists(scene):
+            sys.exit(f"gpus.py: there is no {scene}")
+        wanted.append((scene, int(spp)))
+    if not os.path.exists(results):
+        sys.exit(f"gpus.py: there is no {results}, of which it replaces a part")
     found = {"size": SIZE, "samples_a_wave": WAVE, "numbers": numbers, "scenes": {}, "short": {}, "stages": {}, "equal": {}}
     with tempfile.TemporaryDirectory() as folder:
         renderer = Renderer(program, folder)
