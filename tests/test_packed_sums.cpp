@@ -320,7 +320,7 @@ TEST_CASE("Several queues and arrays take five reductions, and have the sums of 
 
 TEST_CASE("Counters count once where an exchange is made again", "[packed_sums]") {
   constexpr std::uint32_t ranks = 2;
-  for (const std::size_t failing : {0, 1, 2, 4}) {
+  for (const std::size_t failing : {0u, 1u, 2u, 4u}) {
     CAPTURE(failing);
     std::vector<std::uint32_t> found(ranks);
     const std::vector<std::string> errors = run_ranks<one_policy>(
