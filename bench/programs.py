@@ -38,7 +38,8 @@ def gpu_and_driver():
 def write_results(out, results, part=""):
     """With the command that made them, or a `part` of them, and the GPU if there is one."""
     gpu = gpu_and_driver()
-    head = {f"{part}_command" if part else "command": " ".join(sys.argv), **({"gpu_and_driver": gpu} if gpu else {})}
+    command = " ".join([os.path.basename(sys.argv[0]), *sys.argv[1:]])
+    head = {f"{part}_command" if part else "command": command, **({"gpu_and_driver": gpu} if gpu else {})}
     with open(out, "w") as file:
         json.dump({**results, **head}, file, indent=1)
         file.write("\n")
