@@ -29,12 +29,17 @@ class rank_error : public std::runtime_error {
 /// One array that ranks reduce in place, for communicator::all_reduce().
 /// The array must stay where it is until the call returns. Copyable.
 struct reduction {
-  /// What becomes of the values: their sum or the largest, of 32 or 64 bits.
+  /// The sum of values or the largest of them, of 32 or 64 bits.
   enum class kind : std::uint32_t { sum32, sum64, max32, max64 };
 
-  kind what = kind::sum32;  ///< what becomes of the values
+  kind what = kind::sum32;  ///< what they become
   void* values = nullptr;   ///< the first of them, in the memory of the communicator's policy
   std::size_t count = 0;    ///< number of values, not bytes; may be 0
+
+  /// Returns whether values are summed. Of others the largest is taken.
+  bool is_sum() const { return what == kind::sum32 || what == kind::sum64; }
+  /// Returns whether values have 32 bits. Others have 64.
+  bool is_short() const { return what == kind::sum32 || what == kind::max32; }
 
   /// Returns the sum of 32-bit values, modulo 2^32.
   static reduction sum(array_view<std::uint32_t> v) { return {kind::sum32, v.data(), v.size()}; }

@@ -179,9 +179,8 @@ class mpi_communicator final : public communicator {
   /// Reduces values in the policy's memory. Ranks agree that they do.
   /// `doing`: the function that was called, for messages.
   void reduce_one(const reduction& one, const char* doing) {
-    const bool is_sum = one.what == reduction::kind::sum32 || one.what == reduction::kind::sum64;
-    const MPI_Op operation = is_sum ? MPI_SUM : MPI_MAX;
-    if (one.what == reduction::kind::sum32 || one.what == reduction::kind::max32)
+    const MPI_Op operation = one.is_sum() ? MPI_SUM : MPI_MAX;
+    if (one.is_short())
       reduce_in_pieces(static_cast<std::uint32_t*>(one.values), one.count, MPI_UINT32_T, operation, doing);
     else
       reduce_in_pieces(static_cast<std::uint64_t*>(one.values), one.count, MPI_UINT64_T, operation, doing);
@@ -213,9 +212,9 @@ class mpi_communicator final : public communicator {
   void in_pieces(array_view<T> values, const Exchange& exchange) {
     const std::size_t most =
         options_.piece_bytes / sizeof(std::uint64_t) * (sizeof(std::uint64_t) / sizeof(T));
+    void* const piece = piece_.fit(options_.piece_bytes);
     for (std::size_t first = 0; first < values.size(); first += most) {
       const std::size_t count = std::min(most, values.size() - first);
-      void* const piece = piece_.fit(options_.piece_bytes);
       exec_.copy_to_host(piece, values.data() + first, count * sizeof(T));
       exchange(piece, static_cast<int>(count));
       exec_.copy_from_host(values.data() + first, piece, count * sizeof(T));

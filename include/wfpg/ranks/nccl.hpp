@@ -254,11 +254,8 @@ class nccl_communicator final : public communicator {
   }
   /// Puts the collective of one array on the stream, and returns NCCL's result.
   ncclResult_t begin_one(const reduction& one) {
-    using kind = reduction::kind;
-    const bool is_sum = one.what == kind::sum32 || one.what == kind::sum64;
-    const bool is_short = one.what == kind::sum32 || one.what == kind::max32;
-    return ncclAllReduce(one.values, one.values, one.count, is_short ? ncclUint32 : ncclUint64,
-                         is_sum ? ncclSum : ncclMax, ranks_, exec_.stream());
+    return ncclAllReduce(one.values, one.values, one.count, one.is_short() ? ncclUint32 : ncclUint64,
+                         one.is_sum() ? ncclSum : ncclMax, ranks_, exec_.stream());
   }
 
   /// Waits for all ranks, and exchanges no values.

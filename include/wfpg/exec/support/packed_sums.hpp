@@ -236,12 +236,12 @@ class packed_sums {
 
     // Counts decide what is sent of each key.
     arrays.clear();
-    for (sums_to_pack<Exec>& one : all) arrays.push_back(one.memory->pack_counts(exec, one));
+    for (sums_to_pack<Exec>& one : all) arrays.push_back(one.memory->pack_counts(exec, one.view));
     ranks.all_reduce({arrays.data(), arrays.size()});
 
     // Where both are known, sums and floats are sent, and then unpacked.
     arrays.clear();
-    for (sums_to_pack<Exec>& one : all) arrays.push_back(one.memory->pack_sums(exec, one));
+    for (sums_to_pack<Exec>& one : all) arrays.push_back(one.memory->pack_sums(exec, one.view));
     ranks.all_reduce({arrays.data(), arrays.size()});
     for (sums_to_pack<Exec>& one : all) one.memory->template run<packed_step::take_sums>(exec, one.view);
   }
@@ -258,23 +258,26 @@ class packed_sums {
     run<packed_step::count>(exec, one.view);
     return reduction::sum(totals_.view());
   }
-  // The second: counts of keys, as wide as totals say.
-  // Steps before it are done on all ranks.
-  reduction pack_counts(const Exec& exec, sums_to_pack<Exec>& one) {
-    run<packed_step::measure_counts>(exec, one.view);
-    const array_view<std::uint64_t> counts = fit(exec, counts_, count_ends_);
-    one.view.counts.words = counts.data();
-    run<packed_step::put_counts>(exec, one.view);
-    return reduction::sum(counts);
+  // The second step and the third. Those before are done on all ranks.
+  // Waits for the host, which allocates `words`; `to` then has them.
+  template <packed_step measure, packed_step put>
+  reduction pack(const Exec& exec, const packed_sums_view& view, buffer<std::uint64_t, Exec>& words,
+                 buffer<std::uint64_t, Exec>& ends, packed_words& to) {
+    run<measure>(exec, view);
+    const array_view<std::uint64_t> made = fit(exec, words, ends);
+    to.words = made.data();
+    run<put>(exec, view);
+    return reduction::sum(made);
   }
-  // The third: sums and floats of keys, which counts tell apart.
-  // Waits for their number, as the second does.
-  reduction pack_sums(const Exec& exec, sums_to_pack<Exec>& one) {
-    run<packed_step::measure_sums>(exec, one.view);
-    const array_view<std::uint64_t> sums = fit(exec, sums_, sum_ends_);
-    one.view.sums.words = sums.data();
-    run<packed_step::put_sums>(exec, one.view);
-    return reduction::sum(sums);
+  // Counts of keys, as wide as totals say.
+  // What is sent of a key follows from them.
+  reduction pack_counts(const Exec& exec, packed_sums_view& view) {
+    return pack<packed_step::measure_counts, packed_step::put_counts>(exec, view, counts_, count_ends_,
+                                                                      view.counts);
+  }
+  // Sums and floats of keys, which counts tell apart.
+  reduction pack_sums(const Exec& exec, packed_sums_view& view) {
+    return pack<packed_step::measure_sums, packed_step::put_sums>(exec, view, sums_, sum_ends_, view.sums);
   }
   // Runs a step for all blocks.
   // Steps before it are done, and those of other ranks as far as reductions say.
