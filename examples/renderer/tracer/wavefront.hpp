@@ -154,33 +154,48 @@ class path_tracer {
     using stages = path_stages<Caster, Queries>;
     const path_queue all{{}, true};
     const inline_answers<Caster> answers{caster_};
-    const decltype(stages::trace) trace{at,
-                                        world_,
-                                        answers,
-                                        {},
-                                        all,
-                                        paths_.view(),
-                                        vertices_.view(),
-                                        keys_.view(),
-                                        radiance_.view(),
-                                        film_.segment_counts(),
-                                        film_.light_hit_counts(),
-                                        wfpg::partitioner<Exec>::excluded};
-    const decltype(stages::query) query{at, world_, answers, all, vertices_.view(), queries_.view()};
+    const wfpg::no_path_recorder nobody;
     const decltype(stages::sample) sample{
         {{all, vertices_.view()}, {all, at.random, 0}, queries, directions_.view()}, {}};
-    const decltype(stages::shade) shade{at,
-                                        {},
-                                        all,
-                                        vertices_.view(),
-                                        queries_.view(),
-                                        densities_.view(),
-                                        directions_.view(),
-                                        paths_.view(),
-                                        radiance_.view(),
-                                        world_.guide,
-                                        settings_.roulette_depth};
-    exec_.for_each_run(count_, follow_paths<Caster, Queries>{{trace, query, sample, shade}});
+    const stages kernels{tracing(at, all, answers, nobody), querying(at, all, answers), sample,
+                         shading(at, all, nobody)};
+    exec_.for_each_run(count_, follow_paths<Caster, Queries>{kernels});
+  }
+
+  // Kernels of one depth, for waves and for whole paths.
+  template <class Answers, class Recorder>
+  trace_paths<Answers, Recorder> tracing(const wave_position& at, const path_queue& queue,
+                                         const Answers& answers, const Recorder& recorder) {
+    return {at,
+            world_,
+            answers,
+            recorder,
+            queue,
+            paths_.view(),
+            vertices_.view(),
+            keys_.view(),
+            radiance_.view(),
+            film_.segment_counts(),
+            film_.light_hit_counts(),
+            wfpg::partitioner<Exec>::excluded};
+  }
+  template <class Answers>
+  query_lights<Answers> querying(const wave_position& at, const path_queue& queue, const Answers& answers) {
+    return {at, world_, answers, queue, vertices_.view(), queries_.view()};
+  }
+  template <class Recorder>
+  shade_paths<Recorder> shading(const wave_position& at, const path_queue& queue, const Recorder& recorder) {
+    return {at,
+            recorder,
+            queue,
+            vertices_.view(),
+            queries_.view(),
+            densities_.view(),
+            directions_.view(),
+            paths_.view(),
+            radiance_.view(),
+            world_.guide,
+            settings_.roulette_depth};
   }
 
   template <class Guider>
@@ -210,11 +225,7 @@ class path_tracer {
 
   template <class Guider, class Answers>
   void trace_with(Guider& guider, const wave_position& at, const path_queue& queue, const Answers& answers) {
-    auto recorder = guider.recorder();
-    exec_.for_each(count_, trace_paths<Answers, decltype(recorder)>{
-                               at, world_, answers, recorder, queue, paths_.view(), vertices_.view(),
-                               keys_.view(), radiance_.view(), film_.segment_counts(),
-                               film_.light_hit_counts(), wfpg::partitioner<Exec>::excluded});
+    exec_.for_each(count_, tracing(at, queue, answers, guider.recorder()));
   }
 
   path_queue sort_by_material() {
@@ -238,8 +249,7 @@ class path_tracer {
 
   template <class Answers>
   void query_with(const wave_position& at, const path_queue& queue, const Answers& answers) {
-    exec_.for_each(count_,
-                   query_lights<Answers>{at, world_, answers, queue, vertices_.view(), queries_.view()});
+    exec_.for_each(count_, querying(at, queue, answers));
   }
 
   template <class Guider>
@@ -258,13 +268,7 @@ class path_tracer {
 
   template <class Guider>
   void shade(Guider& guider, const wave_position& at, const path_queue& queue) {
-    clock_.measure("shade", [&] {
-      auto recorder = guider.recorder();
-      exec_.for_each(
-          count_, shade_paths<decltype(recorder)>{at, recorder, queue, vertices_.view(), queries_.view(),
-                                                  densities_.view(), directions_.view(), paths_.view(),
-                                                  radiance_.view(), world_.guide, settings_.roulette_depth});
-    });
+    clock_.measure("shade", [&] { exec_.for_each(count_, shading(at, queue, guider.recorder())); });
   }
 
   Exec exec_;
