@@ -134,7 +134,8 @@ def draw_gains(folder: pathlib.Path) -> str:
     by_method = {"wfpg": Look("wfpg", BLUE), "sarsa-hemisphere": Look("SARSA", ORANGE),
                  "monte-carlo-hemisphere": Look("Monte Carlo", GOLD), "records": Look("irradiance records", GREEN)}
     parts += draw_bars(Place(46, 316, 800, 150),
-                       f"Beside other guides: {budget_of(found[0])} on a GPU, without next-event estimation", list(by_method.values()), [last_group(s, by_method) for s in found])
+                       f"Beside other guides: {budget_of(found[0])} on a GPU, without next-event estimation",
+                       list(by_method.values()), [last_group(s, by_method) for s in found])
 
     found = sorted(scenes_of(folder, "quality-records.json"), key=lambda s: short(s) != "cornell-wall")
     by_method = {"wfpg": Look("wfpg", BLUE), "sarsa": Look("SARSA", ORANGE), "records": Look("irradiance records", GREEN)}

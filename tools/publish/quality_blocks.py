@@ -4,7 +4,7 @@ from typing import Any, Dict, List
 
 from blocks import Results, Rows, block, span, three
 
-from quality_plots import Errors, equal_time, gain, short  # bench/quality_plots.py
+from quality_plots import Errors, budget_of, equal_time, gain, short  # bench/quality_plots.py
 from table import errors_at  # bench/table.py
 
 
@@ -20,7 +20,7 @@ def triple(errors: Errors, method: str) -> str:
 
 def last_errors(scene: Dict[str, Any]) -> Errors:
     """A scene's errors at the last budget."""
-    return errors_at(scene, scene["summary"][-1]["budget"])
+    return errors_at(scene, budget_of(scene))
 
 
 def summary(scene: Dict[str, Any], method: str) -> Dict[str, Any]:

@@ -105,10 +105,10 @@ def ranks_beyond(results: Results, what: str) -> str:
     return f"{model.seconds(1, NETWORK, samples) / model.seconds(1024, NETWORK, samples):.0f} times"
 
 
-def renderings(results: Results, kind: str) -> List[Tuple[str, int, Dict[str, float]]]:
-    """Scene, samples and mean seconds by number of GPUs, of the long or the `short` renderings."""
+def renderings(results: Results, *keys: str) -> List[Tuple[str, int, Dict[str, float]]]:
+    """Scene, samples and mean seconds by number of GPUs, of the long renderings or the short ones, which `keys` lead to."""
     return [(scene, found["spp"], {n: sum(s) / len(s) for n, s in found["samples"].items()})
-            for scene, found in results.json(FILE, "gpus", kind).items()]
+            for scene, found in results.json(FILE, *keys).items()]
 
 
 def faster(seconds: Dict[str, float]) -> str:
@@ -122,7 +122,7 @@ def ranks_gpus(results: Results) -> Rows:
     numbers = [str(n) for n in results.json(FILE, "gpus", "numbers")]
     rows = [["scene", "samples", *(f"{n} GPU" if n == "1" else n for n in numbers), "times as fast as 1, and model"]]
     for kind in ("scenes", "short"):
-        for scene, spp, seconds in renderings(results, kind):
+        for scene, spp, seconds in renderings(results, "gpus", kind):
             divided, alone = fit({int(n): s for n, s in seconds.items()})
             model = f"; {divided:.1f} / n + {alone:.2f}" if kind == "scenes" else ""
             rows.append([scene, str(spp), *(three(seconds[n]) for n in numbers), faster(seconds) + model])
@@ -134,9 +134,8 @@ def ranks_eight(results: Results) -> Rows:
     """Seconds by eight GPUs, which were measured before."""
     rows = [["scene", "samples", "1 GPU", "8", "times as fast"]]
     for kind in ("scenes", "short"):
-        for scene, found in results.json(FILE, kind).items():
-            seconds = {n: sum(found["samples"][n]) / len(found["samples"][n]) for n in ("1", "8")}
-            rows.append([scene, str(found["spp"]), *map(three, seconds.values()), faster(seconds)])
+        for scene, spp, seconds in renderings(results, kind):
+            rows.append([scene, str(spp), *map(three, seconds.values()), faster(seconds)])
     return rows
 
 
@@ -144,7 +143,7 @@ def ranks_eight(results: Results) -> Rows:
 def ranks_gpu_model(results: Results) -> str:
     """The largest difference of the model from what was measured."""
     most = 0.0
-    for _, _, seconds in renderings(results, "scenes"):
+    for _, _, seconds in renderings(results, "gpus", "scenes"):
         divided, alone = fit({int(n): s for n, s in seconds.items()})
         most = max([most, *(abs((divided / int(n) + alone) / s - 1) for n, s in seconds.items())])
     return f"{math.ceil(100 * most)}%"
