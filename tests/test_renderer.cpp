@@ -182,6 +182,61 @@ TEST_CASE("a batch caster gives the pictures of an inline one", "[renderer]") {
   }
 }
 
+/// A guider that does not say which paths its guide takes part in, so that all of them are in its waves.
+template <class Guider>
+class silent_guider {
+ public:
+  explicit silent_guider(Guider guider) : guider_(std::move(guider)) {}
+
+  void begin_sample() { guider_.begin_sample(); }
+  void end_sample() { guider_.end_sample(); }
+  auto recorder() const { return guider_.recorder(); }
+  auto lights() const { return guider_.lights(); }
+  float sample_weight() const { return guider_.sample_weight(); }
+
+  template <class Wave, class Caster, class... Queries>
+  void sample_directions(const Wave& wave, const Caster& caster,
+                         wfpg::array_view<wfpg::sampled_direction> directions, const Queries&... queries) {
+    guider_.sample_directions(wave, caster, directions, queries...);
+  }
+
+ private:
+  Guider guider_;
+};
+
+TEST_CASE("while a guide probes, paths that it takes no part in have the bits of their waves", "[renderer]") {
+  using exec_policy = wfpg::exec::tbb;
+  using guider = wfpg::path_guider<exec_policy, wfpg::kept_guide<exec_policy>>;
+  const scene scene = make_builtin_scene("cornell-box");
+  const device_scene<exec_policy> geometry(exec_policy(), scene);
+  wfpg::kept_guide_options options;
+  options.octree_resolution = 32;
+  options.kept.resolution = 16;
+  options.max_paths = 96 * 96;
+  options.max_depth = 5;
+  options.least_gain = 1e6f;
+  const auto make = [&] {
+    return guider(exec_policy(), {geometry.view().positions, geometry.view().triangles}, options);
+  };
+  // Samples 1 and 2 are not guided, and in 3 and 4 the guide probes.
+  const setup with{96, 5, true, 5, 4};
+  guider probes = make();
+  const traced split = trace_all<exec_policy, embree_caster, guider&>(scene, with, probes);
+  const traced waves = trace_all<exec_policy, embree_caster>(scene, with, silent_guider<guider>(make()));
+  REQUIRE(probes.probing());
+  CHECK(probes.statistics().gain.paths > 2048);
+  CHECK(split.has_whole_paths);
+  CHECK(!waves.has_whole_paths);
+  std::size_t equal = 0;
+  for (std::size_t i = 0; i < split.picture.size(); ++i)
+    equal += split.picture[i] == waves.picture[i] ? 1u : 0u;
+  const std::size_t guided = probes.guided_paths().size(options.max_paths);
+  CHECK(guided > 0);
+  CHECK(guided <= options.max_paths / 2);
+  CHECK(equal >= options.max_paths - guided);
+  CHECK(mean_of(split.picture) == Approx(mean_of(waves.picture)).epsilon(0.01));
+}
+
 TEST_CASE("samples in which a guide rests have the bits of their waves", "[renderer]") {
   using exec_policy = wfpg::exec::tbb;
   using guider = wfpg::path_guider<exec_policy, wfpg::kept_guide<exec_policy>>;

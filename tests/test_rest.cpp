@@ -571,7 +571,9 @@ WFPG_TEST_CASE("rest: until it is known whether guiding pays, few paths are reco
   std::size_t among = 0;
   for (std::uint32_t path = 0; path < n; ++path) {
     std::uint32_t place;
-    among += host.guider.recorder().has_place(path, place) ? 1 : 0;
+    const bool is_recorded = host.guider.recorder().has_place(path, place);
+    among += is_recorded ? 1 : 0;
+    CHECK(host.guider.guided_paths().includes(path) == is_recorded);
   }
   host.guided_rays(n, true);  // of two fields that are asked for at once, one may have to wait
   CHECK(host.guided_rays(n, true) == among);
@@ -585,6 +587,7 @@ WFPG_TEST_CASE("rest: until it is known whether guiding pays, few paths are reco
   host.take(16, 16, gains_more);
   host.guider.begin_sample();
   CHECK(!host.guider.probing());
+  CHECK(host.guider.guided_paths() == wfpg::recorded_runs{});
   CHECK(host.guided_rays(n, true) == n);
   CHECK(host.guider.recorder().recorded() == host.paths);
 }

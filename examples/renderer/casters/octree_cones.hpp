@@ -44,6 +44,7 @@ class octree_cone_guider {
   void begin_sample() { guider_.begin_sample(); }
   void end_sample() { guider_.end_sample(); }
   bool resting() const { return guider_.resting(); }
+  wfpg::recorded_runs guided_paths() const { return guider_.guided_paths(); }
   auto recorder() const { return guider_.recorder(); }
   auto lights() const { return guider_.lights(); }
   float sample_weight() const { return guider_.sample_weight(); }

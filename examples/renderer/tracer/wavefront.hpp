@@ -5,6 +5,7 @@
 #include "tracer/path_film.hpp"
 #include "tracer/path_kernels.hpp"
 #include "tracer/stage_clock.hpp"
+#include "tracer/staged_paths.hpp"
 #include "tracer/technique_set.hpp"
 #include "tracer/unguided.hpp"
 #include "tracer/wave_share.hpp"
@@ -14,10 +15,12 @@
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/cpu_policy.hpp>
 #include <wfpg/host/ray_caster.hpp>
+#include <wfpg/host/recorded_runs.hpp>
 #include <wfpg/host/wave.hpp>
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <type_traits>
 #include <utility>
 
@@ -83,6 +86,7 @@ class path_tracer {
         radiance_(exec, count_),
         film_(exec, share_, settings.ranks),
         partitioner_(exec, count_),
+        all_(count_),
         rays_(exec, is_inline ? 0 : count_),
         hits_(exec, is_inline ? 0 : count_),
         hidden_(exec, is_inline || !world.next_event ? 0 : count_),
@@ -103,10 +107,7 @@ class path_tracer {
     clock_.measure("update", [&] { guider.begin_sample(); });
     if (settings_.weighs_by_gain) weight *= guider.sample_weight();
     world_.guide = guider.lights();
-    if (follows_whole_paths(guider))
-      clock_.measure("paths", [&] { follow_whole_paths(at); });
-    else
-      follow_by_stages(guider, at);
+    follow(guider, at);
     clock_.measure("update", [&] { guider.end_sample(); });
     clock_.measure("film", [&] { film_.add(radiance_.view(), weight, samples); });
     wfpg::read_element(exec_, radiance_.data());  // waits, so that a look at the time sees the whole sample
@@ -124,33 +125,59 @@ class path_tracer {
 
  private:
   static constexpr bool is_inline = wfpg::is_inline_caster_v<Caster>;
-  static constexpr bool may_follow =
-      is_inline && std::is_base_of_v<wfpg::exec::cpu_policy<Exec, Exec::warp_width>, Exec>;
+  static constexpr bool is_cpu = std::is_base_of_v<wfpg::exec::cpu_policy<Exec, Exec::warp_width>, Exec>;
+  static constexpr bool may_follow = is_cpu && is_inline;
 
-  // On a CPU, paths of a sample without a guide, or whose guide rests, need not wait for each other.
+  struct listed_part {
+    wfpg::recorded_runs part;
+    staged_paths<Exec> paths;
+  };
+
+  // On a CPU, paths that no guide takes part in need not wait for each other, nor for those that one does.
   template <class Guider>
-  static bool follows_whole_paths(const Guider& guider) {
-    if constexpr (!may_follow)
-      return false;
-    else if constexpr (std::is_same_v<Guider, unguided<Exec>>)
-      return true;
-    else if constexpr (can_rest_v<Guider>)
-      return guider.resting();
-    else
-      return false;
+  void follow(Guider& guider, const wave_position& at) {
+    if constexpr (std::is_same_v<Guider, unguided<Exec>>) {
+      follow_unguided(guider, at, {});
+    } else if constexpr (is_cpu && can_rest_v<Guider>) {
+      unguided<Exec> others(exec_);
+      if (guider.resting()) return follow_unguided(others, at, {});
+      const wfpg::recorded_runs guided = guider.guided_paths();
+      if (guided.log2_divisor() > 0) {
+        follow_unguided(others, at, guided);
+        return follow_by_stages(guider, at, part(guided_, guided, true));
+      }
+      follow_by_stages(guider, at, all_);
+    } else {
+      follow_by_stages(guider, at, all_);
+    }
   }
 
-  void follow_whole_paths(const wave_position& at) {
+  // Follows all paths but a part of few, none of which means all.
+  void follow_unguided(unguided<Exec>& guider, const wave_position& at, const wfpg::recorded_runs& but) {
+    if constexpr (may_follow)
+      clock_.measure("paths", [&] { follow_whole_paths(at, but); });
+    else
+      follow_by_stages(guider, at, but.log2_divisor() > 0 ? part(others_, but, false) : all_);
+  }
+
+  // Returns a part's list, made anew where the part is another one.
+  staged_paths<Exec>& part(std::optional<listed_part>& kept, const wfpg::recorded_runs& part, bool inside) {
+    if (!kept || !(kept->part == part)) kept = listed_part{part, {exec_, count_, part, inside}};
+    return kept->paths;
+  }
+
+  void follow_whole_paths(const wave_position& at, const wfpg::recorded_runs& but) {
     if constexpr (may_follow) {
       if (world_.next_event)
-        follow_with(at, wfpg::density_queries{queued_light_directions{queries_.view()}, densities_.view()});
+        follow_with(at, but,
+                    wfpg::density_queries{queued_light_directions{queries_.view()}, densities_.view()});
       else
-        follow_with(at, wfpg::no_queries());
+        follow_with(at, but, wfpg::no_queries());
     }
   }
 
   template <class Queries>
-  void follow_with(const wave_position& at, const Queries& queries) {
+  void follow_with(const wave_position& at, const wfpg::recorded_runs& but, const Queries& queries) {
     using stages = path_stages<Caster, Queries>;
     const path_queue all{{}, true};
     const inline_answers<Caster> answers{caster_};
@@ -159,7 +186,7 @@ class path_tracer {
         {{all, vertices_.view()}, {all, at.random, 0}, queries, directions_.view()}, {}};
     const stages kernels{tracing(at, all, answers, nobody), querying(at, all, answers), sample,
                          shading(at, all, nobody)};
-    exec_.for_each_run(count_, follow_paths<Caster, Queries>{kernels});
+    exec_.for_each_run(count_, follow_paths<Caster, Queries>{kernels, but.log2_divisor() == 0, but});
   }
 
   // Kernels of one depth, for waves and for whole paths.
@@ -198,65 +225,69 @@ class path_tracer {
             settings_.roulette_depth};
   }
 
+  // Each stage is done for all of the staged paths before the next one begins.
   template <class Guider>
-  void follow_by_stages(Guider& guider, wave_position at) {
-    for (path_queue queue{{}, true}; at.depth < at.max_depth; ++at.depth) {
-      trace(guider, at, queue);
-      if (at.is_last()) break;
-      queue = sort_by_material();
-      if (world_.next_event) query(at, queue);
-      sample_directions(guider, at, queue);
-      shade(guider, at, queue);
+  void follow_by_stages(Guider& guider, wave_position at, staged_paths<Exec>& staged) {
+    for (wave_slots now{at, staged.first(), staged.size()}; now.at.depth < at.max_depth; ++now.at.depth) {
+      trace(guider, now);
+      if (now.at.is_last()) break;
+      clock_.measure("sort", [&] { now.queue = staged.by_material(exec_, partitioner_, keys_.view()); });
+      if (world_.next_event) query(now);
+      sample_directions(guider, now);
+      shade(guider, now);
     }
   }
 
+  // Slots of the staged paths, at one depth.
+  struct wave_slots {
+    wave_position at;
+    path_queue queue;
+    std::size_t count;
+  };
+
   template <class Guider>
-  void trace(Guider& guider, const wave_position& at, const path_queue& queue) {
+  void trace(Guider& guider, const wave_slots& now) {
     clock_.measure("trace", [&] {
       if constexpr (is_inline) {
-        trace_with(guider, at, queue, inline_answers<Caster>{caster_});
+        trace_with(guider, now, inline_answers<Caster>{caster_});
       } else {
-        exec_.for_each(count_, write_rays{queue, paths_.view(), rays_.view()});
-        caster_.intersect(exec_, wfpg::array_view<const wfpg::ray>(rays_.view()), hits_.view());
-        trace_with(guider, at, queue, batch_hits{hits_.view()});
+        exec_.for_each(now.count, write_rays{now.queue, paths_.view(), rays_.view()});
+        caster_.intersect(exec_, wfpg::array_view<const wfpg::ray>(rays_.data(), now.count),
+                          wfpg::array_view<triangle_hit>(hits_.data(), now.count));
+        trace_with(guider, now, batch_hits{hits_.view()});
       }
     });
   }
 
   template <class Guider, class Answers>
-  void trace_with(Guider& guider, const wave_position& at, const path_queue& queue, const Answers& answers) {
-    exec_.for_each(count_, tracing(at, queue, answers, guider.recorder()));
+  void trace_with(Guider& guider, const wave_slots& now, const Answers& answers) {
+    exec_.for_each(now.count, tracing(now.at, now.queue, answers, guider.recorder()));
   }
 
-  path_queue sort_by_material() {
-    path_queue queue;
-    clock_.measure(
-        "sort", [&] { queue.by_material = partitioner_.partition(exec_, keys_.view(), material_key_bits); });
-    return queue;
-  }
-
-  void query(const wave_position& at, const path_queue& queue) {
+  void query(const wave_slots& now) {
     clock_.measure("lights", [&] {
       if constexpr (is_inline) {
-        query_with(at, queue, inline_answers<Caster>{caster_});
+        query_with(now, inline_answers<Caster>{caster_});
       } else {
-        query_with(at, queue, batch_questions{rays_.view()});
-        caster_.occluded(exec_, wfpg::array_view<const wfpg::ray>(rays_.view()), hidden_.view());
-        exec_.for_each(count_, drop_hidden{hidden_.view(), queries_.view()});
+        query_with(now, batch_questions{rays_.view()});
+        caster_.occluded(exec_, wfpg::array_view<const wfpg::ray>(rays_.data(), now.count),
+                         wfpg::array_view<std::uint32_t>(hidden_.data(), now.count));
+        exec_.for_each(now.count, drop_hidden{hidden_.view(), queries_.view()});
       }
     });
   }
 
   template <class Answers>
-  void query_with(const wave_position& at, const path_queue& queue, const Answers& answers) {
-    exec_.for_each(count_, querying(at, queue, answers));
+  void query_with(const wave_slots& now, const Answers& answers) {
+    exec_.for_each(now.count, querying(now.at, now.queue, answers));
   }
 
   template <class Guider>
-  void sample_directions(Guider& guider, const wave_position& at, const path_queue& queue) {
+  void sample_directions(Guider& guider, const wave_slots& now) {
     clock_.measure("directions", [&] {
-      const wfpg::wave wave{at.depth, count_, queued_surfaces{queue, vertices_.view()},
-                            queued_random{queue, at.random, at.first_dimension() + dimension::direction}};
+      const wfpg::wave wave{
+          now.at.depth, now.count, queued_surfaces{now.queue, vertices_.view()},
+          queued_random{now.queue, now.at.random, now.at.first_dimension() + dimension::direction}};
       if (world_.next_event)
         guider.sample_directions(
             wave, caster_, directions_.view(),
@@ -267,8 +298,9 @@ class path_tracer {
   }
 
   template <class Guider>
-  void shade(Guider& guider, const wave_position& at, const path_queue& queue) {
-    clock_.measure("shade", [&] { exec_.for_each(count_, shading(at, queue, guider.recorder())); });
+  void shade(Guider& guider, const wave_slots& now) {
+    clock_.measure("shade",
+                   [&] { exec_.for_each(now.count, shading(now.at, now.queue, guider.recorder())); });
   }
 
   Exec exec_;
@@ -286,6 +318,9 @@ class path_tracer {
   wfpg::buffer<vec3, Exec> radiance_;
   path_film<Exec> film_;
   wfpg::partitioner<Exec> partitioner_;
+  staged_paths<Exec> all_;
+  std::optional<listed_part> guided_;   // while a guide probes
+  std::optional<listed_part> others_;   // for a batch caster
   wfpg::buffer<wfpg::ray, Exec> rays_;  // for a batch caster
   wfpg::buffer<triangle_hit, Exec> hits_;
   wfpg::buffer<std::uint32_t, Exec> hidden_;

@@ -6,6 +6,7 @@
 #include "tracer/path_kernels.hpp"
 
 #include <wfpg/guide/sample_rays.hpp>
+#include <wfpg/host/recorded_runs.hpp>
 
 #include <cstddef>
 #include <type_traits>
@@ -44,6 +45,8 @@ struct path_stages {
 template <class Caster, class Queries>
 struct follow_paths {
   path_stages<Caster, Queries> stages;
+  bool all = true;                    ///< follows all paths
+  wfpg::recorded_runs left_out = {};  ///< otherwise none of these
 
   template <class Run>
   [[gnu::flatten]] void operator()(const Run& run) const {
@@ -52,7 +55,9 @@ struct follow_paths {
     // Said again, so that the compiler leaves out look-ups in queues.
     s.trace.queue.all = s.query.queue.all = s.shade.queue.all = true;
     s.sample.sampler.surfaces.queue.all = s.sample.sampler.random.queue.all = true;
-    run.for_each([&](std::size_t path, int) { s.follow(path, at); });
+    run.for_each([&](std::size_t path, int) {
+      if (all || !left_out.includes(static_cast<std::uint32_t>(path))) s.follow(path, at);
+    });
   }
 };
 

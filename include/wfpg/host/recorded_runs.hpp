@@ -31,6 +31,11 @@ struct recorded_runs {
   std::uint32_t rarer = 0;  ///< log2 of the paths of the runs of which one takes part
   std::uint32_t first = 0;  ///< index of path 0 among the paths of all ranks
 
+  /// Whether both choose the same paths of every sample. Parts of unequal members may choose the same ones,
+  /// but seldom do.
+  WFPG_HD bool operator==(const recorded_runs& other) const {
+    return shift == other.shift && seed == other.seed && rarer == other.rarer && first == other.first;
+  }
   /// Returns log2 of the number of paths of which one takes part.
   /// All take part where it is 0.
   WFPG_HD std::uint32_t log2_divisor() const { return shift + rarer; }
