@@ -86,6 +86,10 @@ TEST_CASE("room: designs are densities, and better ones have less variance", "[r
   for (const char* const design : {"blocks", "quadtree", "caps"})
     for (const bool roots : {false, true}) CHECK(variance(design, roots) < 0.9 * grid);
   CHECK(variance("grid", true) < 0.6 * grid);
+  // A grid for all places of a bin is worse than one for each place.
+  const place_parts shared("shared", set, a.light, places);
+  CHECK(mean_and_median(measure_design("grid", true, set, shared, a.light, places).at_places.alone).mean >
+        1.1 * variance("grid", true));
   // The densities of all designs integrate to 1.
   const auto integral = [](const auto& density) {
     constexpr int side = 512;

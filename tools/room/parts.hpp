@@ -1,8 +1,9 @@
-// The light of places in parts, of which distributions are made. It comes from one of three sources: the
-// exact light, paths that fields learnt from, or the exitance cache that the same paths filled. This
-// tells a distribution's own error from what it could know.
+// The light of places in parts, of which distributions are made. It comes from one of four sources: the
+// exact light, its mean over a part of the wall that shares a field, paths that fields learnt from, or the
+// exitance cache that the same paths filled. This tells a distribution's own error from what it could know.
 //
-// Memory: 28 bytes a part; 57,600 parts a place for exact light, and all paths for recorded light.
+// Memory: 28 bytes a part; 57,600 parts for exact light, 16 times as many for shared light, of one place at a
+// time; all paths for recorded light.
 #pragma once
 
 #include "method.hpp"
@@ -31,7 +32,7 @@ inline light_part part_of(const wfpg::frame& basis, vec3 direction, double irrad
 }
 
 /// Sources of parts, as the program names them.
-inline constexpr std::array<const char*, 3> source_names{"exact", "recorded", "cache"};
+inline constexpr std::array<const char*, 4> source_names{"exact", "shared", "recorded", "cache"};
 
 /// Parts of light for each place of one arrangement.
 class place_parts {
@@ -39,11 +40,8 @@ class place_parts {
   /// `source`: one of source_names.
   place_parts(const std::string& source, const settings& set, const wall_light& light,
               const std::vector<wall_point>& places)
-      : places_(places) {
-    if (source == "exact") {
-      take_exact(light);
-      return;
-    }
+      : places_(places), light_(light), shares_(source == "shared") {
+    if (source == "exact" || source == "shared") return;
     wfpg_method method(light, wfpg_options(set, places.size()));
     if (source == "recorded") bins_.resize(walls * bins_a_side * bins_a_side);
     for (std::uint32_t sample = 0; sample < set.samples; ++sample) {
@@ -53,13 +51,17 @@ class place_parts {
     if (source == "cache") take_cache(method.cache());
   }
 
-  const light_parts& of(std::size_t place) const {
-    return bins_.empty() ? parts_[place] : bins_[bin(places_[place])];
+  light_parts of(std::size_t place) const {
+    if (!bins_.empty()) return bins_[bin(places_[place])];
+    if (!parts_.empty()) return parts_[place];
+    return shares_ ? shared(places_[place]) : exact(places_[place], 1.0);
   }
 
  private:
   // About as many as wfpg has fields in the room.
   static constexpr int bins_a_side = 16;
+  // Origins along the side of a bin, whose light the bin shares.
+  static constexpr int origins_a_side = 4;
 
   static std::size_t bin(const wall_point& p) {
     const vec2 c = coordinates(p) * static_cast<float>(bins_a_side);
@@ -67,14 +69,27 @@ class place_parts {
     const int y = std::min(static_cast<int>(c.y), bins_a_side - 1);
     return static_cast<std::size_t>((p.wall * bins_a_side + y) * bins_a_side + x);
   }
-  void take_exact(const wall_light& light) {
-    for (const wall_point& place : places_) {
-      const wfpg::frame basis(normal_of(place.wall));
-      light_parts& parts = parts_.emplace_back();
-      visit_parts(light, place, [&](const visible_part& p) {
-        parts.push_back(part_of(basis, p.direction, p.irradiance, p.squares));
-      });
+  // The light of a place, times a weight.
+  light_parts exact(const wall_point& place, double weight) const {
+    const wfpg::frame basis(normal_of(place.wall));
+    light_parts parts;
+    visit_parts(light_, place, [&](const visible_part& p) {
+      parts.push_back(part_of(basis, p.direction, weight * p.irradiance, weight * p.squares));
+    });
+    return parts;
+  }
+  // The mean light of a bin, over the places from which a field's cones may start.
+  light_parts shared(const wall_point& place) const {
+    const vec2 corner = glm::floor(coordinates(place) * static_cast<float>(bins_a_side));
+    light_parts parts;
+    for (int i = 0; i < origins_a_side * origins_a_side; ++i) {
+      const vec2 cell(static_cast<float>(i % origins_a_side), static_cast<float>(i / origins_a_side));
+      const vec2 uv = corner + (cell + 0.5f) / static_cast<float>(origins_a_side);
+      const light_parts one = exact(point_on(place.wall, uv / static_cast<float>(bins_a_side)),
+                                    1.0 / (origins_a_side * origins_a_side));
+      parts.insert(parts.end(), one.begin(), one.end());
     }
+    return parts;
   }
   // Estimates both integrals by the paths that begin in a bin.
   void take_paths(const wall_light& light, const std::vector<wfpg::sampled_direction>& drawn,
@@ -115,7 +130,9 @@ class place_parts {
   }
 
   std::vector<wall_point> places_;
-  std::vector<light_parts> parts_;  // a place
+  wall_light light_;
+  bool shares_;
+  std::vector<light_parts> parts_;  // a place, for the cache alone
   std::vector<light_parts> bins_;   // a part of a wall, for recorded light alone
 };
 
