@@ -585,6 +585,8 @@ WFPG_TEST_CASE("rest: until it is known whether guiding pays, few paths are reco
   host.take(10, 15, gains_more);
   CHECK(host.guider.probing());
   host.take(16, 16, gains_more);
+  CHECK(host.guider.probing());  // until the next sample begins
+  CHECK(host.guider.guided_paths().log2_divisor() > 0);
   host.guider.begin_sample();
   CHECK(!host.guider.probing());
   CHECK(host.guider.guided_paths() == wfpg::recorded_runs{});

@@ -186,10 +186,11 @@ class path_guider {
   /// Whether the guide probes in the current sample, since it is not known whether guiding pays. Then few
   /// paths are recorded and guided: those that are compared.
   bool probing() const { return probes_now_; }
-  /// The paths that the guide takes part in, in the current sample: all, or a few while it probes. Others are
-  /// neither recorded nor guided. A renderer may leave them out of its waves, and sample their BSDFs itself.
-  /// Where the guide rests, all may be left out: see resting().
-  recorded_runs guided_paths() const { return guided_paths(samples_); }
+  /// The paths that the guide takes part in, in the current sample: all, or a few while it probes or rests.
+  /// Others are not recorded, nor guided where surfaces tell their paths. A renderer may leave them out of
+  /// its waves, and sample their BSDFs itself. Their lights are chosen and deposited as ever. max_paths
+  /// counts them, too. Where the guide rests, all may be left out: see resting().
+  recorded_runs guided_paths() const { return probes_now_ || rests_now_ ? compared_ : all_paths; }
   /// Weight that the current sample should have in the picture, from 1 to rest_constants::largest_weight.
   /// Guided samples have less variance than others, by the gain of the comparisons before. The best weights
   /// are inverse to the variance. 1 for samples that are not guided, or that probe.

@@ -7,7 +7,6 @@
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/host/recorded_runs.hpp>
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -22,8 +21,8 @@ struct gather_words {
   WFPG_HD void operator()(std::size_t i) const { to[i] = from[index[i]]; }
 };
 
-/// Paths that wait for each other after each stage. A part of the paths is a short list, so that stages and
-/// sorts take no time for the others.
+/// Paths that wait for each other after each stage. A part of the paths is a list, so that stages and sorts
+/// take no time for the others.
 template <class Exec>
 class staged_paths {
  public:

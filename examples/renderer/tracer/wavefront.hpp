@@ -26,13 +26,14 @@
 
 namespace render {
 
-/// Whether a guider says that its guide rests in a sample: then it records nothing, and BSDFs draw all
-/// directions.
+/// Whether a guider says which paths its guide takes part in, and whether it rests in a sample: then it
+/// records nothing, and BSDFs draw all directions.
 template <class Guider, class = void>
 inline constexpr bool can_rest_v = false;
 template <class Guider>
-inline constexpr bool can_rest_v<Guider, std::void_t<decltype(std::declval<const Guider&>().resting())>> =
-    true;
+inline constexpr bool
+    can_rest_v<Guider, std::void_t<decltype(std::declval<const Guider&>().resting()),
+                                   decltype(std::declval<const Guider&>().guided_paths())>> = true;
 
 struct tracer_settings {
   int width = 512;              ///< pixels, positive
@@ -162,7 +163,7 @@ class path_tracer {
 
   // Returns a part's list, made anew where the part is another one.
   staged_paths<Exec>& part(std::optional<listed_part>& kept, const wfpg::recorded_runs& part, bool inside) {
-    if (!kept || !(kept->part == part)) kept = listed_part{part, {exec_, count_, part, inside}};
+    if (!kept || kept->part != part) kept = listed_part{part, {exec_, count_, part, inside}};
     return kept->paths;
   }
 

@@ -31,11 +31,13 @@ struct recorded_runs {
   std::uint32_t rarer = 0;  ///< log2 of the paths of the runs of which one takes part
   std::uint32_t first = 0;  ///< index of path 0 among the paths of all ranks
 
-  /// Whether both choose the same paths of every sample. Parts of unequal members may choose the same ones,
-  /// but seldom do.
+  /// Whether all members are equal. Unequal parts may have the same paths: all of them, where log2_divisor()
+  /// is 0.
   WFPG_HD bool operator==(const recorded_runs& other) const {
     return shift == other.shift && seed == other.seed && rarer == other.rarer && first == other.first;
   }
+  /// Whether some member differs.
+  WFPG_HD bool operator!=(const recorded_runs& other) const { return !(*this == other); }
   /// Returns log2 of the number of paths of which one takes part.
   /// All take part where it is 0.
   WFPG_HD std::uint32_t log2_divisor() const { return shift + rarer; }
