@@ -168,13 +168,11 @@ class path_tracer {
   }
 
   void follow_whole_paths(const wave_position& at, const wfpg::recorded_runs& but) {
-    if constexpr (may_follow) {
-      if (world_.next_event)
-        follow_with(at, but,
-                    wfpg::density_queries{queued_light_directions{queries_.view()}, densities_.view()});
-      else
-        follow_with(at, but, wfpg::no_queries());
-    }
+    if (world_.next_event)
+      follow_with(at, but,
+                  wfpg::density_queries{queued_light_directions{queries_.view()}, densities_.view()});
+    else
+      follow_with(at, but, wfpg::no_queries());
   }
 
   template <class Queries>
