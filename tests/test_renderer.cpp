@@ -194,45 +194,50 @@ TEST_CASE("a batch caster gives the pictures of an inline one", "[renderer]") {
 
 /// A guider that does not say which paths its guide takes part in, so that all of them are in its waves.
 template <class Guider>
-class silent_guider {
+class silent_guider : private Guider {
  public:
-  explicit silent_guider(Guider guider) : guider_(std::move(guider)) {}
+  explicit silent_guider(Guider guider) : Guider(std::move(guider)) {}
 
-  void begin_sample() { guider_.begin_sample(); }
-  void end_sample() { guider_.end_sample(); }
-  auto recorder() const { return guider_.recorder(); }
-  auto lights() const { return guider_.lights(); }
-  float sample_weight() const { return guider_.sample_weight(); }
+  using Guider::begin_sample;
+  using Guider::end_sample;
+  using Guider::lights;
+  using Guider::recorder;
+  using Guider::sample_directions;
+  using Guider::sample_weight;
+};
 
-  template <class Wave, class Caster, class... Queries>
-  void sample_directions(const Wave& wave, const Caster& caster,
-                         wfpg::array_view<wfpg::sampled_direction> directions, const Queries&... queries) {
-    guider_.sample_directions(wave, caster, directions, queries...);
+/// Makes guiders of one scene. They never find that guiding pays.
+struct guiders_that_rest {
+  using exec_policy = wfpg::exec::tbb;
+  using guider = wfpg::path_guider<exec_policy, wfpg::kept_guide<exec_policy>>;
+  static constexpr int side = 96;
+  static constexpr std::uint32_t max_depth = 5;
+
+  scene world = make_builtin_scene("cornell-box");
+  device_scene<exec_policy> geometry{exec_policy(), world};
+
+  static setup of_samples(std::uint32_t samples) { return {side, max_depth, true, 5, samples}; }
+  guider make() const {
+    wfpg::kept_guide_options options;
+    options.octree_resolution = 32;
+    options.kept.resolution = 16;
+    options.max_paths = side * side;
+    options.max_depth = max_depth;
+    options.least_gain = 1e6f;
+    return guider(exec_policy(), {geometry.view().positions, geometry.view().triangles}, options);
   }
-
- private:
-  Guider guider_;
 };
 
 TEST_CASE("while a guide probes, paths that it takes no part in have the bits of their waves", "[renderer]") {
-  using exec_policy = wfpg::exec::tbb;
-  using guider = wfpg::path_guider<exec_policy, wfpg::kept_guide<exec_policy>>;
-  const scene scene = make_builtin_scene("cornell-box");
-  const device_scene<exec_policy> geometry(exec_policy(), scene);
-  wfpg::kept_guide_options options;
-  options.octree_resolution = 32;
-  options.kept.resolution = 16;
-  options.max_paths = 96 * 96;
-  options.max_depth = 5;
-  options.least_gain = 1e6f;
-  const auto make = [&] {
-    return guider(exec_policy(), {geometry.view().positions, geometry.view().triangles}, options);
-  };
+  using exec_policy = guiders_that_rest::exec_policy;
+  using guider = guiders_that_rest::guider;
+  const guiders_that_rest guiders;
   // The guide probes in all four samples. The first two are not guided.
-  const setup with{96, 5, true, 5, 4};
-  guider probes = make();
-  const traced split = trace_all<exec_policy, embree_caster, guider&>(scene, with, probes);
-  const traced waves = trace_all<exec_policy, embree_caster>(scene, with, silent_guider<guider>(make()));
+  const setup with = guiders_that_rest::of_samples(4);
+  guider probes = guiders.make();
+  const traced split = trace_all<exec_policy, embree_caster, guider&>(guiders.world, with, probes);
+  const traced waves =
+      trace_all<exec_policy, embree_caster>(guiders.world, with, silent_guider<guider>(guiders.make()));
   REQUIRE(probes.probing());
   CHECK(probes.statistics().gain.paths > 2048);
   CHECK(split.has_whole_paths);
@@ -241,33 +246,22 @@ TEST_CASE("while a guide probes, paths that it takes no part in have the bits of
   std::size_t equal = 0;
   for (std::size_t i = 0; i < split.picture.size(); ++i)
     equal += split.picture[i] == waves.picture[i] ? 1u : 0u;
-  const std::size_t guided = probes.guided_paths().size(options.max_paths);
+  const std::size_t paths = split.picture.size(), guided = probes.guided_paths().size(paths);
   CHECK(guided > 0);
-  CHECK(guided <= options.max_paths / 2);
-  CHECK(equal >= options.max_paths - guided);
+  CHECK(guided <= paths / 2);
+  CHECK(equal >= paths - guided);
   CHECK(mean_of(split.picture) == Approx(mean_of(waves.picture)).epsilon(0.01));
 }
 
 TEST_CASE("samples in which a guide rests have the bits of their waves", "[renderer]") {
-  using exec_policy = wfpg::exec::tbb;
-  using guider = wfpg::path_guider<exec_policy, wfpg::kept_guide<exec_policy>>;
-  const scene scene = make_builtin_scene("cornell-box");
-  const device_scene<exec_policy> geometry(exec_policy(), scene);
-  wfpg::kept_guide_options options;
-  options.octree_resolution = 32;
-  options.kept.resolution = 16;
-  options.max_paths = 96 * 96;
-  options.max_depth = 5;
-  options.least_gain = 1e6f;
-  const auto make = [&] {
-    const wfpg::triangle_mesh_view mesh{geometry.view().positions, geometry.view().triangles};
-    return guider(exec_policy(), mesh, options);
-  };
-  const setup with{96, 5, true, 5, 24};
-  guider rests = make();
-  const traced whole = trace_all<exec_policy, embree_caster, guider&>(scene, with, rests);
+  using exec_policy = guiders_that_rest::exec_policy;
+  using guider = guiders_that_rest::guider;
+  const guiders_that_rest guiders;
+  const setup with = guiders_that_rest::of_samples(24);
+  guider rests = guiders.make();
+  const traced whole = trace_all<exec_policy, embree_caster, guider&>(guiders.world, with, rests);
   // A batch caster's paths wait for each other in all samples.
-  const traced waves = trace_all<exec_policy, batch_caster>(scene, with, make());
+  const traced waves = trace_all<exec_policy, batch_caster>(guiders.world, with, guiders.make());
   CHECK(rests.resting());
   CHECK(whole.ends_in_one_kernel);
   CHECK(!waves.has_whole_paths);

@@ -7,19 +7,13 @@
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/host/recorded_runs.hpp>
 
+#include <thrust/gather.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 namespace render {
-
-/// Kernel: to[i] = from[index[i]].
-struct gather_words {
-  wfpg::array_view<const std::uint32_t> index, from;
-  wfpg::array_view<std::uint32_t> to;
-
-  WFPG_HD void operator()(std::size_t i) const { to[i] = from[index[i]]; }
-};
 
 /// Paths that wait for each other after each stage. A part of the paths is a list, so that stages and sorts
 /// take no time for the others.
@@ -43,9 +37,11 @@ class staged_paths {
   path_queue by_material(const Exec& exec, wfpg::partitioner<Exec>& partitioner,
                          wfpg::array_view<const std::uint32_t> keys) {
     if (!count_.data()) return {partitioner.partition(exec, keys, material_key_bits), false};
-    exec.for_each(size_, gather_words{list_.view(), keys, keys_.view()});
+    const std::uint32_t* const list = list_.data();
+    ::thrust::gather(exec.thrust(), list, list + size_, keys.data(), keys_.data());
     path_queue queue{partitioner.partition(exec, keys_.view(), material_key_bits), false};
-    exec.for_each(size_, gather_words{queue.by_material.permutation, list_.view(), sorted_.view()});
+    const std::uint32_t* const order = queue.by_material.permutation.data();
+    ::thrust::gather(exec.thrust(), order, order + size_, list, sorted_.data());
     queue.by_material.permutation = sorted_.view();
     return queue;
   }
@@ -61,14 +57,8 @@ class staged_paths {
 
   static std::vector<std::uint32_t> list_of(std::size_t paths, const wfpg::recorded_runs& part, bool inside) {
     std::vector<std::uint32_t> list;
-    if (inside) {
-      const auto places = static_cast<std::uint32_t>(part.size(paths));
-      for (std::uint32_t place = 0; place < places; ++place)
-        if (part.path(place) < paths) list.push_back(static_cast<std::uint32_t>(part.path(place)));
-    } else {
-      for (std::uint32_t path = 0; path < paths; ++path)
-        if (!part.includes(path)) list.push_back(path);
-    }
+    for (std::uint32_t path = 0; path < paths; ++path)
+      if (part.includes(path) == inside) list.push_back(path);
     return list;
   }
 
