@@ -10,7 +10,6 @@
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/support/thrust.hpp>
 
-#include <thrust/fill.h>
 #include <thrust/functional.h>
 #include <thrust/iterator/counting_iterator.h>
 #include <thrust/sequence.h>
@@ -110,8 +109,8 @@ class partitioner {
                                        prefix.begin(), detail::starts_key_group{sorted, excluded},
                                        ::thrust::plus<std::uint32_t>());
     // Without keys, or with excluded ones alone, no thread writes these.
-    ::thrust::fill_n(exec.thrust(), count_.data(), 1, 0u);
-    ::thrust::fill_n(exec.thrust(), offsets_.data(), 1, 0u);
+    exec.fill_bytes(count_.data(), 0, count_.bytes());
+    exec.fill_bytes(offsets_.data(), 0, sizeof(std::uint32_t));
     exec.for_each(n, detail::write_group_offsets{sorted, prefix, excluded, offsets_.data(), count_.data()});
     return {{permutation_.data(), n}, {offsets_.data(), n + 1}, sorted, prefix, count_.data()};
   }

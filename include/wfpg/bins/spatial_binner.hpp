@@ -151,8 +151,8 @@ class spatial_binner {
     require(n <= keys_.size(), "number of rays", n, "at most the binner's capacity");
     // Keys are those of leaves first, and of bins after the ascent.
     const array_view<std::uint32_t> keys(keys_.data(), n);
-    ::thrust::fill_n(exec.thrust(), node_counts_.data(), node_counts_.size(), 0u);
-    ::thrust::fill_n(exec.thrust(), unbinned_.data(), 1, 0u);
+    exec.fill_bytes(node_counts_.data(), 0, node_counts_.bytes());
+    exec.fill_bytes(unbinned_.data(), 0, unbinned_.bytes());
     exec.for_each(n, detail::count_at_leaves<Rays>{rays, tree_, keys, node_counts_.data(), unbinned_.data()});
     if (ranks) ranks->all_reduce_sum(node_counts_.view().subview(tree_.first_leaf(), tree_.leaf_count()));
     // Levels above l_min are not summed: no bin lies there.

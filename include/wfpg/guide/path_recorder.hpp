@@ -23,8 +23,6 @@
 #include <wfpg/host/recorded_runs.hpp>
 #include <wfpg/sampling/sampled_direction.hpp>
 
-#include <thrust/fill.h>
-
 namespace wfpg {
 
 namespace detail {
@@ -354,7 +352,7 @@ class path_recorder {
     view_.shares_ = shares_.data();
     view_.counters_ = counters_.data();
     view_.wave_ = wave_.view();
-    ::thrust::fill_n(exec.thrust(), counters_.data(), counters_.size(), 0u);
+    exec.fill_bytes(counters_.data(), 0, counters_.bytes());
     clear(exec);
   }
 

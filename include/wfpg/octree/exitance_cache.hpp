@@ -209,7 +209,7 @@ class exitance_cache {
     // Normals do not change afterwards, whatever the light does.
     detail::build_voxel_normals(exec, tree, fragments, normals_.view(), swapped_sides_.view());
     // Counted for the life of the cache: clear() does not reset them.
-    ::thrust::fill_n(exec.thrust(), counters_.data(), counters_.size(), 0u);
+    exec.fill_bytes(counters_.data(), 0, counters_.bytes());
     clear(exec);
   }
 

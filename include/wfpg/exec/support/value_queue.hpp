@@ -22,8 +22,6 @@
 #include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/ranks/communicator.hpp>
 
-#include <thrust/fill.h>
-
 #include <vector>
 
 namespace wfpg::detail {
@@ -304,7 +302,7 @@ class value_queue {
   void empty(const Exec& exec) {
     exec.fill_bytes(largest_.data(), 0, largest_.bytes());
     // Should this fail, a repeated sum adds and counts all values twice, which leaves their means.
-    ::thrust::fill_n(exec.thrust(), queued_.data(), queued_.size(), 0u);
+    exec.fill_bytes(queued_.data(), 0, queued_.bytes());
   }
 
   communicator* ranks_ = nullptr;

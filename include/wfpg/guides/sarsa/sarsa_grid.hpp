@@ -28,8 +28,6 @@
 #include <wfpg/octree/voxelizer.hpp>
 #include <wfpg/sampling/mixture.hpp>
 
-#include <thrust/fill.h>
-
 #include <vector>
 
 namespace wfpg {

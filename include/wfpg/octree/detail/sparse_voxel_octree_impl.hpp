@@ -7,7 +7,6 @@
 #include <wfpg/octree/sparse_voxel_octree.hpp>
 
 #include <thrust/copy.h>
-#include <thrust/fill.h>
 #include <thrust/functional.h>
 #include <thrust/iterator/counting_iterator.h>
 #include <thrust/transform_scan.h>
@@ -285,7 +284,8 @@ template <class Exec>
 void sparse_voxel_octree<Exec>::build_descents(const Exec& exec, const buffer<morton_code, Exec>& leaf_codes,
                                                const buffer<std::uint32_t, Exec>& first_leaf_of) {
   const std::uint32_t top = view_.top_level_;
-  ::thrust::fill_n(exec.thrust(), top_.data(), top_.size(), invalid_node);
+  // All bits of invalid_node are set.
+  exec.fill_bytes(top_.data(), 0xff, top_.bytes());
   exec.for_each(view_.level_size(top),
                 detail::fill_top{leaf_codes.view(), first_leaf_of.data(), view_.level_begin_[top], top,
                                  view_.depth_, top_.data()});

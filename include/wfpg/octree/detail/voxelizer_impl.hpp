@@ -11,7 +11,6 @@
 #include <wfpg/octree/triangle_voxel.hpp>
 #include <wfpg/octree/voxelizer.hpp>
 
-#include <thrust/fill.h>
 #include <thrust/functional.h>
 #include <thrust/iterator/counting_iterator.h>
 #include <thrust/scan.h>
@@ -312,7 +311,7 @@ voxel_fragments<Exec> voxelize(const Exec& exec, triangle_mesh_view mesh, std::u
   exec.for_each(n, detail::count_items{reader, boxes.view(), items.view(), counters.data()});
   const std::uint64_t item_count = sum_prefix(exec, items);
   const buffer<std::uint32_t, Exec> triangles(exec, item_count);
-  ::thrust::fill_n(exec.thrust(), triangles.data(), item_count, 0u);
+  exec.fill_bytes(triangles.data(), 0, triangles.bytes());
   exec.for_each(n, detail::mark_first_items{items.view(), triangles.data()});
   ::thrust::inclusive_scan(exec.thrust(), triangles.data(), triangles.data() + item_count, triangles.data(),
                            ::thrust::maximum<std::uint32_t>());

@@ -16,8 +16,6 @@
 #include <wfpg/octree/bottom_up.hpp>
 #include <wfpg/octree/sparse_voxel_octree.hpp>
 
-#include <thrust/fill.h>
-
 namespace wfpg::detail {
 
 /// Ray count of a leaf, and its bin: the deepest marked ancestor, or the leaf itself. Both lie together,
@@ -117,8 +115,8 @@ class bin_marks {
         inner_(exec, tree.first_leaf()),
         shared_(exec, has_ranks ? tree.leaf_count() : 0) {
     options_.min_level = min(options_.min_level, tree.depth());
-    ::thrust::fill_n(exec.thrust(), leaves_.data(), leaves_.size(), leaf_mark{});
-    ::thrust::fill_n(exec.thrust(), inner_.data(), inner_.size(), 0u);
+    exec.fill_bytes(leaves_.data(), 0, leaves_.bytes());
+    exec.fill_bytes(inner_.data(), 0, inner_.bytes());
     mark_bins(exec, {1, 1, 0, nullptr}, options_.min_level);
   }
 

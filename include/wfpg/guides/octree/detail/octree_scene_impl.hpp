@@ -43,7 +43,7 @@ octree_scene<Exec>::octree_scene(const Exec& exec, const Exec& working, voxel_fr
       options_.ranks ? rays_of_ranks() : max(options_.max_paths, options_.max_rays.value_or(0)),
       options_.max_depth, options_.ranks, options_.max_paths,
       static_cast<std::uint32_t>(options_.first_path));
-  ::thrust::fill_n(working.thrust(), counts_.data(), counts_.size(), depth_statistics{});
+  working.fill_bytes(counts_.data(), 0, counts_.bytes());
   // The means and radii of blocks do not change: measured once.
   const std::uint32_t p = product_resolution(options_);
   product_point* const hemisphere = product_points_.data();

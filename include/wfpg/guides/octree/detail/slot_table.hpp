@@ -8,7 +8,6 @@
 #include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/guides/octree/detail/allocate_slots.hpp>
 
-#include <thrust/fill.h>
 #include <thrust/functional.h>
 #include <thrust/transform_scan.h>
 
@@ -40,7 +39,8 @@ class slot_table {
     wanted_prefix_ = buffer<std::uint32_t, Exec>(exec, wanted_.size());
     clear_table(exec);
     exec.fill_bytes(noted_.data(), 0, noted_.bytes());
-    ::thrust::fill_n(exec.thrust(), wanted_.data(), wanted_.size(), no_key);
+    // All bits of no_key are set.
+    exec.fill_bytes(wanted_.data(), 0xff, wanted_.bytes());
   }
 
   std::size_t size() const { return slots_.size(); }

@@ -67,7 +67,8 @@ guide_view transient_guide<Exec>::prepare(const sample_context<Exec>& at, const 
   if (resident_fields_.size() < bins) reallocate(at.exec, resident_fields_, bins + bins / 2);
   if (resident_words_.size() < words) reallocate(at.exec, resident_words_, words + words / 2);
   if (field_of_ray_.size() < max_rays_) reallocate(at.exec, field_of_ray_, max_rays_);
-  ::thrust::fill_n(at.exec.thrust(), field_of_ray_.data(), w.ray_count, no_field);
+  // All bits of no_field are set.
+  at.exec.fill_bytes(field_of_ray_.data(), 0xff, w.ray_count * sizeof(no_field));
   for_each_field(at.exec, fields, caster,
                  resident_sink{fields.bins, resident_words_.data(), resident_fields_.data(),
                                field_of_ray_.data(), scene::fraction(), fields.resolution},
