@@ -203,9 +203,9 @@ class path_guider {
   /// Returns counts and times since construction; see statistics.hpp. Waits for the work before it, so that
   /// calling it for each sample slows a device down. `dropped_vertices` and `deposits` tell of calls out of
   /// range: look at them when guiding does not help.
-  guider_statistics statistics() const;
+  WFPG_COLD guider_statistics statistics() const;
   /// Returns the bytes of each part that it holds in the policy's memory. Does not wait.
-  memory_report memory() const;
+  WFPG_COLD memory_report memory() const;
 
  private:
   friend struct detail::state_access;
@@ -264,7 +264,7 @@ class path_guider {
     return options;
   }
   /// Checks that all ranks learn the same guide, and rest below the same gain.
-  void join_ranks(float least_gain);
+  WFPG_COLD void join_ranks(float least_gain);
   /// Fails to compile where the renderer's types lack what they need; throws where the wave is too large.
   template <class Surfaces, class Random, class Caster>
   void check(const wave<Surfaces, Random>& w, const Caster& caster) const;

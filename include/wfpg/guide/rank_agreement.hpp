@@ -7,6 +7,7 @@
 // call.
 #pragma once
 
+#include <wfpg/base/config.hpp>
 #include <wfpg/base/math.hpp>
 #include <wfpg/guide/sampling_options.hpp>
 #include <wfpg/ranks/communicator.hpp>
@@ -25,7 +26,7 @@ namespace wfpg {
 class agreed_items {
  public:
   /// Adds an item. `name`: as an error names it, a string literal.
-  void add(const char* name, std::uint64_t value) { items_.push_back({name, value}); }
+  WFPG_COLD void add(const char* name, std::uint64_t value) { items_.push_back({name, value}); }
   /// Adds a number's bits.
   void add(const char* name, float value) { add(name, std::uint64_t(float_bits(value))); }
   /// Adds the hash of an array of integers or of floats, so that a message names the array as a whole. Two
@@ -41,7 +42,7 @@ class agreed_items {
   /// call it with as many items: 16 bytes of traffic an item. Waits for the work before it. Throws
   /// out_of_memory.
   template <class Exec>
-  void check(const Exec& exec, communicator& ranks) const;
+  WFPG_COLD void check(const Exec& exec, communicator& ranks) const;
 
  private:
   // Bits of a number, for the hash of an array. Floats are compared by their bits, so that 0 and -0 differ.
@@ -64,7 +65,7 @@ namespace detail {
 /// lie in any order of ranks. The message names the first path that is in no part, or in two. 16 bytes of
 /// traffic a rank.
 template <class Exec>
-void require_all_paths(const Exec& exec, const sampling_options& options);
+WFPG_COLD void require_all_paths(const Exec& exec, const sampling_options& options);
 
 /// Adds the options that all guides have, and that decide what is learnt.
 void add_options(agreed_items& items, const sampling_options& options);

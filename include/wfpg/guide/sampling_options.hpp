@@ -81,7 +81,7 @@ inline std::size_t all_paths_of(const sampling_options& o) {
 }
 
 /// Throws std::invalid_argument, which names the option and its range, where one is out of range.
-inline void require_valid(const sampling_options& o) {
+WFPG_COLD inline void require_valid(const sampling_options& o) {
   const float fraction = o.guide_fraction.value_or(1.0f);
   require(fraction > 0.0f && fraction <= 1.0f, "guide_fraction", fraction, "in (0, 1]");
   const float least = o.least_gain.value_or(1.0f);

@@ -141,7 +141,8 @@ namespace detail {
 
 /// Throws std::invalid_argument where P is not 0, 4, 8 or 16, or does not divide `resolution`, which the
 /// message calls `name`.
-inline void require_product_resolution(std::uint32_t p, const char* name, std::uint32_t resolution) {
+WFPG_COLD inline void require_product_resolution(std::uint32_t p, const char* name,
+                                                 std::uint32_t resolution) {
   require(p == 0 || p == 4 || p == 8 || p == max_product_resolution, "product_resolution", p,
           "0, 4, 8 or 16");
   require(p == 0 || resolution % p == 0, name, resolution,

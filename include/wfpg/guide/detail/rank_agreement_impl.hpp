@@ -54,7 +54,7 @@ void require_all_paths(const Exec& exec, const sampling_options& options) {
                      " on: set max_paths so that they add up to all_paths");
 }
 
-inline void add_options(agreed_items& items, const sampling_options& o) {
+WFPG_COLD inline void add_options(agreed_items& items, const sampling_options& o) {
   items.add("all_paths", std::uint64_t(all_paths_of(o)));
   items.add("max_depth", std::uint64_t(o.max_depth));
   items.add("guide_fraction", o.guide_fraction.value_or(-1.0f));

@@ -56,7 +56,7 @@ class kept_guide : public octree_scene<Exec> {
   /// Adds the scene and the options that decide what is learnt, for ranks to compare. Every option that
   /// changes what a guide learns belongs here: ranks that differ in it would learn different guides, and
   /// nothing else would notice. Waits for the work before it.
-  void agree(const Exec& exec, agreed_items& items) const {
+  WFPG_COLD void agree(const Exec& exec, agreed_items& items) const {
     scene::agree_scene(exec, items);
     items.add("kept.resolution", std::uint64_t(options_.kept.resolution));
     items.add("kept.budget_bytes", std::uint64_t(options_.kept.budget_bytes));

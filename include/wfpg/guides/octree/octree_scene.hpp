@@ -25,8 +25,6 @@
 #include <wfpg/octree/voxelizer.hpp>
 #include <wfpg/sampling/product_sampler.hpp>
 
-#include <thrust/fill.h>
-
 #include <vector>
 
 namespace wfpg {
@@ -91,7 +89,7 @@ class octree_scene : public guide_base {
   ~octree_scene() = default;
 
   /// Throws std::invalid_argument for options out of range. It checks them before anything is allocated.
-  static void require_valid(const octree_guide_options& options);
+  WFPG_COLD static void require_valid(const octree_guide_options& options);
   /// Voxelizes a mesh for the constructor, after it checked the options. Reads the mesh during the call
   /// alone.
   static voxel_fragments<Exec> fragments_of(const Exec& exec, triangle_mesh_view mesh,
@@ -101,7 +99,7 @@ class octree_scene : public guide_base {
   }
   /// Adds the octree, normals and the options that decide what is learnt, for ranks to compare.
   /// O(nodes) on the host. Waits for the work before it.
-  void agree_scene(const Exec& exec, agreed_items& items) const;
+  WFPG_COLD void agree_scene(const Exec& exec, agreed_items& items) const;
   /// Index of this rank's path 0 among all paths; no_path without ranks.
   std::uint32_t first_path() const {
     return options_.ranks ? static_cast<std::uint32_t>(options_.first_path) : no_path;

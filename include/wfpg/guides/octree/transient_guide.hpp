@@ -72,7 +72,7 @@ class transient_guide : public octree_scene<Exec> {
   /// bytes a leaf, and 48 for each bin of each rank.
   static constexpr bool joins_ranks = true;
   /// Adds the scene and the options that decide what is learnt, for ranks to compare.
-  void agree(const Exec& exec, agreed_items& items) const {
+  WFPG_COLD void agree(const Exec& exec, agreed_items& items) const {
     scene::agree_scene(exec, items);
     items.add("field_resolution", std::uint64_t(options_.field_resolution));
     items.add("min_field_resolution", std::uint64_t(options_.min_field_resolution));

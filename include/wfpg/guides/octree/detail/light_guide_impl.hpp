@@ -8,7 +8,7 @@ namespace wfpg {
 namespace detail {
 
 /// Throws std::invalid_argument for options out of range.
-inline void require_valid(const light_guide_options& options) {
+WFPG_COLD inline void require_valid(const light_guide_options& options) {
   const std::vector<float>& weights = options.weights;
   require(weights.size() <= 256, "lights.weights.size()", weights.size(), "at most 256");
   float largest = 0.0f;
