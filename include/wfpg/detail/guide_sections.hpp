@@ -10,13 +10,11 @@
 
 #include <wfpg/detail/kept_state.hpp>
 #include <wfpg/detail/light_state.hpp>
-#include <wfpg/exec/support/thrust.hpp>
+#include <wfpg/exec/support/fill.hpp>
 #include <wfpg/guides/octree/kept_guide.hpp>
 #include <wfpg/guides/octree/transient_guide.hpp>
 #include <wfpg/octree/leaf_codes.hpp>
 #include <wfpg/state/section_file.hpp>
-
-#include <thrust/fill.h>
 
 #include <algorithm>
 #include <cmath>
@@ -128,8 +126,7 @@ voxel_fragments<Exec> fragments_from_bytes(const Exec& exec, section_reader byte
     bytes.require(codes[i] < all && (i == 0 || codes[i - 1] < codes[i]), "has leaves out of order");
   voxel_fragments<Exec> fragments(exec, codes.size());
   exec.copy_from_host(fragments.codes.data(), codes.data(), fragments.codes.bytes());
-  ::thrust::fill_n(exec.thrust(), fragments.surfaces.data(), codes.size(),
-                   fragment_surface{pack_direction(vec3(0.0f, 0.0f, 1.0f)), 1.0f});
+  fill(exec, fragments.surfaces, fragment_surface{pack_direction(vec3(0.0f, 0.0f, 1.0f)), 1.0f});
   fragments.grid = grid;
   return fragments;
 }

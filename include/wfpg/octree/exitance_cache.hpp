@@ -13,15 +13,13 @@
 #include <wfpg/base/types.hpp>
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/support/atomic.hpp>
+#include <wfpg/exec/support/fill.hpp>
 #include <wfpg/exec/support/rank_counters.hpp>
 #include <wfpg/exec/support/rank_exchange.hpp>
-#include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/octree/bottom_up.hpp>
 #include <wfpg/octree/sparse_voxel_octree.hpp>
 #include <wfpg/octree/statistics.hpp>
 #include <wfpg/octree/voxel_normals.hpp>
-
-#include <thrust/fill.h>
 
 namespace wfpg {
 
@@ -229,7 +227,7 @@ class exitance_cache {
   void clear(const Exec& exec) {
     // Zero bytes are means and counts of zero.
     exec.fill_bytes(leaves_.data(), 0, leaves_.bytes());  // means and counts of zero
-    ::thrust::fill_n(exec.thrust(), inner_radiance_.data(), inner_radiance_.size(), -1.0f);
+    fill(exec, inner_radiance_, -1.0f);
     queue_.clear(exec);
   }
 

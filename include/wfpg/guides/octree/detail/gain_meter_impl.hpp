@@ -2,10 +2,10 @@
 #pragma once
 
 #include <wfpg/base/math.hpp>
+#include <wfpg/exec/support/fill.hpp>
 #include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/guides/octree/gain_meter.hpp>
 
-#include <thrust/fill.h>
 #include <thrust/functional.h>
 #include <thrust/iterator/counting_iterator.h>
 #include <thrust/transform_reduce.h>
@@ -90,7 +90,7 @@ guiding_gain gain_meter<Exec>::gain_of(const detail::path_sums& sums) {
 
 template <class Exec>
 void gain_meter<Exec>::forget(const Exec& exec) {
-  ::thrust::fill_n(exec.thrust(), kept_.data(), kept_.size(), detail::earlier_paths{});
+  fill(exec, kept_, detail::earlier_paths{});
 }
 
 template <class Exec>

@@ -1,12 +1,12 @@
 // Implementation of irradiance_records.hpp.
 #pragma once
 
+#include <wfpg/exec/support/fill.hpp>
 #include <wfpg/exec/support/sum_prefix.hpp>
 #include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/guides/records/irradiance_records.hpp>
 
 #include <thrust/count.h>
-#include <thrust/fill.h>
 #include <thrust/functional.h>
 #include <thrust/iterator/counting_iterator.h>
 #include <thrust/transform_reduce.h>
@@ -160,7 +160,7 @@ irradiance_records<Exec, Smooth>::irradiance_records(const Exec& exec, const Exe
                    detail::measure_leaves{octree_.leaf_fragment_begin(), fragments.surfaces.view(),
                                           1.0f / (voxel * voxel), areas_.data()});
   octree_.release_build_data();
-  ::thrust::fill_n(working.thrust(), tags_.data(), tags_.size(), voxel_tag::object);
+  fill(working, tags_, voxel_tag::object);
   exec.fill_bytes(records_.data(), 0, records_.bytes());
   exec.fill_bytes(rows_.data(), 0, rows_.bytes());
   cosines_ = buffer<detail::cell_cosines, Exec>(exec, view_.normals_.size() + 1);
