@@ -4,7 +4,7 @@ from typing import Any, Dict, List
 from blocks import Results, Rows, block, per_cent, three
 
 ROOM, MORE, AIMED = "room.json", "room-64.json", "aimed-cones.json"
-FRACTIONS, TUNING = "fractions.json", "tuning.json"
+FRACTIONS, TUNING, CEILING = "fractions.json", "tuning.json", "ceiling.json"
 UNAIMED, MORE_UNAIMED = "room-unaimed.json", "room-64-unaimed.json"
 DESIGNS = {
     "cosine": "cosine alone", "wfpg": "wfpg's fields", "unaimed": "wfpg's fields, without aimed cones",
@@ -110,6 +110,45 @@ def fractions_time(results: Results, which: str) -> str:
     middle = len(ratios) // 2
     value = ratios[-1] if which == "most" else (ratios[middle - 1] + ratios[middle]) / 2
     return f"{100 * (value - 1):.0f}%"
+
+
+GUIDES = {"cold": "begins with nothing", "default": "trained", "finer": "48² cells", "larger": "1 GiB", "both": "both"}
+
+
+def possible(found: Dict[str, Any]) -> float:
+    """Gain of a guide that begins with nothing, over that of the best trained one."""
+    return found["gain"]["cold"] / max(found["gain"].values())
+
+
+@block
+def ceiling(results: Results) -> Rows:
+    """Gains of guides that begin with nothing and that were trained for long, and MiB of the best one's fields."""
+    rows = [["scene", *GUIDES.values(), "of the possible", "MiB of both"]]
+    for scene, found in results.json(CEILING, "scenes").items():
+        rows.append([scene, *(three(found["gain"][g]) for g in GUIDES), f"{100 * possible(found):.0f}%",
+                     f"{found['bytes']['both'] / 2**20:.0f}"])
+    return rows
+
+
+@block
+def ceiling_parts(results: Results) -> str:
+    """Part of the possible gain that a guide has which begins with nothing, least and most."""
+    parts = [possible(found) for found in results.json(CEILING, "scenes").values()]
+    return f"{100 * min(parts):.0f} to {100 * max(parts):.0f}%"
+
+
+@block
+def ceiling_learning(results: Results) -> str:
+    """Part of the default guide's gain that is missing where it begins with nothing, least and most."""
+    parts = [1 - found["gain"]["cold"] / found["gain"]["default"] for found in results.json(CEILING, "scenes").values()]
+    return per_cent(parts)
+
+
+@block
+def ceiling_finer(results: Results, scene: str) -> str:
+    """Gain of a trained guide with finer cells in equal memory, over that with the default's."""
+    gain = results.json(CEILING, "scenes", scene, "gain")
+    return f"{gain['finer'] / gain['default']:.2f}"
 
 
 def option(results: Results, name: str, value: Any) -> List[str]:
