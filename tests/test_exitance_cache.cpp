@@ -64,7 +64,9 @@ WFPG_TEST_CASE("a deposit on one side is read from that side", "[exitance_cache]
   CHECK(scene.cache.dropped(scene.exec).total() == 0);
 
   deposit_colour(scene, p, z, vec3(1.0f));
+  CHECK(scene.radiance(0, 0) > 0.0f);
   scene.cache.clear(scene.exec);
+  CHECK(scene.radiance(0, 0) < 0.0f);  // inner nodes forget before update() averages them anew
   scene.cache.update(scene.exec);
   CHECK(scene.read(leaf, z) == 0.0f);
   CHECK(scene.radiance(0, 0) < 0.0f);
