@@ -18,7 +18,6 @@
 #include <wfpg/base/types.hpp>
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/support/atomic.hpp>
-#include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/guide/recorded_wave.hpp>
 #include <wfpg/host/recorded_runs.hpp>
 #include <wfpg/sampling/sampled_direction.hpp>

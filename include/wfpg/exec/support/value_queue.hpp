@@ -19,7 +19,6 @@
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/support/atomic.hpp>
 #include <wfpg/exec/support/packed_sums.hpp>
-#include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/ranks/communicator.hpp>
 
 #include <vector>

@@ -17,7 +17,6 @@
 #pragma once
 
 #include <wfpg/exec/buffer.hpp>
-#include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/guide/guide.hpp>
 #include <wfpg/guide/path_recorder.hpp>
 #include <wfpg/guide/rank_agreement.hpp>

@@ -11,7 +11,6 @@
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/support/atomic.hpp>
 #include <wfpg/exec/support/rank_counters.hpp>
-#include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/guides/octree/build_schedule.hpp>
 #include <wfpg/octree/bottom_up.hpp>
 #include <wfpg/octree/sparse_voxel_octree.hpp>
