@@ -82,15 +82,19 @@ def measure(scenes):
 
 def main(directory, out, folder, *chosen):
     results = {}
-    if os.path.exists(out):
+    if os.path.exists(out) and os.path.getsize(out) > 0:
         with open(out) as file:
             results = json.load(file)
     options = {**FILES, **BUILT_IN}
     if unknown := [name for name in chosen if name not in options]:
         sys.exit(f"{unknown[0]} is none of {', '.join(sorted(options))}")
+    places = {name: os.path.join(folder, name) if name in FILES else name for name in chosen or options}
+    if missing := [place for name, place in places.items() if name in FILES and not os.path.exists(place)]:
+        sys.exit(f"cannot read {missing[0]}")
+    with open(out, "a"):  # before minutes of work
+        pass
     with tempfile.TemporaryDirectory() as pictures:
-        found = measure([Scene(directory, os.path.join(pictures, name), os.path.join(folder, name) if name in FILES else name, options[name])
-                         for name in chosen or options])
+        found = measure([Scene(directory, os.path.join(pictures, name), place, options[name]) for name, place in places.items()])
     scenes = {**results.get("scenes", {}), **found}
     write_results(out, {"size": SIZE, "training": TRAINING, "samples": SAMPLES, "scenes": {name: scenes[name] for name in sorted(scenes)}})
 
