@@ -8,21 +8,17 @@ seeds. A variance is half of the mean difference of two seeds' pictures. Renderi
 have a rendering each. OUT.json keeps the scenes that are not named.
 """
 import concurrent.futures
-import json
 import os
-import statistics
 import sys
 import tempfile
 
-from programs import Programs, write_results
+from programs import SEEDS, Programs, begin_results, renderings_at_once, unguided_options, write_results
 
 BUILT_IN = {"ajar": "", "glossy-room": "--nee off", "thin-wall": "--max-depth 6"}
 FILES = {"bathroom.glb": "", "cornell-box.glb": "", "staircase2.glb": "", "veach-ajar.glb": "", "veach-mis.glb": "--light-groups 1"}
 FINER, LARGER = ["--slot-resolution", "48"], ["--field-budget", "1GiB"]
 GUIDES = {"default": [], "finer": FINER, "larger": LARGER, "both": [*FINER, *LARGER]}
 TRAINING, SAMPLES, SIZE = 192, 32, "256x256"
-PAIRS = ((1, 2), (3, 4))
-SEEDS = [seed for pair in PAIRS for seed in pair]
 
 
 class Scene:
@@ -48,8 +44,8 @@ class Scene:
         return stats["slots"]["live_bytes"]
 
     def unguided(self, seed):
-        own = [] if "--light-groups" in self.options else self.options
-        self.programs.render(self.scene, f"pt{seed}", ["--spp", str(SAMPLES), "--seed", str(seed), "--method", "pt", *own])
+        self.programs.render(self.scene, f"pt{seed}", ["--spp", str(SAMPLES), "--seed", str(seed), "--method", "pt",
+                                                       *unguided_options(self.options)])
 
     def cold(self, seed):
         self.guided(SAMPLES, seed, f"cold{seed}", [])
@@ -57,13 +53,10 @@ class Scene:
     def trained(self, name, seed):
         self.guided(SAMPLES, seed, f"{name}{seed}", [*GUIDES[name], "--load-guide", self.guide(name)])
 
-    def variance(self, name):
-        return statistics.mean(self.programs.compare(f"{name}{a}", f"{name}{b}")["mse_reinhard"] for a, b in PAIRS) / 2
-
 
 def measure(scenes):
     """Gains over path tracing, and bytes of the guides' fields."""
-    with concurrent.futures.ThreadPoolExecutor(max(1, len(os.sched_getaffinity(0)) - 2)) as threads:
+    with concurrent.futures.ThreadPoolExecutor(renderings_at_once()) as threads:
         sizes = {scene: {g: threads.submit(scene.train, g) for g in reversed(GUIDES)} for scene in scenes}  # the longest first
         others = [threads.submit(render, seed) for scene in scenes for seed in SEEDS for render in (scene.cold, scene.unguided)]
         for done in others:
@@ -73,26 +66,21 @@ def measure(scenes):
             done.result()
     result = {}
     for scene in scenes:
-        unguided = scene.variance("pt")
+        unguided = scene.programs.variance("pt")
         result[os.path.basename(scene.scene)] = {
-            "gain": {name: round(unguided / scene.variance(name), 3) for name in ("cold", *GUIDES)},
+            "gain": {name: round(unguided / scene.programs.variance(name), 3) for name in ("cold", *GUIDES)},
             "bytes": {name: bytes_of[scene][name] for name in GUIDES}}
     return result
 
 
 def main(directory, out, folder, *chosen):
-    results = {}
-    if os.path.exists(out) and os.path.getsize(out) > 0:
-        with open(out) as file:
-            results = json.load(file)
     options = {**FILES, **BUILT_IN}
     if unknown := [name for name in chosen if name not in options]:
         sys.exit(f"{unknown[0]} is none of {', '.join(sorted(options))}")
     places = {name: os.path.join(folder, name) if name in FILES else name for name in chosen or options}
     if missing := [place for name, place in places.items() if name in FILES and not os.path.exists(place)]:
         sys.exit(f"cannot read {missing[0]}")
-    with open(out, "a"):  # before minutes of work
-        pass
+    results = begin_results(out)
     with tempfile.TemporaryDirectory() as pictures:
         found = measure([Scene(directory, os.path.join(pictures, name), place, options[name]) for name, place in places.items()])
     scenes = {**results.get("scenes", {}), **found}

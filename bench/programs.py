@@ -1,8 +1,12 @@
 """Runs the renderer's programs, and writes results. Shared by the scripts beside it."""
 import json
 import os
+import statistics
 import subprocess
 import sys
+
+PAIRS = ((1, 2), (3, 4))  # of seeds, whose pictures are compared
+SEEDS = [seed for pair in PAIRS for seed in pair]
 
 
 class Programs:
@@ -20,10 +24,31 @@ class Programs:
         with open(stats) as file:
             return json.load(file)
 
+    def variance(self, name):
+        """Variance of pictures NAME and a seed: half of the mean difference of two seeds' pictures."""
+        return statistics.mean(self.compare(f"{name}{a}", f"{name}{b}")["mse_reinhard"] for a, b in PAIRS) / 2
+
     def compare(self, name, reference):
         pictures = [os.path.join(self.folder, n + ".exr") for n in (name, reference)]
         command = [os.path.join(self.directory, "wfpg-compare"), *pictures, "--json"]
         return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
+
+
+def unguided_options(options):
+    """Those of a scene's options that path tracing has, too."""
+    return [] if "--light-groups" in options else options
+
+
+def renderings_at_once():
+    """How many renderings of one thread run beside each other: two cores stay free."""
+    return max(1, len(os.sched_getaffinity(0)) - 2)
+
+
+def begin_results(out):
+    """What OUT holds so far. Fails before minutes of work where it cannot be written."""
+    with open(out, "a+") as file:
+        file.seek(0)
+        return json.loads(file.read() or "{}")
 
 
 def gpu_and_driver():

@@ -7,21 +7,18 @@ Four seeds render each scene with and without a guide. A variance is half of the
 renderings have one thread, and two cores fewer than there are have a rendering each. OUT.json keeps the other device's part.
 """
 import concurrent.futures
-import json
 import os
 import statistics
 import sys
 import tempfile
 
-from programs import Programs, write_results
+from programs import SEEDS, Programs, begin_results, renderings_at_once, unguided_options, write_results
 
 BUILT_IN = {"ajar": "", "cornell-box": "", "cornell-enclosed": "--nee off", "furnace": "", "glossy-room": "--nee off",
             "materials": "", "outdoor": "", "thin-wall": "--max-depth 6"}
 FILES = {"bathroom.glb": "", "cornell-box.glb": "", "staircase2.glb": "", "veach-ajar.glb": "", "veach-mis.glb": "--light-groups 1"}
 ON_CPUS_ALONE = ("cornell-enclosed", "furnace", "glossy-room", "thin-wall")
 DEVICES = {"cpu": ("seq", "256x256"), "gpu": ("cuda", "1920x1080")}
-PAIRS = ((1, 2), (3, 4))
-SEEDS = [seed for pair in PAIRS for seed in pair]
 METHODS = ("pt", "wfpg")
 
 
@@ -39,20 +36,15 @@ class Cell:
     def render(self, seed):
         """Renders a seed by both methods, one after the other."""
         for method in METHODS:
-            own = [] if method == "pt" and "--light-groups" in self.options else self.options
+            own = unguided_options(self.options) if method == "pt" else self.options
             self.statistics[method][seed] = self.programs.render(
                 self.scene, f"{method}{seed}", ["--spp", self.samples, "--seed", str(seed), "--method", method, *own])
         print(os.path.basename(self.scene), self.samples, seed, file=sys.stderr, flush=True)
 
-    def half_difference(self, method):
-        """Variance of a method's pictures."""
-        errors = [self.programs.compare(f"{method}{a}", f"{method}{b}")["mse_reinhard"] for a, b in PAIRS]
-        return statistics.mean(errors) / 2
-
     def result(self):
         """Gain, time and rests, once all seeds are rendered."""
         times = {method: statistics.mean(seconds(stats) for stats in by_seed.values()) for method, by_seed in self.statistics.items()}
-        gain = self.half_difference("pt") / self.half_difference("wfpg")
+        gain = self.programs.variance("pt") / self.programs.variance("wfpg")
         time = times["wfpg"] / times["pt"]
         return {"gain": round(gain, 3), "time": round(time, 3), "equal_time": round(gain / time, 3),
                 "seconds_pt": round(times["pt"], 2), "rested": [self.statistics["wfpg"][seed]["rest"]["samples"] for seed in SEEDS]}
@@ -64,13 +56,10 @@ def seconds(stats):
 
 
 def main(directory, out, device, folder):
-    results = {}
-    if os.path.exists(out):
-        with open(out) as file:
-            results = json.load(file)
+    results = begin_results(out)
     kind, size = DEVICES[device]
     chosen = {name: options for name, options in {**FILES, **BUILT_IN}.items() if device == "cpu" or name not in ON_CPUS_ALONE}
-    at_once = max(1, len(os.sched_getaffinity(0)) - 2) if device == "cpu" else 1
+    at_once = renderings_at_once() if device == "cpu" else 1
     with tempfile.TemporaryDirectory() as pictures:
         cells = {name: {samples: Cell(directory, device, pictures, os.path.join(folder, name) if name in FILES else name, options, samples)
                         for samples in ("64", "16")} for name, options in chosen.items()}

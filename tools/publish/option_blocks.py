@@ -133,8 +133,7 @@ def ceiling(results: Results) -> Rows:
 @block
 def ceiling_parts(results: Results) -> str:
     """Part of the possible gain that a guide has which begins with nothing, least and most."""
-    parts = [possible(found) for found in results.json(CEILING, "scenes").values()]
-    return f"{100 * min(parts):.0f} to {100 * max(parts):.0f}%"
+    return per_cent([possible(found) for found in results.json(CEILING, "scenes").values()])
 
 
 @block

@@ -226,7 +226,7 @@ class exitance_cache {
   /// deposits. O(nodes).
   void clear(const Exec& exec) {
     // Zero bytes are means and counts of zero.
-    exec.fill_bytes(leaves_.data(), 0, leaves_.bytes());  // means and counts of zero
+    exec.fill_bytes(leaves_.data(), 0, leaves_.bytes());
     fill(exec, inner_radiance_, -1.0f);
     queue_.clear(exec);
   }
