@@ -19,7 +19,7 @@ DEFAULT = "wfpg"
 # Title of the plot, wfpg-render's arguments for a value, the values, the default, and arguments of all runs.
 OPTIONS = (
     ("kept.budget_bytes, MiB", "--field-budget {}MiB", (1, 4, 16, 24, 32, 64), 24, ""),
-    ("kept.resolution", "--slot-resolution {}", (12, 16, 24, 32), 24, ""),
+    ("kept.resolution", "--slot-resolution {}", (12, 16, 24, 32, 48), 32, ""),
     ("octree_resolution", "--octree-resolution {}", (32, 64, 128, 256), 128, ""),
     ("rays_per_bin", "--rays-per-bin {}", (16, 64, 256, 1024), 64, ""),
     ("kept.recast", "--recast {}", (1, 4, 8, 16, 32, 64), 32, ""),

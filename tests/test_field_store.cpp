@@ -111,20 +111,20 @@ TEST_CASE("field store: `recast` successive refreshes cast every cell once", "[f
 }
 
 TEST_CASE("field store: the cones of a refresh are spread over rows and columns", "[field_store]") {
-  constexpr std::uint32_t resolution = 24;
-  for (std::uint32_t recast : {2u, 4u, 8u, 16u, 32u})
-    for (std::uint32_t refresh = 0; refresh < recast; ++refresh) {
-      const std::uint32_t cones = wfpg::refresh_cones(resolution, recast);
-      std::set<std::uint32_t> rows, columns;
-      for (std::uint32_t cone = 0; cone < cones; ++cone) {
-        const std::uint32_t cell = wfpg::refreshed_cell(cone, refresh, resolution, recast);
-        rows.insert(cell / resolution);
-        columns.insert(cell % resolution);
+  for (std::uint32_t resolution : {24u, 32u, 48u})
+    for (std::uint32_t recast : {2u, 4u, 8u, 16u, 32u})
+      for (std::uint32_t refresh = 0; refresh < recast; ++refresh) {
+        const std::uint32_t cones = wfpg::refresh_cones(resolution, recast);
+        std::set<std::uint32_t> rows, columns;
+        for (std::uint32_t cone = 0; cone < cones; ++cone) {
+          const std::uint32_t cell = wfpg::refreshed_cell(cone, refresh, resolution, recast);
+          rows.insert(cell / resolution);
+          columns.insert(cell % resolution);
+        }
+        INFO("resolution " << resolution << ", one in " << recast << ", refresh " << refresh);
+        CHECK(5 * rows.size() >= 2 * std::min(cones, resolution));
+        CHECK(5 * columns.size() >= 2 * std::min(cones, resolution));
       }
-      INFO("one in " << recast << ", refresh " << refresh);
-      CHECK(5 * rows.size() >= 2 * std::min(cones, resolution));
-      CHECK(5 * columns.size() >= 2 * std::min(cones, resolution));
-    }
 }
 
 TEST_CASE("field store: a refresh casts at least one cell", "[field_store]") {
@@ -206,7 +206,7 @@ std::vector<double> seen_through(const kept_box<Exec>& box, const directional_fi
   const std::uint32_t n = field.grid().resolution();
   const std::vector<wfpg::ray> cones = box.log.cones();
   const auto radiance =
-      evaluate(box.exec(), cones, look_through{box.box.cache.view(), field.cell_solid_angle()});
+      evaluate(box.exec(), cones, look_through{box.box.cache.view(), 4.0f * field.cell_solid_angle()});
   std::vector<double> seen(std::size_t(n) * n, -1.0);
   for (std::size_t i = 0; i < cones.size(); ++i)
     seen[cell_of(field, cones[i].direction)] = double(radiance[i]);

@@ -25,7 +25,7 @@ constexpr vec3 up{0, 1, 0}, down{0, -1, 0};
 
 WFPG_TEST_CASE("field store: budgets of 0, less than a slot, one slot, and 1 MiB work", "[field_store]") {
   const auto wave = wall_surfaces(600, 1);
-  const std::size_t a_slot = field_store<Exec>::bytes_a_slot(24, false);
+  const std::size_t a_slot = field_store<Exec>::bytes_a_slot(kept_field_options().resolution, false);
   for (std::size_t budget : {std::size_t(0), a_slot - 1, a_slot, 3 * a_slot + 7, std::size_t(1) << 20}) {
     kept_field_options options;
     options.budget_bytes = budget;

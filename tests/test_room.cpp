@@ -121,7 +121,7 @@ TEST_CASE("room: recorded paths and the cache hold the light", "[room]") {
   settings set;
   set.samples = 3;
   set.paths = 60000;
-  set.resolution = 8;
+  set.slot_resolution = 8;
   set.budget_mib = 4.0;
   // Light from around the disk, and from elsewhere.
   const auto is_near = [&](const wall_point& place, vec3 direction) {
@@ -153,7 +153,7 @@ TEST_CASE("room: kept fields learn the light, alike in each run", "[room]") {
   wall_light light = even_light();
   light.disks.push_back({point_on(1, {0.3f, 0.4f}), 0.1f, 200.0f});
   settings set;
-  set.resolution = 8;
+  set.slot_resolution = 8;
   set.paths = 4000;
   wfpg::kept_guide_options options = wfpg_options(set, places.size());
   options.octree_resolution = 16;

@@ -127,8 +127,11 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(1, 1 << 28))
       ->capture_default_str();
   app.add_option("--resolution", set.resolution,
-                 "F: cells along a field's side, of wfpg; other designs have as many numbers")
+                 "cells along the side of a grid; other designs have as many numbers, but for wfpg's fields")
       ->check(CLI::Range(3, 128))
+      ->capture_default_str();
+  app.add_option("--slot-resolution", set.slot_resolution, "F: cells along the side of wfpg's fields")
+      ->check(CLI::Range(2, 128))
       ->capture_default_str();
   app.add_option("--budget", set.budget_mib, "MiB of wfpg's kept fields")
       ->check(CLI::Range(0.01, 4096.0))

@@ -3,6 +3,8 @@
 
 #include "places.hpp"
 
+#include <wfpg/guides/octree/options.hpp>
+
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -12,9 +14,11 @@ namespace room {
 
 /// How methods learn.
 struct settings {
-  std::uint32_t samples = 16;          ///< samples that train a method
-  std::size_t paths = 1u << 18;        ///< paths of a sample, each of one direction
-  std::uint32_t resolution = 24;       ///< F: cells along the side of a field
+  std::uint32_t samples = 16;     ///< samples that train a method
+  std::size_t paths = 1u << 18;   ///< paths of a sample, each of one direction
+  std::uint32_t resolution = 24;  ///< its square bounds the numbers of all designs but wfpg's fields
+  /// F: cells along the side of wfpg's fields.
+  std::uint32_t slot_resolution = wfpg::kept_field_options().resolution;
   double budget_mib = 24.0;            ///< of wfpg's kept fields
   float filter_alpha = 0.8f;           ///< of wfpg's fields, in cells
   float floor = 0.01f;                 ///< of wfpg's fields and of exact cells, of the mean

@@ -89,7 +89,7 @@ struct cube {
 /// Options of the guider of a method.
 inline wfpg::kept_guide_options wfpg_options(const settings& set, std::size_t places) {
   wfpg::kept_guide_options options;
-  options.kept.resolution = set.resolution;
+  options.kept.resolution = set.slot_resolution;
   options.kept.budget_bytes = static_cast<std::size_t>(set.budget_mib * 0x1p20);
   options.field.filter_alpha = set.filter_alpha;
   options.field.floor = set.floor;

@@ -31,7 +31,8 @@ WFPG_HD constexpr std::uint32_t refresh_cones(std::uint32_t resolution, std::uin
 /// has one cone, and casts another cell in each refresh. After `recast` refreshes every cell has been cast.
 ///
 /// From run to run the cell shifts by about the golden ratio of `recast`. The shift is odd where `recast` is
-/// even. So rows and columns are covered evenly.
+/// even. After each `recast` runs it shifts by one more, since rows may begin alike. So rows and columns are
+/// covered evenly.
 ///
 /// `cone`: in [0, refresh_cones()). `refresh`: any number, such as the field's builds. The last run may be
 /// shorter than the others.
@@ -40,7 +41,7 @@ WFPG_HD constexpr std::uint32_t refreshed_cell(std::uint32_t cone, std::uint32_t
   const std::uint32_t begin = cone * recast;
   const std::uint32_t length = min(recast, resolution * resolution - begin);
   const std::uint32_t shift = (5 * recast + 4) / 8 | (recast % 2 == 0 ? 1u : 0u);
-  return begin + (refresh + shift * (cone % recast)) % length;
+  return begin + (refresh + shift * (cone % recast) + cone / recast) % length;
 }
 
 /// Memory of all kept fields, as the kernels that build them see it. Trivially copyable.
@@ -63,6 +64,11 @@ struct kept_fields_view {
 /// Builds the fields of slots for a wave's rays. `Wave`: kept_field_wave.
 template <class Wave>
 struct kept_field_builder {
+  /// Cells over which a cone reads the cache. The filter spreads each cell over its neighbours anyway, and
+  /// larger nodes have more deposits. Variance with four instead of one is 2 to 5% less in ajar, bathroom and
+  /// veach-ajar; with 48² cells 29% less in ajar. In a room with small lights it is 6% more.
+  static constexpr float cells_a_node = 4.0f;
+
   Wave wave;              ///< rays, cache and options of the wave
   kept_fields_view kept;  ///< where fields are written
 
@@ -110,7 +116,7 @@ struct kept_field_builder {
                               ? origin_of(static_cast<std::uint32_t>(state.origin), state.key)
                               : kept.origins.get(slot, seed_of(state.key));
     if (!whole) origin.normal = kept.fields[slot].normal;
-    return {origin, kept.resolution};
+    return {origin, kept.resolution, cells_a_node};
   }
 
   /// Returns where a field of a key starts, if it starts at the surface of a ray of the wave. With ranks, the

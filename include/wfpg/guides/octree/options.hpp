@@ -44,7 +44,7 @@ struct light_guide_options {
 /// Resolution, memory and refresh of kept fields.
 struct kept_field_options {
   /// F: cells along a field's side, in [2, 128]. A field casts F² cones when it is new.
-  std::uint32_t resolution = 24;
+  std::uint32_t resolution = 32;
   /// R: a refresh casts one of R cones again, at least 1. At F² and above, one cone.
   std::uint32_t recast = 32;
   /// Bytes of all slots. One slot takes about 10 F² bytes, or 8 F² where fields do not learn.
