@@ -4,19 +4,18 @@
 usage: bench/guide_fractions.py DIRECTORY_OF_PROGRAMS OUT.json
 
 Four seeds render each scene on one thread with each method, the methods in turn. A variance is half of the mean difference of every
-two seeds' pictures. Seconds are the least of four.
+two seeds' pictures. Seconds are the least of four. An interrupted run resumes after the scenes that OUT has.
 """
 import itertools
 import statistics
 import sys
 import tempfile
 
-from programs import Programs, write_results
+from programs import Programs, SEEDS, begin_results, write_results
 
 SCENES = {"ajar": "", "thin-wall": "--max-depth 6", "glossy-room": "--nee off", "cornell-enclosed": "--nee off", "cornell-box": "",
           "outdoor": "", "materials": "", "furnace": ""}
 FRACTIONS = ("0.5", "0.7", "0.9")
-SEEDS = (1, 2, 3, 4)
 
 
 def methods():
@@ -43,13 +42,16 @@ def measure(programs, scene, options, samples):
 
 
 def main(directory, out):
-    scenes = {}
+    scenes = begin_results(out).get("scenes", {})
     with tempfile.TemporaryDirectory() as pictures:
         programs = Programs(directory, "128x128", pictures, "seq")
         for name, options in SCENES.items():
+            if name in scenes:
+                print(f"{name}: {out} has it", file=sys.stderr)
+                continue
             print(name, file=sys.stderr)
             scenes[name] = {samples: measure(programs, name, options, samples) for samples in ("16", "64")}
-    write_results(out, {"scenes": scenes})
+            write_results(out, {"scenes": scenes})
 
 
 if __name__ == "__main__":

@@ -12,6 +12,8 @@ import os
 import subprocess
 import sys
 
+from programs import begin_results
+
 SCENES = ("ajar", "cornell-enclosed --nee off")
 SETTINGS = "--size 96x96 --spp 64 --seeds 2 --reference-spp 2048".split()
 DEFAULT = "wfpg"
@@ -66,6 +68,7 @@ def summaries(results):
 
 
 def main(programs, out, folder, device="cpu"):
+    begin_results(out)  # before minutes of work
     settings = [*SETTINGS, "--device", device]
     command = ["--scenes", *SCENES, *settings, *methods()]
     subprocess.run([os.path.join(programs, "wfpg-quality"), *command, "--cache", os.path.join(folder, "cache"),
