@@ -16,8 +16,7 @@ vec3 direction_grid::direction(std::size_t cell, vec2 inside) const {
 std::optional<std::size_t> direction_grid::cell_of(vec3 direction) const {
   vec2 uv;
   if (!cells_.locate(direction, uv)) return std::nullopt;
-  const std::size_t x = cells_.grid().cell_along(uv.x), y = cells_.grid().cell_along(uv.y);
-  return y * static_cast<std::size_t>(resolution()) + x;
+  return cells_.grid().cell_of(uv);
 }
 
 vec3 direction_at(vec2 place) {

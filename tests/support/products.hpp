@@ -113,8 +113,7 @@ class made_product {
     std::vector<double> result(std::size_t(n) * n, 0.0);
     for (const product_draw& d : drawn_) {
       vec2 uv;
-      if (field_.locate(d.product.direction, uv))
-        result[field_.grid().cell_along(uv.y) * n + field_.grid().cell_along(uv.x)] += 1.0;
+      if (field_.locate(d.product.direction, uv)) result[field_.grid().cell_of(uv)] += 1.0;
     }
     return result;
   }

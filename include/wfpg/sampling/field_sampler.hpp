@@ -137,6 +137,9 @@ class grid_distribution {
     if (is_in_range(along, end)) return static_cast<std::uint32_t>(along);
     return along < 0.0f ? 0u : resolution_ - 1u;
   }
+  /// Row-major index, in [0, F²), of the cell that holds a point of [0,1]². Other points give a cell at the
+  /// border, as cell_along() does.
+  WFPG_HD std::uint32_t cell_of(vec2 uv) const { return cell_along(uv.y) * resolution_ + cell_along(uv.x); }
   /// Density at a point of [0,1]², per unit of the square's area. Its mean over the square is 1.
   WFPG_HD float pdf(vec2 uv) const { return density_of(weight(cell_along(uv.x), cell_along(uv.y))); }
 

@@ -75,7 +75,7 @@ class learnt_radiance_view {
     if (!(fields_[field].hemisphere() ? directional_field(grid, normal) : directional_field(grid))
              .locate(direction, uv))
       return false;
-    cell = (field * resolution_ + grid.cell_along(uv.y)) * resolution_ + grid.cell_along(uv.x);
+    cell = field * resolution_ * resolution_ + grid.cell_of(uv);
     return true;
   }
 

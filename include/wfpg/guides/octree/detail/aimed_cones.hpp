@@ -31,6 +31,7 @@ class aimed_cells {
   /// Bytes of scratch memory that a block needs.
   static constexpr std::size_t scratch_bytes = bright_node_constants::most * sizeof(std::uint32_t);
   /// Paths that a cone counts as where it hits its node. 4 paths leave a seventh more variance in wfpg-room.
+  /// As many as its cell has seen leave a fifth less there after 64 samples, and twice as much in veach-ajar.
   static constexpr std::uint32_t paths = 8;
 
   /// Finds the cell of each bright side, of those that face the field. `wanted`: false finds none. All
@@ -111,8 +112,7 @@ class aimed_cells {
     vec2 uv;
     if (!(square > 0.0f) || !(glm::dot(to, side.normal) < 0.0f)) return no_cell;
     if (!cells.domain.locate(to / sqrtf(square), uv)) return no_cell;
-    const grid_distribution grid(nullptr, cells.resolution);
-    return grid.cell_along(uv.y) * cells.resolution + grid.cell_along(uv.x);
+    return cells.domain.grid().cell_of(uv);
   }
 
   const bright_side* sides_;

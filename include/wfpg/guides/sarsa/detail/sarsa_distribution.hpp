@@ -39,9 +39,7 @@ struct sarsa_cell {
   WFPG_HD directional_field sphere() const { return directional_field(grid_distribution(sums, resolution)); }
   WFPG_HD std::uint32_t directions() const { return resolution * resolution; }
   WFPG_HD std::uint32_t index(vec3 direction) const {
-    const grid_distribution grid(sums, resolution);
-    const vec2 uv = sphere_to_square(direction);
-    return grid.cell_along(uv.y) * resolution + grid.cell_along(uv.x);
+    return grid_distribution(sums, resolution).cell_of(sphere_to_square(direction));
   }
 };
 
