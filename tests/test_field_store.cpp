@@ -206,7 +206,7 @@ std::vector<double> seen_through(const kept_box<Exec>& box, const directional_fi
   const std::uint32_t n = field.grid().resolution();
   const std::vector<wfpg::ray> cones = box.log.cones();
   const auto radiance =
-      evaluate(box.exec(), cones, look_through{box.box.cache.view(), 4.0f * field.cell_solid_angle()});
+      evaluate(box.exec(), cones, look_through{box.box.cache.view(), field.cell_solid_angle()});
   std::vector<double> seen(std::size_t(n) * n, -1.0);
   for (std::size_t i = 0; i < cones.size(); ++i)
     seen[cell_of(field, cones[i].direction)] = double(radiance[i]);

@@ -57,7 +57,11 @@ const std::vector<bad_option>& bad_options() {
       {"kept.budget_bytes", [](guider_options& o) { o.kept.budget_bytes = ~std::size_t(0); }},
       {"product_resolution", [](guider_options& o) { o.product_resolution = 3; }},
       {"product_resolution", [](guider_options& o) { o.product_resolution = 32; }},
-      {"kept.resolution", [](guider_options& o) { o.product_resolution = 16; }},  // 24 cells by default
+      {"kept.resolution",
+       [](guider_options& o) {
+         o.product_resolution = 16;
+         o.kept.resolution = 24;
+       }},
       {"field_resolution at a depth",
        [](guider_options& o) {
          o.fields = field_lifetime::transient;

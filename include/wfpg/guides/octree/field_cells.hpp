@@ -104,15 +104,11 @@ struct field_cells {
   field_origin origin;       ///< where cones start
   directional_field domain;  ///< maps directions; has no distribution yet
   std::uint32_t resolution;  ///< F: cells along a side
-  float footprint;           ///< solid angle of the cones for which find() chooses nodes, in steradians
 
-  /// `size`: F. `cells_a_node`: number of cells in a cone's footprint, positive. Precondition: the normal of
-  /// a hemisphere has unit length.
-  WFPG_HD field_cells(const field_origin& from, std::uint32_t size, float cells_a_node = 1.0f)
-      : origin(from), resolution(size) {
+  /// `size`: F. Precondition: the normal of a hemisphere has unit length.
+  WFPG_HD field_cells(const field_origin& from, std::uint32_t size) : origin(from), resolution(size) {
     const grid_distribution grid(nullptr, size);
     domain = from.hemisphere ? directional_field(grid, from.normal) : directional_field(grid);
-    footprint = cells_a_node * domain.cell_solid_angle();
   }
 
   /// Ray of one cell, from the field's origin. Its direction is jittered uniformly inside the cell. The
@@ -127,7 +123,7 @@ struct field_cells {
   }
 
   /// Returns what a cone found. `hit`: what the caster returned for `cone`. A hit takes the leaf nearest to
-  /// its point, then the ancestor whose size fits the footprint. It takes the side that faces the
+  /// its point, then the ancestor whose size fits the cone's footprint. It takes the side that faces the
   /// cone. A point without a leaf near it gives darkness. O(depth).
   WFPG_HD cone_hit find(const exitance_cache_view& cache, const ray& cone, const ray_hit& hit) const {
     if (!hit.is_hit()) return cone_hit::environment(hit.radiance);
@@ -135,7 +131,7 @@ struct field_cells {
     const node_id leaf = tree.nearest_leaf(cone.origin + hit.distance * cone.direction);
     if (leaf == invalid_node) return {};
     // The node's radiance is the mean over the cone's footprint: one cone needs one read.
-    const node_id node = tree.node_for_cone(leaf, hit.distance, footprint);
+    const node_id node = tree.node_for_cone(leaf, hit.distance, domain.cell_solid_angle());
     return cone_hit::surface(node, cache.side_facing(node, -cone.direction));
   }
 

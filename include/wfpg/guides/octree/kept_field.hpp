@@ -64,11 +64,6 @@ struct kept_fields_view {
 /// Builds the fields of slots for a wave's rays. `Wave`: kept_field_wave.
 template <class Wave>
 struct kept_field_builder {
-  /// Cells over which a cone reads the cache. The filter spreads each cell over its neighbours anyway, and
-  /// larger nodes have more deposits. Variance with four instead of one is 2 to 5% less in ajar, bathroom and
-  /// veach-ajar; with 48² cells 29% less in ajar. In a room with small lights it is 6% more.
-  static constexpr float cells_a_node = 4.0f;
-
   Wave wave;              ///< rays, cache and options of the wave
   kept_fields_view kept;  ///< where fields are written
 
@@ -116,7 +111,7 @@ struct kept_field_builder {
                               ? origin_of(static_cast<std::uint32_t>(state.origin), state.key)
                               : kept.origins.get(slot, seed_of(state.key));
     if (!whole) origin.normal = kept.fields[slot].normal;
-    return {origin, kept.resolution, cells_a_node};
+    return {origin, kept.resolution};
   }
 
   /// Returns where a field of a key starts, if it starts at the surface of a ray of the wave. With ranks, the

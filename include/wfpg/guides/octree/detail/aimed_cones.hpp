@@ -31,7 +31,7 @@ class aimed_cells {
   /// Bytes of scratch memory that a block needs.
   static constexpr std::size_t scratch_bytes = bright_node_constants::most * sizeof(std::uint32_t);
   /// Paths that a cone counts as where it hits its node. 4 paths leave a seventh more variance in wfpg-room.
-  /// As many as its cell has seen leave a fifth less there after 64 samples, and twice as much in veach-ajar.
+  /// As many as its cell has seen leave less there, and far more in veach-ajar.
   static constexpr std::uint32_t paths = 8;
 
   /// Finds the cell of each bright side, of those that face the field. `wanted`: false finds none. All
