@@ -193,21 +193,46 @@ TEST_CASE("rest: a guide rests between comparisons, and only where its gain is k
 
 TEST_CASE("rest: in noise less is asked for than of typical paths, but no less than guiding costs",
           "[rest]") {
-  const auto taken_part = [](float least_gain, double gain, std::uint32_t sample = 16) {
+  const auto taken_part = [](float least_gain, double gain) {
     rest_schedule schedule(least_gain, 1);
-    schedule.decide(sample, noisy_gain_of(gain, 10.0));
-    return schedule.resting() ? 0 : schedule.probes(sample + 1) ? 1 : 2;
+    schedule.decide(16, noisy_gain_of(gain, 10.0));
+    return schedule.resting() ? 0 : schedule.probes(17) ? 1 : 2;
   };
   for (const auto& [least_gain, enough] : std::vector<std::pair<float, double>>{
-           {1.1f, 0.95}, {1.25f, 0.95}, {1.5f, 1.2}, {1.7f, 1.4}, {2.5f, 1.4}}) {
+           {1.1f, 0.95}, {1.25f, 0.95}, {1.4f, 1.1}, {1.7f, 1.15}, {2.5f, 1.15}}) {
     INFO("least gain " << least_gain);
     CHECK(taken_part(least_gain, enough + 0.01) == 2);
     CHECK(taken_part(least_gain, enough - 0.01) == 1);
     CHECK(taken_part(least_gain, enough - 0.06) == 0);
   }
-  // At first guides still learn: in noise no more is asked for than of typical paths.
-  CHECK(taken_part(1.5f, 1.13, 4) == 1);
-  CHECK(taken_part(1.5f, 1.12, 4) == 0);
+}
+
+TEST_CASE("rest: the more noise, the less is asked for, from 1.25 times the square of the mean on",
+          "[rest]") {
+  const auto enough = [](float least_gain, double noise) {
+    return rest_schedule(least_gain, 1).enough(noise);
+  };
+  for (const double little : {0.0, 0.5, 1.25}) CHECK(enough(2.0f, little) == 2.0f);
+  CHECK(enough(2.0f, 1.5625) == Approx(1.6f));
+  CHECK(enough(2.0f, 2.0) == Approx(1.25f));
+  for (const double much : {2.5, 10.0, 50.0}) CHECK(enough(2.0f, much) == Approx(1.15f));
+  CHECK(enough(1.25f, 1.5625) == Approx(1.0f));
+  CHECK(enough(1.25f, 2.0) == Approx(0.95f));
+  CHECK(enough(2.0f, 51.0) == Approx(0.95f));
+
+  rest_schedule guides(2.0f, 1), probes(2.0f, 1), rests(2.0f, 1);
+  guides.decide(16, noisy_gain_of(1.61, 1.5625));
+  CHECK(!guides.guides_few(17));
+  probes.decide(16, noisy_gain_of(1.57, 1.5625));
+  CHECK(probes.probes(17));
+  rests.decide(16, noisy_gain_of(1.54, 1.5625));
+  CHECK(rests.resting());
+  // At first guides still learn: no more is asked for than without noise.
+  rest_schedule learns(2.0f, 1), gains_little(2.0f, 1);
+  learns.decide(4, noisy_gain_of(1.26, 1.5625));
+  CHECK(learns.probes(5));
+  gains_little.decide(4, noisy_gain_of(1.24, 1.5625));
+  CHECK(gains_little.resting());
 }
 
 TEST_CASE("rest: where few paths find light, a gain of about 1 is enough to go on", "[rest]") {
@@ -230,9 +255,11 @@ TEST_CASE("rest: longer paths have to gain more, and bright ones decide nothing"
   guiding_gain bright = calm_gain_of(1.1);
   bright.unguided_variance *= 100.0;
   CHECK(bright.typical_value() == Approx(1.1));
-  rest_schedule unmoved(2.5f, 1);
-  unmoved.decide(32, bright);
-  CHECK(unmoved.resting());
+  for (const std::uint32_t sample : {4u, 32u}) {
+    rest_schedule unmoved(2.5f, 1);
+    unmoved.decide(sample, bright);
+    CHECK(unmoved.resting());
+  }
   guiding_gain longer = calm_gain_of(3.0);
   longer.unguided_vertices = 2.0;
   longer.guided_vertices = 3.0;

@@ -31,16 +31,17 @@ struct rest_constants {
   /// From this sample on the whole of least_gain is asked for. Before, guides still learn. Sample i then asks
   /// for i / 16 of what least_gain exceeds 1 by.
   static constexpr std::uint32_t settled_samples = 16;
-  /// Variance of typical unguided paths, over the square of the mean, above which bright paths decide. They
-  /// hold most of what there is to gain, and a few thousand do not measure it.
-  static constexpr double much_noise = 2.0;
-  /// Gain that lets a guide take part in all paths there: so much less than least_gain, from least_in_noise
-  /// to most_in_noise. Bright paths gain more than typical ones.
+  /// Noise above which less is asked for, in inverse proportion. Bright paths then hold most of what there is
+  /// to gain, and a few thousand do not measure it. The noise is the variance of typical unguided paths, over
+  /// the square of their mean.
+  static constexpr double much_noise = 1.25;
+  /// Least gain that is asked for in noise: so much less than least_gain, from least_in_noise to
+  /// most_in_noise. Where guides cannot help, since lights are chosen badly, typical gains reach 1.05.
   static constexpr float hidden_in_noise = 0.3f;
-  static constexpr float least_in_noise = 0.95f;  ///< the least gain that is asked for in noise
-  static constexpr float most_in_noise = 1.4f;    ///< the most: guides still learn
-  /// Variance over the square of the mean above which no more than least_in_noise is asked for. So few paths
-  /// find light that a few thousand do not measure a gain.
+  static constexpr float least_in_noise = 0.95f;  ///< the least gain that is ever asked for
+  static constexpr float most_in_noise = 1.15f;   ///< a gain that is enough where noise is large
+  /// Noise above which no more than least_in_noise is asked for. So few paths find light that a few thousand
+  /// do not measure a gain.
   static constexpr double little_light = 50.0;
   /// A guide rests in noise where its gain is so much less than what lets it take part.
   static constexpr float slack_in_noise = 0.05f;
@@ -131,30 +132,30 @@ class rest_schedule {
         static_cast<float>(age_of(sample)) / static_cast<float>(rest_constants::settled_samples);
     return 1.0f + (least_gain_ - 1.0f) * min(part, 1.0f);
   }
-  /// Gain in noise that lets the guide take part in all paths. `finds_little`: whether the variance is above
-  /// rest_constants::little_light.
-  float enough_in_noise(bool finds_little) const {
-    if (finds_little) return rest_constants::least_in_noise;
-    return clamp(least_gain_ - rest_constants::hidden_in_noise, rest_constants::least_in_noise,
-                 rest_constants::most_in_noise);
+  /// Gain that lets the guide take part in all paths, at most least_gain. `noise`: of unguided paths, as
+  /// rest_constants::much_noise has it.
+  float enough(double noise) const {
+    if (noise > rest_constants::little_light) return rest_constants::least_in_noise;
+    const float least = clamp(least_gain_ - rest_constants::hidden_in_noise, rest_constants::least_in_noise,
+                              rest_constants::most_in_noise);
+    const double part = rest_constants::much_noise / max(noise, rest_constants::much_noise);
+    return max(static_cast<float>(part) * least_gain_, least);
   }
   /// Takes what was measured in a sample, which decides from the next one on. The guide takes part in all
-  /// paths where the gain is not known, or surely at least least_gain. It rests where the gain is less than
+  /// paths where the gain is not known, or surely at least enough(). It rests where the gain is less than
   /// threshold(), from last_doubt on also where it is not surely as much. Between them it takes part in as
-  /// many as before, and in few where it rested or the gain is in doubt. Noisy paths have limits of their
-  /// own: enough_in_noise(), and slack_in_noise below it where that is less than threshold(). Nothing is
-  /// decided before the first comparison. Precondition: compares(sample).
+  /// many as before, and in few where it rested or the gain is in doubt. In noise it rests where the gain is
+  /// less than enough() by slack_in_noise, if that is less than threshold(). Nothing is decided before the
+  /// first comparison. Precondition: compares(sample).
   void decide(std::uint32_t sample, const guiding_gain& measured) {
     if (age_of(sample) < rest_constants::first_comparison) return;
     weight_ = weight_of(measured);
-    const double gain = measured.typical_value(), mean = measured.unguided_mean;
-    const auto varies = [&](double times) { return measured.typical_unguided > times * mean * mean; };
-    const bool is_noisy = varies(rest_constants::much_noise),
-               finds_little = varies(rest_constants::little_light);
-    const double sure = finds_little ? gain : sure_gain(measured);
-    const float in_noise = enough_in_noise(finds_little), enough = is_noisy ? in_noise : least_gain_,
-                least = min(threshold(sample), is_noisy ? in_noise - rest_constants::slack_in_noise : enough);
-    if (!measured.is_known() || sure >= enough)
+    const double gain = measured.typical_value(), noise = noise_of(measured);
+    const double sure = noise > rest_constants::little_light ? gain : sure_gain(measured);
+    const float all = enough(noise),
+                slack = noise > rest_constants::much_noise ? rest_constants::slack_in_noise : 0.0f,
+                least = min(threshold(sample), all - slack);
+    if (!measured.is_known() || sure >= all)
       takes_part_ = part::in_all;
     else if ((age_of(sample) < rest_constants::last_doubt ? gain : sure) < least)
       takes_part_ = part::in_none;
@@ -226,6 +227,10 @@ class rest_schedule {
   // In how many paths the guide takes part. Numbers are those of the file.
   enum class part : std::uint32_t { in_none = 0, in_few = 1, in_all = 2 };
 
+  // Variance of typical unguided paths over the square of their mean; 0 where none is known.
+  static double noise_of(const guiding_gain& measured) {
+    return measured.typical_unguided / max(measured.unguided_mean * measured.unguided_mean, 1.0e-30);
+  }
   // The gain of typical paths without what chance may have added.
   static double sure_gain(const guiding_gain& measured) {
     const double doubt = max(measured.typical_error - rest_constants::small_error, 0.0);
