@@ -11,6 +11,9 @@
 #include <string>
 #include <vector>
 
+// Hosts instantiate guiders in one file of theirs, so that others compile sooner.
+template class wfpg::path_guider<wfpg::exec::seq, wfpg::irradiance_records<wfpg::exec::seq>>;
+
 namespace {
 
 using namespace wfpg_test;

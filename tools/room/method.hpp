@@ -19,10 +19,11 @@ struct settings {
   std::uint32_t resolution = 24;  ///< its square bounds the numbers of all designs but wfpg's fields
   /// F: cells along the side of wfpg's fields.
   std::uint32_t slot_resolution = wfpg::kept_field_options().resolution;
-  double budget_mib = 24.0;            ///< of wfpg's kept fields
-  float filter_alpha = 0.8f;           ///< of wfpg's fields, in cells
-  float floor = 0.01f;                 ///< of wfpg's fields and of exact cells, of the mean
-  std::size_t samples_a_leaf = 32000;  ///< of Open PGL
+  /// Of wfpg's kept fields.
+  double budget_mib = static_cast<double>(wfpg::kept_field_options().budget_bytes) / (1u << 20);
+  float filter_alpha = wfpg::field_options().filter_alpha;  ///< of wfpg's fields, in cells
+  float floor = wfpg::field_options().floor;                ///< of wfpg's fields and exact cells, of the mean
+  std::size_t samples_a_leaf = 32000;                       ///< of Open PGL
 };
 
 /// Measures of a method that has learnt one arrangement.

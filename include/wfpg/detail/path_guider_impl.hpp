@@ -82,7 +82,7 @@ void path_guider<Exec, Guide>::end_sample() {
     // The stage ends with this block, before the next one begins.
     const auto timed = clock_.time(stage::record);
     recorder_.close_paths(exec_);
-    if constexpr (Guide::measures_gain) measure();
+    measure();
     guide_.learn(now(), recorder_);
   }
   const auto timed = clock_.time(stage::cache);
@@ -100,14 +100,16 @@ void path_guider<Exec, Guide>::end_sample() {
 // an end_sample() that threw is called again, and would compare the sample with itself.
 template <class Exec, class Guide>
 void path_guider<Exec, Guide>::measure() {
-  if (measured_ || guide_.empty()) return;
-  if (rests_.is_unguided(samples_)) {
-    guide_.keep_unguided(exec_, recorder_, compared_, rests_.unguided_number(samples_));
-  } else if (rests_.compares(samples_) && is_guided(samples_)) {
-    gain_ = guide_.gain(exec_, recorder_, compared_).mean_with(gain_);
-    rests_.decide(samples_, gain_);
+  if constexpr (Guide::measures_gain) {
+    if (measured_ || guide_.empty()) return;
+    if (rests_.is_unguided(samples_)) {
+      guide_.keep_unguided(exec_, recorder_, compared_, rests_.unguided_number(samples_));
+    } else if (rests_.compares(samples_) && is_guided(samples_)) {
+      gain_ = guide_.gain(exec_, recorder_, compared_).mean_with(gain_);
+      rests_.decide(samples_, gain_);
+    }
+    measured_ = true;
   }
-  measured_ = true;
 }
 
 // Checks what prepare() and sample_directions() have in common. The latter checks `Random` and its outputs,
