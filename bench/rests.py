@@ -14,10 +14,10 @@ import tempfile
 
 from programs import SEEDS, Programs, begin_results, renderings_at_once, unguided_options, write_results
 
-BUILT_IN = {"ajar": "", "cornell-box": "", "cornell-enclosed": "--nee off", "furnace": "", "glossy-room": "--nee off",
+BUILT_IN = {"ajar": "", "cornell-box": "", "cornell-enclosed": "--nee off", "cornell-wall": "", "furnace": "", "glossy-room": "--nee off",
             "materials": "", "outdoor": "", "thin-wall": "--max-depth 6"}
 FILES = {"bathroom.glb": "", "cornell-box.glb": "", "staircase2.glb": "", "veach-ajar.glb": "", "veach-mis.glb": "--light-groups 1"}
-ON_CPUS_ALONE = ("cornell-enclosed", "furnace", "glossy-room", "thin-wall")
+ON_CPUS_ALONE = ("cornell-enclosed", "cornell-wall", "furnace", "glossy-room", "thin-wall")
 DEVICES = {"cpu": ("seq", "256x256"), "gpu": ("cuda", "1920x1080")}
 METHODS = ("pt", "wfpg")
 
