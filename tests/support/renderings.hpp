@@ -30,7 +30,7 @@ struct rendering {
   render::sampling_method method = render::sampling_method::wfpg;
   render::fields lifetime = render::fields::kept;
   render::guiding mode = render::guiding::oriented;
-  render::device where = render::device::cpu;
+  render::device where = render::device::seq;
   wfpg::sarsa_update update = wfpg::sarsa_update::sarsa;
   wfpg::sarsa_sampler sampler = wfpg::sarsa_sampler::mixed_rejection;
   render::cones through = render::cones::scene;
@@ -40,15 +40,22 @@ struct rendering {
 
   /// The number of independent renderings. Long ones have little noise and need fewer.
   int count() const { return precise && warmed_up ? renderings * 2 / 3 : renderings; }
-  /// Samples a pixel of one rendering.
+  /// Samples a pixel of one rendering. Precise ones have as many as a method's noise takes.
   int samples() const {
-    if (!precise) return warmed_up ? 64 : 12;
-    if (method == render::sampling_method::pt) return nee ? 96 : 192;  // rendered once for all checks
+    using render::sampling_method;
+    if (method == sampling_method::pt) {  // rendered once for all checks
+      // Few of its paths find light, so means of few samples are not nearly normal.
+      if (!precise) return scene == "cornell-enclosed" ? 96 : 12;
+      return nee ? 128 : 192;
+    }
     if (warmed_up) return 64;
-    if (method == render::sampling_method::bpt) return 48;
-    const bool noisy = mode == render::guiding::plain || method == render::sampling_method::records;
-    if (noisy) return nee ? 64 : 128;
-    return nee && method != render::sampling_method::sarsa ? 24 : 32;
+    if (!precise) return 12;
+    if (method == sampling_method::bpt) return 48;
+    if (method == sampling_method::records) return nee ? 64 : 48;
+    const bool kept = lifetime == render::fields::kept;
+    if (mode == render::guiding::plain) return nee && kept ? 32 : nee ? 48 : 64;
+    if (!nee || method == sampling_method::sarsa) return 32;
+    return kept ? 16 : 24;
   }
 
   render::render_options options() const {
@@ -128,7 +135,7 @@ inline tile_means render_tiles(const render::render_options& options, const std:
                                std::uint64_t first_seed, int count) {
   const render::scene world = make_test_scene(scene);
   std::vector<std::vector<double>> pictures(static_cast<std::size_t>(count));
-  const bool alone = options.where != render::device::cpu || render::is_openpgl(options.method);
+  const bool alone = options.where != render::device::seq || render::is_openpgl(options.method);
   const std::size_t at_once = alone ? 1 : 2;
   const auto render_from = [&](std::size_t first) {
     render::render_options own = options;
@@ -155,7 +162,10 @@ inline const tile_means& unguided_tiles(const rendering& like, int factor, int m
   rendering unguided{like.scene, like.nee, render::sampling_method::pt};
   unguided.precise = like.precise;
   render::render_options options = unguided.options();
-  if (max_depth > 0) options.max_depth = max_depth;
+  if (max_depth > 0) {
+    options.max_depth = max_depth;
+    options.spp /= 8;  // such light has little noise
+  }
   const auto first_seed = static_cast<std::uint64_t>(1000 * factor);
   return made.emplace(key, render_tiles(options, like.scene, first_seed, factor * renderings)).first->second;
 }
