@@ -42,7 +42,8 @@ inline std::unique_ptr<kernels::renderer> host_of(const render::scene& world, in
 /// The tiles of a picture's renderings, each of which goes on with what the guide has learnt before.
 inline tile_means tiles_of(const kernel_picture& what, bool guided, int factor = 1) {
   const auto host = host_of(what.world(), what.side, what.fog, guided,
-                            static_cast<std::uint64_t>(10 * factor + (guided ? 1 : 2)));
+                            static_cast<std::uint64_t>(10 * factor + (guided ? 1 : 2)),
+                            kernels::device::serial);  // such waves are too small to share
   const int samples = guided ? what.guided : what.unguided;
   tile_means result(tiles * tiles);
   for (int picture = 0; picture < factor * what.pictures; ++picture) {
