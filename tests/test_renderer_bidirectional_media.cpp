@@ -56,7 +56,7 @@ struct measured_set {
 /// Sets that find all light, and have noise without end nowhere. Light samples and splats alone have it
 /// where they are near a vertex in a medium. Radii are so small that walls, beyond which are no photons,
 /// darken merges by less than 0.2%.
-constexpr measured_set all_sets[] = {{"hits", 0.01f, 24},
+constexpr measured_set all_sets[] = {{"hits", 0.01f, 100},
                                      {"hits+nee", 0.01f, 24},
                                      {"hits+nee+connect", 0.01f, 52},
                                      {"hits+splat", 0.01f, 26},
