@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-// Hosts instantiate guiders in one file of theirs, so that others compile sooner.
+// All members compile, as a host's explicit instantiation needs.
 template class wfpg::path_guider<wfpg::exec::seq, wfpg::irradiance_records<wfpg::exec::seq>>;
 
 namespace {

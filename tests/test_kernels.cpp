@@ -93,12 +93,12 @@ TEST_CASE("kernels: a bias of 1% shows, with fog and without", "[kernels][unbias
   check_kernels({"bright-room", 0.2f, 12, 12, 48}, true);
 }
 
-// Takes half an hour, so that it runs by name alone.
+// Takes long, so that it runs by name alone.
 TEST_CASE("kernels: guided pictures have the mean of unguided ones to 0.2%", "[.long]") {
   const kernel_picture what = GENERATE(
       kernel_picture{"materials", 0.0f, 24, 24, 64}, kernel_picture{"cornell-enclosed", 0.0f, 180, 400, 64},
       kernel_picture{"cornell-enclosed", 0.1f, 300, 600, 64}, kernel_picture{"ajar", 0.0f, 400, 3000, 64});
-  const tile_means truth = tiles_of(what, false), tested = tiles_of(what, true);
+  const auto [truth, tested] = both_tiles_of(what);
   std::printf("%s, fog %g: unguided %.5f +- %.3f%%, guided %.5f +- %.3f%%; tiles +- %.2f%% and %.2f%%\n",
               what.scene.c_str(), static_cast<double>(what.fog), truth.picture_mean(),
               100.0 * wfpg_test::error_of_picture(truth), tested.picture_mean(),

@@ -41,8 +41,8 @@ rendering with(const std::string& scene, const std::string& techniques) {
   return what;
 }
 
-// A spot of 1 W/sr one unit above a grey plane, and a camera that sees a square below it. The spot's cone is
-// a little wider than all that merges within a radius reach.
+// A spot of 1 W/sr one unit above a grey plane, and a camera that sees a square below it. The spot lights a
+// little more than what merges within `radius` reach.
 
 constexpr double half_plane = 4.0, reflectance = 0.5, half_view = 0.1;
 
@@ -151,7 +151,8 @@ TEST_CASE("merging blurs by its disc, with a bias that falls as the square of it
       options.techniques = render::techniques_of("surf");
       options.light.surface_radius = static_cast<float>(radius / scene_radius);
       options.light.radius_alpha = 1.0f;
-      // Noise falls with the number of photons. Each merges at each pixel, so few pixels cost least.
+      // Noise falls with the number of photons. Each merges at most of the pixels, so few of these cost
+      // least.
       options.width = options.height = 4;
       options.max_depth = 2;
       options.spp = radius > 0.3 ? 2500 : 10000;

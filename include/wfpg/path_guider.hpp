@@ -181,7 +181,7 @@ class path_guider {
   /// Whether the current sample is guided: unguided_samples are over, the guide is not empty, and it does not
   /// rest.
   bool guided() const { return is_guided(samples_); }
-  /// Whether the guide rests in the current sample, since guiding gained less than least_gain.
+  /// Whether the guide rests in the current sample, since guiding gained too little.
   bool resting() const { return rests_now_; }
   /// Whether the guide probes in the current sample, since it is not known whether guiding pays. Then few
   /// paths are recorded and guided: those that are compared.

@@ -28,20 +28,21 @@ struct rest_constants {
   /// The first sample that decides, counted from the first that is compared. Guides have learnt little
   /// before.
   static constexpr std::uint32_t first_comparison = 4;
-  /// From this sample on the whole of least_gain is asked for. Before, guides still learn. Sample i then asks
-  /// for i / 16 of what least_gain exceeds 1 by.
+  /// From this sample on the whole of least_gain is asked for where noise is small. Before, guides still
+  /// learn. Sample i then asks for i / 16 of what least_gain exceeds 1 by.
   static constexpr std::uint32_t settled_samples = 16;
   /// Noise above which less is asked for, in inverse proportion. Bright paths then hold most of what there is
-  /// to gain, and a few thousand do not measure it. The noise is the variance of typical unguided paths, over
+  /// to gain, and a few thousand do not measure it. The noise is the typical variance of unguided paths, over
   /// the square of their mean.
   static constexpr double much_noise = 1.25;
-  /// Least gain that is asked for in noise: so much less than least_gain, from least_in_noise to
-  /// most_in_noise. Where guides cannot help, since lights are chosen badly, typical gains reach 1.05.
+  /// Noise lowers what is asked for no further than by this, but to most_in_noise where that is less. It
+  /// never goes below least_in_noise.
   static constexpr float hidden_in_noise = 0.3f;
-  static constexpr float least_in_noise = 0.95f;  ///< the least gain that is ever asked for
-  static constexpr float most_in_noise = 1.15f;   ///< a gain that is enough where noise is large
-  /// Noise above which no more than least_in_noise is asked for. So few paths find light that a few thousand
-  /// do not measure a gain.
+  static constexpr float least_in_noise = 0.95f;  ///< least value of rest_schedule::enough()
+  /// Above what guides reach where they cannot help: a gain of 1.05 where lights are chosen badly.
+  static constexpr float most_in_noise = 1.15f;
+  /// Noise above which no more than least_in_noise is asked for. Few paths then find light, and a few
+  /// thousand do not measure a gain.
   static constexpr double little_light = 50.0;
   /// A guide rests in noise where its gain is so much less than what lets it take part.
   static constexpr float slack_in_noise = 0.05f;
@@ -126,7 +127,8 @@ class rest_schedule {
     return age == first - 1 || (age >= first && (age & (age - 1)) == 0);
   }
 
-  /// Least gain for which the guide goes on after a sample that is compared; at least 1.
+  /// Least gain for which the guide goes on after a sample that is compared, where noise is small; at
+  /// least 1.
   float threshold(std::uint32_t sample) const {
     const float part =
         static_cast<float>(age_of(sample)) / static_cast<float>(rest_constants::settled_samples);
@@ -138,8 +140,8 @@ class rest_schedule {
     if (noise > rest_constants::little_light) return rest_constants::least_in_noise;
     const float least = clamp(least_gain_ - rest_constants::hidden_in_noise, rest_constants::least_in_noise,
                               rest_constants::most_in_noise);
-    const double part = rest_constants::much_noise / max(noise, rest_constants::much_noise);
-    return max(static_cast<float>(part) * least_gain_, least);
+    const double lowered = rest_constants::much_noise / max(noise, rest_constants::much_noise);
+    return max(static_cast<float>(lowered) * least_gain_, least);
   }
   /// Takes what was measured in a sample, which decides from the next one on. The guide takes part in all
   /// paths where the gain is not known, or surely at least enough(). It rests where the gain is less than

@@ -116,7 +116,7 @@ struct guider_statistics {
   /// Samples begun after the first unguided_samples, where the guide can guide and did not rest. Of these,
   /// samples that are compared, or begin after light was forgotten, may be unguided.
   std::uint32_t guided_samples = 0;
-  /// Samples begun in which the guide rested, since guiding gained less than least_gain.
+  /// Samples begun in which the guide rested, since guiding gained too little.
   std::uint32_t rested_samples = 0;
   /// Mean of the comparisons of guided samples with an unguided one. Each weighs half of the one after it.
   guiding_gain gain;
