@@ -36,7 +36,6 @@ render_options small(const rendering& what, int spp) {
   options.width = 24;
   options.height = 16;
   options.spp = spp;
-  options.where = device::cpu;
   options.kept.budget_bytes = std::size_t(1) << 18;
   return options;
 }

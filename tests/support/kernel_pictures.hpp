@@ -28,8 +28,7 @@ struct kernel_picture {
 
 /// The host's renderer of a picture of `side` by `side` pixels.
 inline std::unique_ptr<kernels::renderer> host_of(const render::scene& world, int side, float fog,
-                                                  bool guided, std::uint64_t seed,
-                                                  kernels::device where = kernels::device::tbb) {
+                                                  bool guided, std::uint64_t seed, kernels::device where) {
   kernels::settings wanted;
   wanted.width = wanted.height = side;
   wanted.max_depth = 6;

@@ -30,7 +30,7 @@ struct rendering {
   render::sampling_method method = render::sampling_method::wfpg;
   render::fields lifetime = render::fields::kept;
   render::guiding mode = render::guiding::oriented;
-  render::device where = render::device::seq;
+  render::device where = render::device::cpu;
   wfpg::sarsa_update update = wfpg::sarsa_update::sarsa;
   wfpg::sarsa_sampler sampler = wfpg::sarsa_sampler::mixed_rejection;
   render::cones through = render::cones::scene;
@@ -52,10 +52,9 @@ struct rendering {
     if (!precise) return 12;
     if (method == sampling_method::bpt) return 48;
     if (method == sampling_method::records) return nee ? 64 : 48;
-    const bool kept = lifetime == render::fields::kept;
-    if (mode == render::guiding::plain) return nee && kept ? 32 : nee ? 48 : 64;
-    if (!nee || method == sampling_method::sarsa) return 32;
-    return kept ? 16 : 24;
+    const bool noisy = !nee || method == sampling_method::sarsa, kept = lifetime == render::fields::kept;
+    const int oriented = noisy ? 32 : kept ? 16 : 24;
+    return mode == render::guiding::plain ? 2 * oriented : oriented;
   }
 
   render::render_options options() const {
@@ -65,7 +64,7 @@ struct rendering {
     options.lifetime = lifetime;
     options.mode = mode;
     options.through = through;
-    options.where = render::is_openpgl(method) ? render::device::cpu : where;  // it runs on TBB alone
+    options.where = where;
     options.width = options.height = tiles * tile_pixels;
     options.max_depth = 6;
     options.spp = samples();
@@ -130,15 +129,16 @@ inline std::vector<double> tiles_of(const render::image& picture) {
 }
 
 /// Tiles of renderings with `count` seeds from `first_seed` on. Other seeds are independent. Such small waves
-/// keep one core busy, so two pictures are rendered at once.
+/// keep one core busy, so two pictures are rendered at once, each by one thread.
 inline tile_means render_tiles(const render::render_options& options, const std::string& scene,
                                std::uint64_t first_seed, int count) {
   const render::scene world = make_test_scene(scene);
   std::vector<std::vector<double>> pictures(static_cast<std::size_t>(count));
-  const bool alone = options.where != render::device::seq;
+  const bool alone = options.where != render::device::cpu || render::is_openpgl(options.method);
   const std::size_t at_once = alone ? 1 : 2;
   const auto render_from = [&](std::size_t first) {
     render::render_options own = options;
+    if (!alone) own.where = render::device::seq;
     for (std::size_t i = first; i < pictures.size(); i += at_once) {
       own.seed = first_seed + i;
       pictures[i] = tiles_of(render::render(world, own, {}).picture);
