@@ -317,9 +317,9 @@ TEST_CASE("truncated, altered and foreign guide files have different errors", "[
   for (const std::string& foreign : {std::string(), std::string("\x89PNG\r\n\x1a\n................"),
                                      std::string(1000, '\0'), std::string("glTF"), bytes.substr(1)})
     CHECK(fault(foreign, options) == "wfpg: the guide is not a guide file");
-  CHECK(fault(with_version(bytes, 8), options) ==
-        "wfpg: the guide is of version 8, expected 7 or older: a newer wfpg wrote it");
-  CHECK(fault(with_version(bytes, 2), options) == "wfpg: the guide is of version 2, expected 7");
+  CHECK(fault(with_version(bytes, 9), options) ==
+        "wfpg: the guide is of version 9, expected 8 or older: a newer wfpg wrote it");
+  CHECK(fault(with_version(bytes, 2), options) == "wfpg: the guide is of version 2, expected 8");
   for (const std::size_t at : {8u, 11u, 12u}) {
     std::string altered = bytes;
     altered[at] = static_cast<char>(altered[at] ^ 1);
@@ -445,8 +445,11 @@ TEST_CASE("the content of a guide file is checked, even if its checksums are rig
   refused("counts", 20, 4, 3, "has rests that no guider has");
   refused("counts", 24, 4, 0, "has rests that no guider has");
   refused("counts", 28, 4, 0x3f000000u, "has rests that no guider has");
-  refused("counts", 40, 8, nan, "has a gain out of range");
-  refused("counts", 96, 8, nan, "has a gain out of range");
+  refused("counts", 32, 4, 4, "has rests that no guider has");
+  refused("counts", 36, 4, 0x3f000000u, "has rests that no guider has");
+  refused("counts", 40, 4, 0x3f000000u, "has rests that no guider has");
+  refused("counts", 52, 8, nan, "has a gain out of range");
+  refused("counts", 108, 8, nan, "has a gain out of range");
   refused("paths", 0, 4, 2 * nodes, "has paths from no node");
   for (const std::size_t at : {8u, 20u, 24u})
     refused("paths", at, 4, infinity, "has radiance that is not finite");

@@ -318,6 +318,25 @@ TEST_CASE("any number of ranks probes, compares and rests alike", "[ranks]") {
   }
 }
 
+TEST_CASE("any number of ranks waits alike where paths have little noise", "[ranks]") {
+  rank_run<kept_guide_options> run{ranks_options(), 34, 6011};
+  run.options.least_gain = 2.0f;
+  run.ambient = 4.0f;
+  const finding alone = found_by<one_policy>(reference, run);
+  CHECK(alone.statistics.gain.paths > wfpg::guiding_gain::least_paths);
+  CHECK(alone.statistics.rested_samples >= 26);  // samples 3 to 28
+  for (const std::uint32_t n : {1u, 3u}) {
+    CAPTURE(n);
+    CHECK((found_by<one_policy>(n, run) == alone));
+  }
+  run.ends = {7, 8, 3000};
+  for (const std::uint32_t saved_after : {2u, 10u, 30u}) {
+    CAPTURE(saved_after);
+    run.resumed_after = saved_after;
+    CHECK((found_by<one_policy>(4, run) == alone));
+  }
+}
+
 TEST_CASE("ranks build equal fields under every option", "[ranks]") {
   for (const std::uint32_t kind : {0u, 1u, 2u, 3u, 4u}) {
     CAPTURE(kind);

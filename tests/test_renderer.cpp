@@ -213,7 +213,7 @@ struct guiders_that_rest {
   static constexpr int side = 96;
   static constexpr std::uint32_t max_depth = 5;
 
-  scene world = make_builtin_scene("cornell-box");
+  scene world = make_builtin_scene("cornell-wall");
   device_scene<exec_policy> geometry{exec_policy(), world};
 
   static setup of_samples(std::uint32_t samples) { return {side, max_depth, true, 5, samples}; }
@@ -263,6 +263,7 @@ TEST_CASE("samples in which a guide rests have the bits of their waves", "[rende
   // A batch caster's paths wait for each other in all samples.
   const traced waves = trace_all<exec_policy, batch_caster>(guiders.world, with, guiders.make());
   CHECK(rests.resting());
+  CHECK(rests.statistics().gain.paths > wfpg::guiding_gain::least_paths);
   CHECK(whole.ends_in_one_kernel);
   CHECK(!waves.has_whole_paths);
   CHECK(same_bits(whole.picture, waves.picture));

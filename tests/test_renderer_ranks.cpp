@@ -140,7 +140,7 @@ TEST_CASE("Threads as ranks learn one guide", "[renderer][ranks]") {
 TEST_CASE("Threads as ranks learn one guide that probes and then rests", "[renderer][ranks]") {
   const rank_split split = GENERATE(rank_split::tiles, rank_split::samples);
   const fields lifetime = GENERATE(fields::kept, fields::transient);
-  const scene world = make_builtin_scene("cornell-box");
+  const scene world = make_builtin_scene("cornell-wall");
   render_options options = options_of(sampling_method::wfpg, split);
   // A wave has enough paths that a part of those that are recorded is compared.
   options.width = options.height = split == rank_split::tiles ? 104 : 60;
@@ -151,6 +151,7 @@ TEST_CASE("Threads as ranks learn one guide that probes and then rests", "[rende
   options.spp = split == rank_split::tiles ? 9 : 27;
   const render_result one = by_threads(world, options, 1);
   CHECK(one.report.rest.rested > 0);
+  CHECK(one.report.rest.gain.paths > wfpg::guiding_gain::least_paths);
   for (const std::size_t ranks : {std::size_t(2), std::size_t(3)}) {
     const render_result shared = by_threads(world, options, ranks);
     INFO(ranks << " ranks");

@@ -71,12 +71,12 @@ wfpg::kept_guide_options rest_options() {
 }
 
 /// Probabilities of unguided and of guided paths. The variance of a pixel is its squared mean times
-/// 1 / probability - 1.
+/// 1 / probability - 1. Unguided ones are noisy enough to be compared at once.
 struct chances {
   float unguided, guided;
 };
-constexpr chances gains_much{0.25f, 0.5f}, gains_surely{0.5f, 0.75f}, gains_more{0.5f, 0.9f},
-    loses{0.5f, 0.4f};
+constexpr chances gains_much{0.25f, 0.5f}, gains_surely{0.48f, 0.7347f}, gains_more{0.48f, 0.8926f},
+    loses{0.48f, 0.381f};
 
 template <class Exec, class Guide>
 void take_sample(const Exec& exec, wfpg::path_guider<Exec, Guide>& guider, std::uint32_t sample, chances p,
@@ -206,7 +206,7 @@ WFPG_TEST_CASE("rest: a host that gives pixels other indices in each sample is n
   CHECK(guider.statistics().rested_samples == 0);
 }
 
-/// Records paths whose gain is 1. One of 500 is so bright that it holds most of the variance.
+/// Records paths whose gain is 1. One of 1000 is so bright that it holds most of the variance.
 struct record_bright_paths {
   wfpg::path_recorder_view recorder;
   std::uint32_t sample, seed;
@@ -216,30 +216,34 @@ struct record_bright_paths {
     const wall_path at = wall_path::of(path);
     const vec2 u = wfpg::unit_vec2(wfpg::hash(wfpg::hash(wfpg::hash(3u, seed), sample), path));
     recorder.vertex(i, 0, at.position, at.normal, 1.0f);
-    recorder.radiance(i, 0, at.mean * (u.x < 0.002f ? 12.0f : 0.8f + 0.4f * u.y));
+    recorder.radiance(i, 0, at.mean * (u.x < 0.001f ? 12.0f : 0.8f + 0.4f * u.y));
   }
 };
 
 /// Gains of the first comparison, their errors, and how many guiders of `seeds` seeds guide all paths at some
-/// time in 16 samples. `by_gain`: how many would by their gains alone.
+/// time in 16 samples. `by_gain`: how many would by their gains alone. Comparisons begin after as many
+/// samples as guides wait in little noise.
 struct bright_gains {
   std::vector<double> logarithms, errors;
   std::uint32_t guide_all = 0, by_gain = 0;
 };
 template <class Exec>
 bright_gains gains_of_bright_paths(const Exec& exec, std::uint32_t seeds) {
+  constexpr std::uint32_t before = wfpg::rest_constants::longest_wait;
   bright_gains result;
   for (std::uint32_t seed = 0; seed < seeds; ++seed) {
-    wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), rest_options());
+    wfpg::kept_guide_options options = rest_options();
+    options.unguided_samples = before + 1;
+    wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), options);
     bool guides_all = false, gains = false;
-    for (std::uint32_t sample = 1; sample <= 16; ++sample) {
+    for (std::uint32_t sample = 1; sample <= before + 16; ++sample) {
       guider.begin_sample();
       guides_all |= guider.guided() && !guider.probing();
       exec.for_each(path_count, record_bright_paths{guider.recorder(), sample, seed});
       guider.end_sample();
       const guiding_gain gain = guider.statistics().gain;
-      gains |= sample >= 4 && gain.typical_value() >= 1.25;
-      if (sample != 4) continue;
+      gains |= sample >= before + 4 && gain.typical_value() >= 1.25;
+      if (sample != before + 4) continue;
       result.logarithms.push_back(std::log(gain.typical_value()));
       result.errors.push_back(gain.typical_error);
     }
@@ -264,6 +268,55 @@ WFPG_TEST_CASE("rest: a gain's error is known, and few bright paths let no guide
   INFO(found.guide_all << " guide all paths, " << found.by_gain << " by their gains alone");
   CHECK(found.by_gain > seeds / 4);
   CHECK(found.guide_all <= seeds / 10);
+}
+
+WFPG_TEST_CASE("rest: in little noise a guide waits for 28 samples, and less where samples have more paths",
+               "[rest]") {
+  const Exec exec;
+  constexpr chances calm{0.6f, 0.8571f};  // a gain of 4
+  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), rest_options());
+  CHECK(guided_samples(exec, guider, 1, 40, calm) == numbers{31, 32, 33, 34, 35, 36, 37, 38, 39, 40});
+  CHECK(guider.statistics().rested_samples == 26);
+  CHECK(guider.statistics().guided_samples == 13);
+
+  wfpg::kept_guide_options large = rest_options();
+  large.max_paths = std::size_t(1) << 19;
+  wfpg::path_guider<Exec> of_many(exec, box_mesh<Exec>(exec).view(), large);
+  numbers guided;
+  for (std::uint32_t sample = 1; sample <= 8; ++sample) {
+    take_sample(exec, of_many, sample, calm, 1u << 19);
+    if (of_many.guided()) guided.push_back(sample);
+  }
+  CHECK(guided == numbers{7, 8});
+}
+
+WFPG_TEST_CASE("rest: two unguided samples show the unguided part of a gain, one shows none", "[rest]") {
+  const Exec exec;
+  wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), rest_options());
+  take_sample(exec, guider, 1, gains_much);
+  const wfpg::exitance_cache_view cache = guider.guide().cache();
+  wfpg::path_recorder<Exec> recorder(exec, {path_count, 2});
+  wfpg::gain_meter<Exec> meter(exec, path_count);
+  const auto keep = [&](std::uint32_t number) {
+    recorder.begin_sample(exec, 0, true);
+    exec.for_each(path_count, record_wall_paths{recorder.view(), number + 1, gains_much.unguided, 0});
+    recorder.close_paths(exec);
+    const guiding_gain found = meter.keep_unguided(exec, recorder, {}, cache, number);
+    recorder.clear(exec);
+    return found;
+  };
+  CHECK(keep(0).paths == 0);
+  const guiding_gain found = keep(1);
+  const std::vector<float> scales = evaluate(exec, std::size_t(path_count), scale_of_path{cache});
+  CHECK(found.paths == path_count);
+  CHECK(found.unguided_variance ==
+        Approx(brute_force(scales, {1, 2}, 1, 2, gains_much).unguided_variance).epsilon(1.0e-4));
+  CHECK(found.unguided_variance !=
+        Approx(brute_force(scales, {1, 2}, 1, 2, gains_much, 1.01).unguided_variance).epsilon(1.0e-4));
+  CHECK(found.guided_variance == 0.0);
+  // By the probability 3, times the spread of means over their units.
+  CHECK(found.noise() > 2.5);
+  CHECK(found.noise() < 4.0);
 }
 
 template <class Exec, class Options>
@@ -311,7 +364,8 @@ WFPG_TEST_CASE("rest: unset, least_gain follows the triangles on CPUs, also of a
   const Exec exec;
   wfpg::kept_guide_options options = rest_options();
   options.least_gain.reset();
-  constexpr chances gains_two{0.5f, 0.6667f};  // a gain of 2: more than 1.75, less than 2.26 for 12 triangles
+  constexpr chances gains_two{0.48f,
+                              0.6487f};  // a gain of 2: more than 1.75, less than 2.26 for 12 triangles
   const box_mesh<Exec> mesh(exec);
   const auto rests_after = [&](wfpg::path_guider<Exec>& guider, std::uint32_t first) {
     guided_samples(exec, guider, first, 17, gains_two);
@@ -402,6 +456,23 @@ WFPG_TEST_CASE("rest: choices of lights learn while the guide rests, where they 
   CHECK(evaluate(exec, find_lights{guider.lights(), 1}) > 0.7f);
 }
 
+WFPG_TEST_CASE("rest: choices of lights learn while a guide waits, and are by weight in very little noise",
+               "[rest]") {
+  const Exec exec;
+  for (const bool is_noisy : {true, false}) {
+    wfpg::path_guider<Exec> guider =
+        guider_of_lights(exec, 1.25f, 2, is_noisy ? chances{0.6f, 0.5f} : chances{0.95f, 0.9f}, {1.0f, 3.0f});
+    for (int sample = 3; sample < 6; ++sample) {
+      guider.begin_sample();
+      REQUIRE(guider.resting());
+      exec.for_each(path_count, deposit_lights{guider.lights()});
+      guider.end_sample();
+    }
+    const float second = evaluate(exec, find_lights{guider.lights(), 1});
+    CHECK((is_noisy ? second > 0.9f : second == 0.75f));
+  }
+}
+
 WFPG_TEST_CASE("rest: choices of lights are by weight where nothing is gained, but for compared samples",
                "[rest]") {
   const Exec exec;
@@ -475,6 +546,16 @@ WFPG_TEST_CASE("rest: a guide wakes up where light, geometry or the camera moved
       CHECK(!guider.resting());
     }
     CHECK(guided_samples(exec, guider, 13, 40, gains_much).size() == 28);
+
+    guider_type waiting(exec, box_mesh<Exec>(exec).view(), rest_options());
+    guided_samples(exec, waiting, 1, 10, {0.6f, 0.5f});
+    REQUIRE(waiting.resting());
+    move(waiting);
+    for (const std::uint32_t sample : {11u, 12u}) {
+      take_sample(exec, waiting, sample, gains_much);
+      CHECK(!waiting.resting());
+    }
+    CHECK(guided_samples(exec, waiting, 13, 40, gains_much).size() == 28);
   }
 }
 
@@ -487,15 +568,24 @@ std::string saved(const wfpg::path_guider<Exec>& guider) {
 
 WFPG_TEST_CASE("rest: a guide that is saved and loaded goes on as it would have", "[rest]") {
   const Exec exec;
-  for (const std::uint32_t until : {1u, 3u, 6u, 8u, 20u}) {
+  constexpr chances waits{0.6f, 0.5f};
+  for (const auto& [until, p] : std::vector<std::pair<std::uint32_t, chances>>{{1, loses},
+                                                                               {3, loses},
+                                                                               {6, loses},
+                                                                               {8, loses},
+                                                                               {20, loses},
+                                                                               {2, waits},
+                                                                               {28, waits},
+                                                                               {30, waits}}) {
     wfpg::path_guider<Exec> guider(exec, box_mesh<Exec>(exec).view(), rest_options());
-    guided_samples(exec, guider, 1, until, loses);
+    guided_samples(exec, guider, 1, until, p);
     const std::string bytes = saved(guider);
     std::istringstream in(bytes);
     wfpg::path_guider<Exec> loaded = wfpg::load_guide(exec, in, rest_options());
     CHECK(saved(loaded) == bytes);
-    CHECK(guided_samples(exec, loaded, until + 1, 40, loses) ==
-          guided_samples(exec, guider, until + 1, 40, loses));
+    CHECK(loaded.guided() == guider.guided());
+    CHECK(loaded.resting() == guider.resting());
+    CHECK(guided_samples(exec, loaded, until + 1, 40, p) == guided_samples(exec, guider, until + 1, 40, p));
     CHECK(saved(loaded) == saved(guider));
   }
 }

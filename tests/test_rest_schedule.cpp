@@ -234,6 +234,131 @@ TEST_CASE("rest: the more noise, the less is asked for, from 1.25 times the squa
   CHECK(gains_little.resting());
 }
 
+/// What unguided paths of this noise show.
+guiding_gain unguided_of(double noise) {
+  guiding_gain gain;
+  gain.paths = guiding_gain::least_paths;
+  gain.unguided_mean = 0.5;
+  gain.typical_unguided = 0.25 * noise;
+  return gain;
+}
+
+TEST_CASE("rest: in little noise a guide waits for two million paths, at most 28 samples", "[rest]") {
+  const auto begins_at = [](double noise, std::size_t paths, std::uint32_t sample = 2) {
+    rest_schedule schedule(1.25f, 1);
+    schedule.see_unguided(sample, unguided_of(noise), paths);
+    return schedule.unguided_sample();
+  };
+  CHECK(begins_at(1.24, 10000) == 29);
+  CHECK(begins_at(1.26, 10000) == 1);
+  CHECK(begins_at(0.0, 1u << 18) == 9);
+  CHECK(begins_at(0.0, (1u << 18) + 1) == 9);
+  CHECK(begins_at(0.0, (1u << 18) - 1) == 10);
+  CHECK(begins_at(0.0, 1u << 19) == 5);
+  CHECK(begins_at(0.0, 1u << 20) == 1);  // two samples have as many paths
+  CHECK(begins_at(0.0, std::size_t(1) << 40) == 1);
+  CHECK(begins_at(0.0, 10000, 1) == 1);
+  guiding_gain few = unguided_of(0.5);
+  --few.paths;
+  guiding_gain dark = unguided_of(0.5), no_number = dark;
+  dark.unguided_mean = dark.typical_unguided = 0.0;  // light was not found yet
+  no_number.typical_unguided = std::nan("");
+  for (const guiding_gain& unknown : {few, dark, no_number}) {
+    rest_schedule schedule(1.25f, 1);
+    schedule.see_unguided(2, unknown, 10000);
+    CHECK(!schedule.resting());
+  }
+
+  rest_schedule schedule(1.25f, 1);
+  schedule.see_unguided(2, unguided_of(0.5), 10000);
+  CHECK(schedule.weight() == 1.0f);
+  CHECK(samples_where(70, [&](std::uint32_t s) { return s > 2 && !schedule.rests(s); }) ==
+        numbers{29, 30, 31, 32, 36, 44, 60});
+  CHECK(samples_where(70, [&](std::uint32_t s) { return s > 2 && schedule.probes(s); }) ==
+        numbers{29, 30, 31, 32, 36, 44, 60});
+  CHECK(samples_where(70, [&](std::uint32_t s) { return schedule.is_unguided(s); }) == numbers{1, 2, 29, 30});
+  CHECK(!schedule.rests(2));
+  schedule.see_unguided(30, unguided_of(0.5), 10000);  // it waits once
+  CHECK(schedule.unguided_sample() == 29);
+  schedule.decide(32, calm_gain_of(3.0));
+  CHECK(!schedule.guides_few(33));
+
+  rest_schedule late(1.25f, 29);  // more samples were made than it would wait for
+  late.see_unguided(30, unguided_of(0.5), 10000);
+  CHECK(!late.resting());
+}
+
+TEST_CASE("rest: choices of lights rest where they gain little, or where little noise is left", "[rest]") {
+  const auto waits = [](double noise) {
+    rest_schedule schedule(1.25f, 1);
+    schedule.see_unguided(2, unguided_of(noise), 10000);
+    return schedule;
+  };
+  CHECK(waits(0.24).lights_rest({}));
+  CHECK(!waits(0.26).lights_rest({}));
+  const auto rest_after = [&](double first, double learnt, double gain) {
+    rest_schedule schedule = waits(first);
+    schedule.see_unguided(30, unguided_of(learnt), 10000);
+    schedule.decide(32, gain_of(gain));
+    return schedule.lights_rest(gain_of(gain));
+  };
+  // Half of what was seen first was without what was learnt: 0.9 is the mean of 1.0 and 0.8.
+  CHECK(!rest_after(0.901, 0.8, 1.0));
+  CHECK(rest_after(0.899, 0.8, 1.0));
+  CHECK(!rest_after(0.899, 0.8, 1.01));
+  CHECK(rest_after(0.8, 0.9, 1.24));   // they lost by chance alone
+  CHECK(rest_after(0.24, 0.1, 1.24));  // they rested meanwhile
+  CHECK(!rest_after(0.24, 0.1, 1.26));
+  // With more unguided samples, choices of lights had learnt before both: 1.25 is the whole ratio.
+  for (const auto& [first, rests] :
+       {std::pair(0.901, true), std::pair(0.999, true), std::pair(1.001, false)}) {
+    rest_schedule late(1.25f, 2);
+    late.see_unguided(3, unguided_of(first), 10000);
+    late.see_unguided(30, unguided_of(0.8), 10000);
+    CHECK(late.lights_rest(gain_of(1.0)) == rests);
+  }
+  const rest_schedule never_waited(1.25f, 1);
+  CHECK(never_waited.lights_rest(gain_of(1.24)));
+  CHECK(!never_waited.lights_rest(gain_of(1.26)));
+
+  rest_schedule forgets = waits(1.0);
+  forgets.see_unguided(30, unguided_of(0.5), 10000);
+  forgets.restart(31);
+  CHECK(forgets.lights_rest(gain_of(1.24)));
+}
+
+TEST_CASE("rest: a guide that waits is saved, restored and woken up", "[rest]") {
+  rest_schedule schedule(1.25f, 1);
+  schedule.see_unguided(2, unguided_of(0.5), 10000);
+  const rest_schedule::state state = schedule.saved();
+  rest_schedule restored(1.25f, 1);
+  REQUIRE(restored.restore(10, state));
+  CHECK(samples_where(70, [&](std::uint32_t s) { return restored.rests(s) != schedule.rests(s); }).empty());
+  restored.see_unguided(30, unguided_of(0.3), 10000);
+  CHECK(restored.saved().light_gain == Approx(2.0 * 0.5 / 0.3 - 1.0));
+
+  const auto refused = [&](void (*change)(rest_schedule::state&)) {
+    rest_schedule::state changed = state;
+    change(changed);
+    return !rest_schedule(1.25f, 1).restore(10, changed);
+  };
+  CHECK(!refused([](rest_schedule::state&) {}));
+  CHECK(refused([](rest_schedule::state& s) { s.unguided = 30; }));
+  CHECK(refused([](rest_schedule::state& s) { s.unguided = 3; }));
+  CHECK(refused([](rest_schedule::state& s) { s.first_unguided = 0; }));
+  CHECK(refused([](rest_schedule::state& s) { s.first_unguided = 10; }));
+  CHECK(refused([](rest_schedule::state& s) { s.first_noise = 1.25f; }));
+  CHECK(refused([](rest_schedule::state& s) { s.unguided = 0; }));
+  CHECK(refused([](rest_schedule::state& s) { s.first_noise = -1.0f; }));
+  CHECK(refused([](rest_schedule::state& s) { s.first_noise = std::nanf(""); }));
+  CHECK(refused([](rest_schedule::state& s) { s.light_gain = 0.5f; }));
+  CHECK(refused([](rest_schedule::state& s) { s.light_gain = std::nanf(""); }));
+
+  schedule.restart(10);
+  CHECK(schedule.unguided_sample() == 11);
+  CHECK(!schedule.resting());
+}
+
 TEST_CASE("rest: where few paths find light, a gain of about 1 is enough to go on", "[rest]") {
   const auto noisy_gain_of = [](double value) { return ::noisy_gain_of(value, 60.0); };
   for (const std::uint32_t sample : {4u, 32u}) {

@@ -6,7 +6,7 @@
 // Source: wfpg's own. Cost: O(bytes), and loading builds the octree. Memory: a file has about 40 bytes a leaf
 // and 10 F² a kept field.
 //
-// A guide file of version 7, little-endian; state/section_file.hpp has what is around the sections.
+// A guide file of version 8, little-endian; state/section_file.hpp has what is around the sections.
 //
 //   section  content                                              bytes
 //   options  scene_tag                                            8
@@ -25,6 +25,8 @@
 //            samples rested, in how many paths it takes part      8
 //            weight of guided samples                             4
 //            gain below which the guide rests                     4
+//            unguided sample and noise before it waited           8
+//            gain of choices of lights while it waited            4
 //            mean gain of comparisons                             80
 //            triangles left out, by reason                        12
 //            vertices dropped                                     4

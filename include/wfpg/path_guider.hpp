@@ -181,7 +181,7 @@ class path_guider {
   /// Whether the current sample is guided: unguided_samples are over, the guide is not empty, and it does not
   /// rest.
   bool guided() const { return is_guided(samples_); }
-  /// Whether the guide rests in the current sample, since guiding gained too little.
+  /// Whether the guide rests in the current sample, since guiding gained too little, or noise was little.
   bool resting() const { return rests_now_; }
   /// Whether the guide probes in the current sample, since it is not known whether guiding pays. Then few
   /// paths are recorded and guided: those that are compared.
@@ -239,8 +239,6 @@ class path_guider {
     }
   }
 
-  /// Whether choices of lights rest in samples that the guide rests in.
-  bool lights_rest() const { return gain_.value() < rest_constants::light_gain; }
   /// Gain below which guiding does not pay: the option, or what suits policy and scene. A CPU policy's blocks
   /// have one warp.
   template <class Scene>

@@ -54,7 +54,7 @@ struct record_light {
     ray.direction = d.direction;
     const vec3 p = glm::clamp(ray.origin + box_caster()(ray).distance * d.direction, vec3(0.0f), vec3(1.0f));
     recorder.vertex(i, 1, p, -d.direction, vec3(1.0f));
-    recorder.emission(i, 1, vec3(0.5f + emitted(p)));
+    recorder.emission(i, 1, vec3(0.05f + emitted(p)));
   }
 };
 

@@ -49,6 +49,7 @@ json rest_of(const rest_report& rest) {
               {"guided_variance", gain.guided_variance},
               {"unguided_vertices", gain.unguided_vertices},
               {"guided_vertices", gain.guided_vertices},
+              {"noise", gain.paths > 0 ? json(gain.noise()) : json(nullptr)},
               {"gain", nullptr},
               {"gain_error", nullptr}};
   if (!gain.is_known()) return result;

@@ -29,7 +29,7 @@ namespace wfpg::detail {
 
 /// Magic, version and name of guide files. The magic has bytes that text conversion would change, so such
 /// damage is detected.
-inline constexpr file_kind guide_file_kind{{"\x89wfpgG\n\x1a", 8}, 7, "a guide file"};
+inline constexpr file_kind guide_file_kind{{"\x89wfpgG\n\x1a", 8}, 8, "a guide file"};
 
 /// An option that decides how a guide's state is laid out. A file is refused where one differs.
 struct shaping_option {

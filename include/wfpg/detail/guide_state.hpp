@@ -44,6 +44,9 @@ struct state_access {
     bytes.put(state.takes_part);
     bytes.put(state.weight);
     bytes.put(state.least_gain);
+    bytes.put(state.first_unguided);
+    bytes.put(state.first_noise);
+    bytes.put(state.light_gain);
     put_gain(guider.gain_, bytes);
   }
   // The numbers of a gain, in the order of the file. `Gain`: guiding_gain, const or not.
@@ -75,13 +78,16 @@ struct state_access {
     state.takes_part = bytes.get<std::uint32_t>();
     state.weight = bytes.get<float>();
     state.least_gain = bytes.get<float>();
+    state.first_unguided = bytes.get<std::uint32_t>();
+    state.first_noise = bytes.get<float>();
+    state.light_gain = bytes.get<float>();
     const guiding_gain gain = take_gain(bytes);
     bytes.require(state.rested <= guider.samples_, "rests in samples that are to come");
     if (key != comparison_key(guider)) return guider.rests_.restore_other(state.rested);
     bytes.require(guider.rests_.restore(guider.samples_, state), "has rests that no guider has");
     guider.rests_now_ = guider.rests_.rests(guider.samples_);
     guider.gain_ = gain;
-    guider.lights_rest_now_ = guider.rests_now_ && guider.lights_rest();
+    guider.lights_rest_now_ = guider.rests_now_ && guider.rests_.lights_rest(gain);
   }
 
   template <class Exec, class Guide>

@@ -64,7 +64,7 @@ void path_guider<Exec, Guide>::begin_sample() {
   const std::uint64_t chosen = is_measured ? seed_of(0) : seed_of(sample);
   recorder_.begin_sample(exec_, static_cast<std::uint32_t>(chosen), recorded_,
                          probes_now_ ? compared_.rarer : 0);
-  lights_rest_now_ = rests_now_ && lights_rest();
+  lights_rest_now_ = rests_now_ && rests_.lights_rest(gain_);
   if (!rests_now_)
     guide_.begin_sample(at(sample));
   else if (!lights_rest_now_)
@@ -103,7 +103,9 @@ void path_guider<Exec, Guide>::measure() {
   if constexpr (Guide::measures_gain) {
     if (measured_ || guide_.empty()) return;
     if (rests_.is_unguided(samples_)) {
-      guide_.keep_unguided(exec_, recorder_, compared_, rests_.unguided_number(samples_));
+      const std::uint32_t number = rests_.unguided_number(samples_);
+      const guiding_gain unguided = guide_.keep_unguided(exec_, recorder_, compared_, number);
+      rests_.see_unguided(samples_, unguided, detail::all_paths_of(options_));
     } else if (rests_.compares(samples_) && is_guided(samples_)) {
       gain_ = guide_.gain(exec_, recorder_, compared_).mean_with(gain_);
       rests_.decide(samples_, gain_);

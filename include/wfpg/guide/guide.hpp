@@ -129,12 +129,13 @@ struct guide_base {
   /// Whether the guide compares guided samples with unguided ones, so that it can rest. It then has
   ///   bool measures() const;                        whether it does under its options
   ///   std::uint32_t rarer() const;                  log2 of the recorded paths of which one is compared
-  ///   void keep_unguided(const Exec&, const path_recorder<Exec>&, const recorded_runs& compared,
-  ///                      std::uint32_t number);         of the unguided sample, from 0
+  ///   guiding_gain keep_unguided(const Exec&, const path_recorder<Exec>&, const recorded_runs& compared,
+  ///                              std::uint32_t number);  of the unguided sample, from 0
   ///   guiding_gain gain(const Exec&, const path_recorder<Exec>&, const recorded_runs& compared);
   ///   auto resting_lights() const;                  lights() of samples in which nothing is learnt
-  /// and a default view_type guides no ray. The last two run before learn(), keep_unguided() after an
-  /// unguided sample.
+  /// and a default view_type guides no ray. keep_unguided() runs before learn() after an unguided sample, and
+  /// gain() after others that are compared. Of number 1, keep_unguided() returns paths, unguided_mean and
+  /// typical_unguided of a gain, and of others no paths. With ranks, both return what all ranks agree on.
   static constexpr bool measures_gain = false;
   /// Runs in place of begin_sample() before a sample that the guide rests in, but for its choices of lights.
   template <class Exec>

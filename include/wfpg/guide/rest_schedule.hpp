@@ -2,8 +2,10 @@
 // Samples without guiding cost what path tracing costs. Pure functions of counters, and of what was measured;
 // every constant is here.
 //
-// The first two samples are not guided. In the next ones the guide probes: it takes part in few paths, which
-// are compared with those of unguided samples. Samples 3, 4, 8, 16 and so on are compared, also with each
+// The first two samples are not guided. Where they show little noise, the guide rests until probing costs
+// little beside what was rendered. Two more samples are then unguided, and all begins as if the first of them
+// was sample 1. In the next samples the guide probes: it takes part in few paths, which are compared with
+// those of unguided samples. Samples 3, 4, 8, 16 and so on are compared, also with each
 // other. From sample 4 on each comparison lets the guide take part in all paths, or lets it rest until the
 // next one. A gain that a few bright paths may have made by chance is not enough. A guide that goes on
 // probing leaves out samples 5 and 9, so that the variance of unguided paths is known better. A guide that
@@ -44,6 +46,13 @@ struct rest_constants {
   /// Noise above which no more than least_in_noise is asked for. Few paths then find light, and a few
   /// thousand do not measure a gain.
   static constexpr double little_light = 50.0;
+  /// Paths that are made before a guide probes, where noise is less than much_noise. In a box probing takes
+  /// the time of 150,000 paths or more, which few samples of a small picture do not repay.
+  static constexpr std::size_t paths_before_probing = std::size_t(1) << 21;
+  /// A guide probes after so many samples, however few paths they have.
+  static constexpr std::uint32_t longest_wait = 28;
+  /// Noise below which choices of lights rest while a guide waits. They would not repay their time.
+  static constexpr double light_noise = 0.25;
   /// A guide rests in noise where its gain is so much less than what lets it take part.
   static constexpr float slack_in_noise = 0.05f;
   /// Standard error of a gain's logarithm for which the limits above are made.
@@ -96,11 +105,12 @@ class rest_schedule {
   }
 
   /// Whether the guide takes no part in a sample.
-  bool rests(std::uint32_t sample) const { return resting() && !compares(sample); }
+  bool rests(std::uint32_t sample) const { return resting() && !compares(sample) && !is_unguided(sample); }
   /// Whether no other paths than those that are compared are recorded and guided. From the unguided sample
   /// on.
   bool probes(std::uint32_t sample) const {
-    return (takes_part_ == part::in_few && sample >= unguided_) || (resting() && compares(sample));
+    return (takes_part_ == part::in_few && sample >= unguided_) ||
+           (resting() && (compares(sample) || is_unguided(sample)));
   }
   /// Whether a sample guides few paths, or none.
   bool guides_few(std::uint32_t sample) const { return probes(sample) || rests(sample); }
@@ -113,6 +123,8 @@ class rest_schedule {
   /// rest_constants::most_unguided.
   std::uint32_t unguided_number(std::uint32_t sample) const {
     constexpr std::uint32_t ages[rest_constants::most_unguided] = {1, 2, 5, 9};
+    // Those before a wait stay what they were.
+    if (first_unguided_ > 0 && sample - first_unguided_ < 2) return sample - first_unguided_;
     if (unguided_ == 0 || sample < unguided_) return rest_constants::most_unguided;
     std::uint32_t number = 0;
     while (number < rest_constants::most_unguided && ages[number] != age_of(sample)) ++number;
@@ -152,7 +164,7 @@ class rest_schedule {
   void decide(std::uint32_t sample, const guiding_gain& measured) {
     if (age_of(sample) < rest_constants::first_comparison) return;
     weight_ = weight_of(measured);
-    const double gain = measured.typical_value(), noise = noise_of(measured);
+    const double gain = measured.typical_value(), noise = measured.noise();
     const double sure = noise > rest_constants::little_light ? gain : sure_gain(measured);
     const float all = enough(noise),
                 slack = noise > rest_constants::much_noise ? rest_constants::slack_in_noise : 0.0f,
@@ -164,6 +176,31 @@ class rest_schedule {
     else if (resting() || sure < least)
       takes_part_ = part::in_few;
   }
+  /// Takes what unguided paths showed in a sample of `paths`. After the second one, a guide of little noise
+  /// waits until paths_before_probing have been made, or longest_wait samples. It rests meanwhile, and then
+  /// is compared as at the beginning. It does not wait where so much was made already, or too few paths are
+  /// known.
+  void see_unguided(std::uint32_t sample, const guiding_gain& unguided, std::size_t paths) {
+    if (unguided_number(sample) != 1 || unguided.paths < guiding_gain::least_paths) return;
+    const auto noise = static_cast<float>(unguided.noise());
+    if (!(unguided.unguided_mean > 0.0) || !is_finite(noise)) return;
+    if (first_noise_ >= rest_constants::light_noise) light_gain_ = gain_of_lights(noise);
+    if (noise >= rest_constants::much_noise) return;
+    const std::size_t a_sample = max<std::size_t>(paths, 1),
+                      samples = (rest_constants::paths_before_probing - 1) / a_sample + 1;
+    const auto end = static_cast<std::uint32_t>(min<std::size_t>(samples, rest_constants::longest_wait));
+    if (end <= sample) return;
+    first_unguided_ = unguided_;
+    first_noise_ = noise;
+    unguided_ = end + 1;
+    takes_part_ = part::in_none;
+  }
+  /// Whether choices of lights rest with the guide, whose comparisons gave `measured`. They do where they are
+  /// known to gain little. While the guide waits, they rest in very little noise: light_noise.
+  bool lights_rest(const guiding_gain& measured) const {
+    if (measured.paths == 0) return first_noise_ < rest_constants::light_noise;
+    return measured.value() * light_gain_ < rest_constants::light_gain;
+  }
   /// Weight of a guided sample in the picture, over an unguided one's: the gain of the last comparison, from
   /// 1 to largest_weight.
   float weight() const { return weight_; }
@@ -171,47 +208,61 @@ class rest_schedule {
   void count(std::uint32_t sample) { rested_ += rests(sample) ? 1u : 0u; }
   /// Forgets what was measured, after `sample`: light or geometry moved. A guide that rests wakes up, and the
   /// next sample is the unguided one. Another guide takes part in all paths from then on, and is not compared
-  /// again. Otherwise, a host that moves something after each sample would never know. Changes nothing before
-  /// the unguided sample.
+  /// again. Otherwise, a host that moves something after each sample would never know. Before the first
+  /// unguided sample nothing changes.
   void restart(std::uint32_t sample) {
-    if (sample < unguided_ || unguided_ == 0) return;
+    if (unguided_ == 0 || (sample < unguided_ && !resting())) return;
     unguided_ = resting() ? sample + 1 : 0;
     takes_part_ = resting() ? part::in_few : part::in_all;
     weight_ = 1.0f;
+    first_unguided_ = 0;
+    first_noise_ = 0.0f;
+    light_gain_ = 1.0f;
   }
 
   /// Number of samples so far that the guide rested in.
   std::uint32_t rested() const { return rested_; }
   /// Number of the sample that others are compared with, counted from 1; 0: there is none.
   std::uint32_t unguided_sample() const { return unguided_; }
-  /// Whether samples rest, but for those that are compared.
+  /// Whether samples rest, but for those that are compared, and those that these are compared with.
   bool resting() const { return takes_part_ == part::in_none; }
 
   /// A schedule as a guide file holds it.
   struct state {
-    std::uint32_t unguided = 0;    ///< unguided_sample()
-    std::uint32_t rested = 0;      ///< rested()
-    std::uint32_t takes_part = 2;  ///< 0: in no path, 1: in few, 2: in all
-    float weight = 1.0f;           ///< of guided samples in the picture
-    float least_gain = 0.0f;       ///< below which it rests; 0: it never does
+    std::uint32_t unguided = 0;        ///< unguided_sample()
+    std::uint32_t rested = 0;          ///< rested()
+    std::uint32_t takes_part = 2;      ///< 0: in no path, 1: in few, 2: in all
+    float weight = 1.0f;               ///< of guided samples in the picture
+    float least_gain = 0.0f;           ///< below which it rests; 0: it never does
+    std::uint32_t first_unguided = 0;  ///< unguided before it waited; 0: it did not
+    float first_noise = 0.0f;          ///< in which it began to wait
+    float light_gain = 1.0f;           ///< of choices of lights while it waited
   };
   /// The schedule's state.
   state saved() const {
-    return {unguided_, rested_, static_cast<std::uint32_t>(takes_part_), weight_, least_gain_};
+    return {unguided_,    rested_,     static_cast<std::uint32_t>(takes_part_),
+            weight_,      least_gain_, first_unguided_,
+            first_noise_, light_gain_};
   }
   /// Takes the state of a guider that had made `samples` samples, under the same options. Returns false where
   /// it has no such state.
   bool restore(std::uint32_t samples, const state& from) {
+    if (!has_wait(samples, from)) return false;
+    const bool waits = from.first_unguided > 0 && from.takes_part == 0;
     const bool is_to_come = from.unguided == unguided_ || from.unguided == samples + 1;
-    if (from.rested > samples || (from.unguided > samples && !is_to_come) || from.takes_part > 2)
+    if (from.rested > samples || (from.unguided > samples && !waits && !is_to_come) || from.takes_part > 2)
       return false;
     const auto takes_part = static_cast<part>(from.takes_part);
-    if (takes_part == part::in_none && (from.unguided == 0 || from.unguided > samples)) return false;
+    if (takes_part == part::in_none && (from.unguided == 0 || (from.unguided > samples && !waits)))
+      return false;
     if (takes_part == part::in_few && from.unguided == 0) return false;
     if (!is_finite(from.weight)) return false;
     if (from.weight < 1.0f || from.weight > rest_constants::largest_weight) return false;
     if (!is_finite(from.least_gain) || (from.least_gain != 0.0f && from.least_gain < 1.0f)) return false;
     least_gain_ = from.least_gain;
+    first_unguided_ = from.first_unguided;
+    first_noise_ = from.first_noise;
+    light_gain_ = from.light_gain;
     unguided_ = from.unguided;
     rested_ = from.rested;
     takes_part_ = takes_part;
@@ -229,9 +280,20 @@ class rest_schedule {
   // In how many paths the guide takes part. Numbers are those of the file.
   enum class part : std::uint32_t { in_none = 0, in_few = 1, in_all = 2 };
 
-  // Variance of typical unguided paths over the square of their mean; 0 where none is known.
-  static double noise_of(const guiding_gain& measured) {
-    return measured.typical_unguided / max(measured.unguided_mean * measured.unguided_mean, 1.0e-30);
+  // Gain of choices of lights during a wait, after which unguided paths have this noise. Those of sample 1
+  // had learnt nothing, so that the noise before the wait is the mean of that without and with what they
+  // learnt.
+  float gain_of_lights(float noise) const {
+    const float ratio = first_noise_ / max(noise, 1.0e-6f);
+    return max(first_unguided_ == 1 ? 2.0f * ratio - 1.0f : ratio, 1.0f);
+  }
+  // Whether a state's numbers of a wait are those of a guider that had made `samples` samples.
+  static bool has_wait(std::uint32_t samples, const state& from) {
+    const float noise = from.first_noise, gain = from.light_gain;
+    if (from.first_unguided == 0) return noise == 0.0f && gain == 1.0f;
+    const bool follows = from.first_unguided < samples && from.first_unguided + 2 < from.unguided &&
+                         from.unguided <= rest_constants::longest_wait + 1;
+    return follows && noise >= 0.0f && noise < rest_constants::much_noise && is_finite(gain) && gain >= 1.0f;
   }
   // The gain of typical paths without what chance may have added.
   static double sure_gain(const guiding_gain& measured) {
@@ -249,6 +311,9 @@ class rest_schedule {
 
   float least_gain_ = 0.0f;  // 0: never rests
   float weight_ = 1.0f;
+  std::uint32_t first_unguided_ = 0;  // unguided_ before it waited; 0: it did not
+  float first_noise_ = 0.0f;          // in which it began to wait
+  float light_gain_ = 1.0f;           // of choices of lights while it waited, which comparisons lack
   part takes_part_ = part::in_all;
   std::uint32_t unguided_ = 0;
   std::uint32_t rested_ = 0;

@@ -35,7 +35,8 @@ struct sampling_options {
   /// policy and scene, rest_constants::gpu_least_gain or cpu_least_gain(). Samples 4, 8, 16 and so on are
   /// compared with unguided ones. Where the variance of paths falls by less than this at equal numbers of
   /// vertices, the guide rests until the next comparison. A sample that rests costs what path tracing costs.
-  /// Less is asked for where paths are noisy: rest_schedule::enough().
+  /// Less is asked for where paths are noisy: rest_schedule::enough(). Where they are not, the guide
+  /// rests until two million paths or 28 samples are made: rest_schedule::see_unguided().
   ///
   /// Until it is known whether guiding pays, at least until sample 4, few paths are recorded. The guide takes
   /// part in these alone, if surfaces tell their paths (surface::path), and in none of sample 2. Needs

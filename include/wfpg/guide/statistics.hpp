@@ -78,6 +78,9 @@ struct guiding_gain {
     const double chance = std::sqrt((unguided_variance + guided_variance) / static_cast<double>(paths));
     return unguided_mean >= least_light * guided_mean - chance;
   }
+  /// Variance of typical unguided paths, over the square of their mean. A few thousand paths
+  /// measure it.
+  double noise() const { return typical_unguided / std::fmax(unguided_mean * unguided_mean, 1.0e-30); }
   /// Unguided variance over guided variance, at most 1e6; 1 where both are 0.
   double value() const { return ratio(unguided_variance, guided_variance); }
   /// Ratio of the variances of typical paths at equal numbers of surfaces: guided paths may be longer, since
@@ -116,7 +119,7 @@ struct guider_statistics {
   /// Samples begun after the first unguided_samples, where the guide can guide and did not rest. Of these,
   /// samples that are compared, or begin after light was forgotten, may be unguided.
   std::uint32_t guided_samples = 0;
-  /// Samples begun in which the guide rested, since guiding gained too little.
+  /// Samples begun in which the guide rested, since guiding gained too little, or noise was little.
   std::uint32_t rested_samples = 0;
   /// Mean of the comparisons of guided samples with an unguided one. Each weighs half of the one after it.
   guiding_gain gain;

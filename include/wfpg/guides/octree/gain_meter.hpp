@@ -51,10 +51,12 @@ class gain_meter {
   gain_meter(const Exec& exec, std::size_t paths, communicator* ranks = nullptr);
 
   /// Keeps what the recorded paths of an unguided sample brought. `number`: that sample's among unguided
-  /// ones, less than rest_constants::most_unguided. 0: all that was kept is forgotten. Call it before the
-  /// recorder is cleared. O(paths).
-  void keep_unguided(const Exec& exec, const path_recorder<Exec>& recorder, const recorded_runs& compared,
-                     const exitance_cache_view& cache, std::uint32_t number);
+  /// ones, less than rest_constants::most_unguided. 0: all that was kept is forgotten. After sample 1 it
+  /// returns what unguided paths contribute to a gain, and waits for the work before it. After others it
+  /// returns no paths. Call it before the recorder is cleared. O(paths).
+  guiding_gain keep_unguided(const Exec& exec, const path_recorder<Exec>& recorder,
+                             const recorded_runs& compared, const exitance_cache_view& cache,
+                             std::uint32_t number);
   /// Measures the recorded paths of a guided sample, and keeps what they brought. The gain is known from the
   /// second call on, after two unguided samples. Call it before the recorder is cleared, and before the cache
   /// has these paths. Waits for the work before it. O(paths).
@@ -78,6 +80,8 @@ class gain_meter {
   // Sum of what measure(i) adds, for i in [0, n).
   template <class Measure>
   static detail::path_sums sum(const Exec& exec, std::size_t n, const Measure& measure);
+  // Sums over the paths of all ranks, of those over this rank's `own`.
+  detail::path_sums sum_of_ranks(const Exec& exec, detail::path_sums own);
   // Keeps what paths brought in earlier_paths::radiance(number).
   void keep(const Exec& exec, const detail::measured_paths& paths, std::uint32_t number);
   // Keeps what the paths of all ranks brought.

@@ -184,41 +184,40 @@ struct keep_path_words {
   }
 };
 
-/// Terms of a guided path in the sums: 0 where no earlier guided path, or fewer than two unguided ones, began
-/// where it did.
-struct measure_path {
-  measured_paths paths;
-  array_view<const earlier_paths> kept;
-
-  WFPG_HD path_sums operator()(std::size_t i) const {
-    const earlier_paths before = kept[i + paths.compared.first_place()];
-    if (before.place == earlier_paths::nowhere || before.guided < 0.0f) return {};
-    const measured_path now = paths(i);
-    if (now.radiance < 0.0f || now.place != before.place) return {};
-    const float scale = paths.scale(before.place);
+/// Terms of a pixel in the sums.
+struct path_terms {
+  /// Those of its unguided paths: 0 where these are fewer than two. `scale`: unit of differences at its
+  /// place.
+  WFPG_HD static path_sums unguided(const earlier_paths& kept, float scale) {
     if (!(scale > 0.0f) || !is_finite(scale)) return {};
     path_losses of_pairs;
     float value = 0.0f;
     std::uint32_t n = 0;
-    for (const float path : before.unguided) {
+    for (const float path : kept.unguided) {
       if (path < 0.0f) continue;
-      for (const float other : before.unguided)
+      for (const float other : kept.unguided)
         if (other >= 0.0f) of_pairs = of_pairs + losses((path - other) / scale);
       value += min(path / scale, most);
       ++n;
     }
     if (n < 2) return {};
     const std::uint32_t pairs = n * (n - 1);
-    const path_losses unguided{of_pairs.all / pairs, of_pairs.typical / pairs},
-        guided = losses((before.guided - now.radiance) / scale);
-    return {1,
-            units(value / static_cast<float>(n)),
-            units(min(now.radiance / scale, most)),
-            unguided,
-            guided,
-            before.vertices,
-            now.vertices,
-            loss_products::of(unguided.typical, guided.typical)};
+    path_sums result;
+    result.paths = 1;
+    result.unguided = units(value / static_cast<float>(n));
+    result.unguided_losses = {of_pairs.all / pairs, of_pairs.typical / pairs};
+    result.unguided_vertices = kept.vertices;
+    return result;
+  }
+  /// Those of all its paths: 0 where unguided ones have none. `now`: its guided path.
+  WFPG_HD static path_sums all(const earlier_paths& kept, const measured_path& now, float scale) {
+    path_sums result = unguided(kept, scale);
+    if (result.paths == 0) return result;
+    result.guided = units(min(now.radiance / scale, most));
+    result.guided_losses = losses((kept.guided - now.radiance) / scale);
+    result.guided_vertices = now.vertices;
+    result.products = loss_products::of(result.unguided_losses.typical, result.guided_losses.typical);
+    return result;
   }
 
  private:
@@ -232,6 +231,33 @@ struct measure_path {
   }
   WFPG_HD static path_losses losses(float difference) {
     return {loss(difference, most), loss(difference, static_cast<float>(guiding_gain::most_typical))};
+  }
+};
+
+/// Terms of a guided path in the sums: 0 where no earlier guided path, or fewer than two unguided ones, began
+/// where it did.
+struct measure_path {
+  measured_paths paths;
+  array_view<const earlier_paths> kept;
+
+  WFPG_HD path_sums operator()(std::size_t i) const {
+    const earlier_paths before = kept[i + paths.compared.first_place()];
+    if (before.place == earlier_paths::nowhere || before.guided < 0.0f) return {};
+    const measured_path now = paths(i);
+    if (now.radiance < 0.0f || now.place != before.place) return {};
+    return path_terms::all(before, now, paths.scale(before.place));
+  }
+};
+
+/// Terms of unguided paths alone in the sums.
+struct measure_unguided {
+  measured_paths paths;
+  array_view<const earlier_paths> kept;
+
+  WFPG_HD path_sums operator()(std::size_t i) const {
+    const earlier_paths& pixel = kept[i + paths.compared.first_place()];
+    return pixel.place == earlier_paths::nowhere ? path_sums{}
+                                                 : path_terms::unguided(pixel, paths.scale(pixel.place));
   }
 };
 

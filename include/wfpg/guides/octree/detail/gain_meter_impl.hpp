@@ -34,24 +34,32 @@ detail::path_sums gain_meter<Exec>::sum(const Exec& exec, std::size_t n, const M
 }
 
 template <class Exec>
-void gain_meter<Exec>::keep_unguided(const Exec& exec, const path_recorder<Exec>& recorder,
-                                     const recorded_runs& compared, const exitance_cache_view& cache,
-                                     std::uint32_t number) {
-  keep(exec, {recorder.view(), cache, compared}, number);
+guiding_gain gain_meter<Exec>::keep_unguided(const Exec& exec, const path_recorder<Exec>& recorder,
+                                             const recorded_runs& compared, const exitance_cache_view& cache,
+                                             std::uint32_t number) {
+  const detail::measured_paths paths{recorder.view(), cache, compared};
+  keep(exec, paths, number);
+  if (number != 1) return {};
+  return gain_of(sum_of_ranks(exec, sum(exec, count(paths), detail::measure_unguided{paths, kept_.view()})));
 }
 
 template <class Exec>
 guiding_gain gain_meter<Exec>::gain(const Exec& exec, const path_recorder<Exec>& recorder,
                                     const recorded_runs& compared, const exitance_cache_view& cache) {
   const detail::measured_paths paths{recorder.view(), cache, compared};
-  detail::path_sums sums = sum(exec, count(paths), detail::measure_path{paths, kept_.view()});
-  if (ranks_) {
-    exec.copy_from_host(sums_.data(), &sums, sizeof sums);
-    ranks_->all_reduce_sum(sums_.view());
-    exec.copy_to_host(&sums, sums_.data(), sizeof sums);
-  }
+  const detail::path_sums sums =
+      sum_of_ranks(exec, sum(exec, count(paths), detail::measure_path{paths, kept_.view()}));
   keep(exec, paths, detail::earlier_paths::of_guided);
   return gain_of(sums);
+}
+
+template <class Exec>
+detail::path_sums gain_meter<Exec>::sum_of_ranks(const Exec& exec, detail::path_sums own) {
+  if (!ranks_) return own;
+  exec.copy_from_host(sums_.data(), &own, sizeof own);
+  ranks_->all_reduce_sum(sums_.view());
+  exec.copy_to_host(&own, sums_.data(), sizeof own);
+  return own;
 }
 
 // By the delta method: log(u / g) is linear in small changes of the sums u and g of losses. Paths are
