@@ -182,7 +182,7 @@ def gains(results: Results) -> Rows:
 @block
 def rests(results: Results) -> Rows:
     """Gains of guides that may rest, on CPU and GPU, and how many samples rested in each seed."""
-    order = ("ajar", "thin-wall", "glossy-room", "cornell-enclosed", "veach-ajar.glb", "bathroom.glb", "staircase2.glb",
+    order = ("ajar", "thin-wall", "glossy-room", "cornell-enclosed", "cornell-wall", "veach-ajar.glb", "bathroom.glb", "staircase2.glb",
              "cornell-box.glb", "cornell-box", "veach-mis.glb", "materials", "outdoor", "furnace")
     cpu, gpu = (results.json("rest.json", device, "scenes") for device in ("cpu", "gpu"))
     rows = [["scene", "CPU, 16 samples", "CPU, 64", "GPU, 16", "GPU, 64", "CPU, of 64 samples rest"]]
