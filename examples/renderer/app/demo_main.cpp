@@ -31,7 +31,7 @@ using render::render_result;
 using render::sampling_method;
 
 constexpr int samples = 64;             // of the compared pictures
-constexpr int reference_samples = 192;  // of both halves
+constexpr int reference_samples = 128;  // of both halves
 
 /// Size and zoom of pictures on a device.
 struct demo_device {
