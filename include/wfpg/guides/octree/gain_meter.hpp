@@ -51,8 +51,8 @@ class gain_meter {
   gain_meter(const Exec& exec, std::size_t paths, communicator* ranks = nullptr);
 
   /// Keeps what the recorded paths of an unguided sample brought. `number`: that sample's among unguided
-  /// ones, less than rest_constants::most_unguided. 0: all that was kept is forgotten. After sample 1 it
-  /// returns what unguided paths contribute to a gain, and waits for the work before it. After others it
+  /// ones, less than rest_constants::most_unguided. 0: all that was kept is forgotten. 1: it
+  /// returns what unguided paths contribute to a gain, and waits for the work before it. For others it
   /// returns no paths. Call it before the recorder is cleared. O(paths).
   guiding_gain keep_unguided(const Exec& exec, const path_recorder<Exec>& recorder,
                              const recorded_runs& compared, const exitance_cache_view& cache,

@@ -55,8 +55,8 @@ class octree_scene : public guide_base {
   std::uint32_t rarer() const {
     return gain_meter<Exec>::rarer(recorded().paths(), detail::all_paths_of(options_));
   }
-  /// Keeps what the paths of an unguided sample brought. `number`: among unguided ones, from 0. Sample 1
-  /// waits for the work before it, and returns what unguided paths contribute to a gain. O(compared paths).
+  /// Keeps what the paths of an unguided sample brought. `number`: among unguided ones, from 0. For 1
+  /// it waits for the work before, and returns what unguided paths contribute to a gain. O(compared paths).
   guiding_gain keep_unguided(const Exec& exec, const path_recorder<Exec>& paths,
                              const recorded_runs& compared, std::uint32_t number) {
     return meter_.keep_unguided(exec, paths, compared, cache_.view(), number);
