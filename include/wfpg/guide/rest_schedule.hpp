@@ -293,7 +293,8 @@ class rest_schedule {
     if (from.first_unguided == 0) return noise == 0.0f && gain == 1.0f;
     const bool follows = from.first_unguided < samples && from.first_unguided + 2 < from.unguided &&
                          from.unguided <= rest_constants::longest_wait + 1;
-    return follows && noise >= 0.0f && noise < rest_constants::much_noise && is_finite(gain) && gain >= 1.0f;
+    return follows && is_finite(noise) && noise >= 0.0f && noise < rest_constants::much_noise &&
+           is_finite(gain) && gain >= 1.0f;
   }
   // The gain of typical paths without what chance may have added.
   static double sure_gain(const guiding_gain& measured) {
