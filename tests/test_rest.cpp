@@ -90,10 +90,10 @@ void take_sample(const Exec& exec, wfpg::path_guider<Exec, Guide>& guider, std::
 /// Numbers of the samples from `first` to `last` that are guided.
 template <class Exec, class Guide>
 numbers guided_samples(const Exec& exec, wfpg::path_guider<Exec, Guide>& guider, std::uint32_t first,
-                       std::uint32_t last, chances p) {
+                       std::uint32_t last, chances p, std::uint32_t paths = path_count) {
   numbers found;
   for (std::uint32_t sample = first; sample <= last; ++sample) {
-    take_sample(exec, guider, sample, p);
+    take_sample(exec, guider, sample, p, paths);
     if (guider.guided()) found.push_back(sample);
     if (guider.guided() && guider.resting()) found.push_back(0);  // unguided samples are neither
   }
@@ -282,12 +282,7 @@ WFPG_TEST_CASE("rest: in little noise a guide waits for 28 samples, and less whe
   wfpg::kept_guide_options large = rest_options();
   large.max_paths = std::size_t(1) << 19;
   wfpg::path_guider<Exec> of_many(exec, box_mesh<Exec>(exec).view(), large);
-  numbers guided;
-  for (std::uint32_t sample = 1; sample <= 8; ++sample) {
-    take_sample(exec, of_many, sample, calm, 1u << 19);
-    if (of_many.guided()) guided.push_back(sample);
-  }
-  CHECK(guided == numbers{7, 8});
+  CHECK(guided_samples(exec, of_many, 1, 8, calm, 1u << 19) == numbers{7, 8});
 }
 
 WFPG_TEST_CASE("rest: two unguided samples show the unguided part of a gain, one shows none", "[rest]") {
@@ -364,8 +359,8 @@ WFPG_TEST_CASE("rest: unset, least_gain follows the triangles on CPUs, also of a
   const Exec exec;
   wfpg::kept_guide_options options = rest_options();
   options.least_gain.reset();
-  constexpr chances gains_two{0.48f,
-                              0.6487f};  // a gain of 2: more than 1.75, less than 2.26 for 12 triangles
+  // A gain of 2: more than 1.75, less than 2.26 for 12 triangles.
+  constexpr chances gains_two{0.48f, 0.6487f};
   const box_mesh<Exec> mesh(exec);
   const auto rests_after = [&](wfpg::path_guider<Exec>& guider, std::uint32_t first) {
     guided_samples(exec, guider, first, 17, gains_two);

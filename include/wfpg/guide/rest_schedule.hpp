@@ -248,14 +248,14 @@ class rest_schedule {
   /// it has no such state.
   bool restore(std::uint32_t samples, const state& from) {
     if (!has_wait(samples, from)) return false;
-    const bool waits = from.first_unguided > 0 && from.takes_part == 0;
-    const bool is_to_come = from.unguided == unguided_ || from.unguided == samples + 1;
-    if (from.rested > samples || (from.unguided > samples && !waits && !is_to_come) || from.takes_part > 2)
-      return false;
+    if (from.rested > samples || from.takes_part > 2) return false;
     const auto takes_part = static_cast<part>(from.takes_part);
-    if (takes_part == part::in_none && (from.unguided == 0 || (from.unguided > samples && !waits)))
-      return false;
-    if (takes_part == part::in_few && from.unguided == 0) return false;
+    // A guide that rests has seen its unguided sample, but for one that waits for the next.
+    const bool is_to_come = takes_part == part::in_none
+                                ? from.first_unguided > 0
+                                : from.unguided == unguided_ || from.unguided == samples + 1;
+    if (from.unguided > samples && !is_to_come) return false;
+    if (takes_part != part::in_all && from.unguided == 0) return false;
     if (!is_finite(from.weight)) return false;
     if (from.weight < 1.0f || from.weight > rest_constants::largest_weight) return false;
     if (!is_finite(from.least_gain) || (from.least_gain != 0.0f && from.least_gain < 1.0f)) return false;
