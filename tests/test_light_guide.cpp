@@ -210,11 +210,13 @@ WFPG_TEST_CASE("groups are chosen with their probabilities", "[light_guide]") {
   }
   learn(box, values);
   const std::vector<float> p = probabilities_at(box, {on_floor});
+  const std::uint32_t row = rows_of(box, {on_floor})[0];
   constexpr std::uint32_t draws = 100000;
   std::vector<double> counted(p.size(), 0.0), expected;
   for (const wfpg::light_choice& choice : choices_at(box, on_floor, draws)) {
     REQUIRE(choice.group < p.size());
     REQUIRE(choice.probability == p[choice.group]);
+    REQUIRE(box.lights.view().row_of(choice.key) == row);
     counted[choice.group] += 1.0;
   }
   for (const float probability : p) expected.push_back(draws * static_cast<double>(probability));
@@ -385,6 +387,14 @@ WFPG_TEST_CASE("choices forget light, and invalid deposits are dropped", "[light
   guided_box<Exec> silent(three_groups(), 0);
   learn(silent, only_group(0, 10));
   CHECK(probabilities_at(silent, {on_floor}) == before);
+}
+
+WFPG_TEST_CASE("a view says whether choices are by weight alone", "[light_guide]") {
+  guided_box<Exec> box(three_groups());
+  CHECK(!box.lights.view().rests());
+  CHECK(box.lights.resting_view().rests());
+  CHECK(!box.lights.resting_view().empty());
+  CHECK(wfpg::light_guide_view().rests());
 }
 
 WFPG_TEST_CASE("places outside the octree use the root's choices", "[light_guide]") {

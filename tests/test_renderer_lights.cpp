@@ -222,29 +222,31 @@ TEST_CASE("choices of groups change the lights' densities, not their radiance", 
     double sum = 0.0;
     constexpr std::uint32_t draws = 200000;
     for (std::uint32_t i = 0; i < draws; ++i) {
-      const light_sample light = lights.view().sample(geometry.view(), from, choose(i),
-                                                      [&](std::uint32_t use) { return numbers(i, use); });
-      if (light.pdf > 0.0f) sum += static_cast<double>(light.radiance.x / light.pdf);
+      const auto draw = [&](std::uint32_t use) { return numbers(i, use); };
+      const path_lights::chosen_light chosen = choose(i, draw);
+      const light_sample light = lights.view().sample(geometry.view(), from, chosen.light, draw);
+      if (light.pdf > 0.0f) sum += static_cast<double>(light.radiance.x / (light.pdf * chosen.preference));
     }
     return sum / draws;
   };
-  const double expected = irradiance(whole, [](std::uint32_t) { return wfpg::light_choice{}; });
+  const auto by_power = [&](const light_distribution<wfpg::exec::seq>& lights) {
+    const path_lights without_guide{geometry.view(), lights.view()};
+    return irradiance(
+        lights, [&](std::uint32_t, const auto& draw) { return without_guide.choose(path_vertex{}, draw); });
+  };
+  const double expected = by_power(whole);
   // Probabilities unlike the groups' brightness.
   const float probabilities[] = {0.4f, 0.3f, 0.05f, 0.05f, 0.2f};
-  const double found = irradiance(parts, [&](std::uint32_t i) {
+  const double found = irradiance(parts, [&](std::uint32_t i, const auto& draw) {
     float u = numbers(i, 20).x;
-    for (std::uint32_t g = 0;; ++g) {
-      if (u < probabilities[g] || g == 4) return wfpg::light_choice{g, probabilities[g]};
-      u -= probabilities[g];
-    }
+    std::uint32_t group = 0;
+    while (u >= probabilities[group] && group < 4) u -= probabilities[group++];
+    return path_lights::chosen_light{parts.view().pick_in(group, draw(dimension::light_choice)),
+                                     probabilities[group] / parts.shares()[group]};
   });
   CHECK(found == Approx(expected).epsilon(0.02));
-  // In a sample without a guide, groups are chosen by power.
-  const path_lights without_guide{geometry.view(), parts.view()};
-  const double by_power = irradiance(parts, [&](std::uint32_t i) {
-    return without_guide.choose(path_vertex{}, [=] { return numbers(i, 20).x; });
-  });
-  CHECK(by_power == Approx(expected).epsilon(0.02));
+  // In a sample without a guide, lights are chosen by power, whatever their groups.
+  CHECK(by_power(parts) == Approx(expected).epsilon(0.02));
 }
 
 namespace {

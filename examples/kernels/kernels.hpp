@@ -242,7 +242,7 @@ struct shade {
 
   KERNELS_BOTH void sample_light(shading<Bsdf>& s) const {
     const render::light_sample light =
-        at.lights.sample(at.scene, s.v.position, {}, [&](std::uint32_t use) { return at.draw(s.id, use); });
+        at.lights.sample(at.scene, s.v.position, [&](std::uint32_t use) { return at.draw(s.id, use); });
     const vec3 wi = s.local.to_local(light.direction);
     if (!(light.pdf > 0.0f) || !s.can_pass(wi, light.direction)) return;
     const spectrum value = s.bsdf.value(s.wo, wi, s.walks);
@@ -315,7 +315,7 @@ struct scatter_in_fog {
     path& p = at.paths[id];
     const vec3 from = at.vertices[id].position;
     const render::light_sample light =
-        at.lights.sample(at.scene, from, {}, [&](std::uint32_t use) { return at.draw(id, use); });
+        at.lights.sample(at.scene, from, [&](std::uint32_t use) { return at.draw(id, use); });
     if (light.pdf > 0.0f) {
       const float weight = light.is_delta ? 1.0f : mis_weight(light.pdf, phase);
       ask(at, id, from, light, p.throughput * p.waves.of(light.radiance) * (phase * weight / light.pdf));

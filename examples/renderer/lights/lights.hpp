@@ -55,7 +55,8 @@ WFPG_HD inline float solid_angle_pdf(float area_pdf, float distance, float cosin
 struct light_view {
   wfpg::array_view<const std::uint32_t> lights;  ///< as in grouped_lights
   wfpg::array_view<const punctual_light> punctual;
-  wfpg::array_view<const alias_column> table;  ///< by power inside a group, a column a light
+  wfpg::array_view<const alias_column> table;   ///< by power inside a group, a column a light
+  wfpg::array_view<const alias_column> of_all;  ///< by power among all lights, a column a light
   wfpg::array_view<const light_group> groups;
   wfpg::array_view<const std::uint8_t> triangle_groups;  ///< of all triangles; empty: there is one group
   float total_power = 0.0f;   ///< over pi; of an emitter, mean luminance times area
@@ -109,24 +110,46 @@ struct light_view {
   }
   WFPG_HD std::uint32_t sky_group() const { return static_cast<std::uint32_t>(groups.size() - 1); }
 
-  /// Samples light for a point from the chosen group. draw(dimension) returns random numbers in [0,1)².
+  /// A light of a group, from u in [0,1)². Lights are columns of the table.
+  WFPG_HD std::uint32_t pick_in(std::uint32_t group, vec2 u) const {
+    const light_group of = groups[group];
+    return of.first + pick({table.data() + of.first, of.count}, u);
+  }
+  /// A light of all. Precondition: there is one.
+  WFPG_HD std::uint32_t pick_of_all(vec2 u) const { return pick(of_all, u); }
+
+  /// Samples one of the lights for a point, which was picked of all. draw(dimension) returns random numbers
+  /// in [0,1)².
   template <class Draw>
-  WFPG_HD light_sample sample(const scene_view& scene, vec3 from, const wfpg::light_choice& choice,
+  WFPG_HD light_sample sample(const scene_view& scene, vec3 from, std::uint32_t light,
                               const Draw& draw) const {
-    if (table.empty()) return {};
-    const light_group group = groups[choice.group];
-    const std::uint32_t column =
-        pick({table.data() + group.first, group.count}, draw(dimension::light_choice));
-    light_sample light = sample_light(scene, from, group.first + column, draw);
-    light.pdf *= choice.probability / group.share;
-    return light;
+    const std::uint32_t number = lights[light];
+    if ((number & grouped_lights::beyond_triangles) == 0)
+      return from_emitter(sample_emitter(scene, light, draw(dimension::light_point)), from);
+    const std::uint32_t beyond = number & ~grouped_lights::beyond_triangles;
+    if (beyond < punctual.size()) return from_punctual(punctual[beyond], from);
+    const vec3 direction =
+        scene.environment.sample(draw(dimension::light_texel), draw(dimension::light_point));
+    light_sample sky;
+    sky.direction = direction;
+    sky.pdf = environment_pdf(scene.environment, direction);
+    sky.radiance = scene.environment.radiance(direction);
+    sky.is_distant = true;
+    sky.source = distant_end(sky.pdf, false);
+    return sky;
+  }
+  /// Picks a light of all, and samples it. There may be none.
+  template <class Draw>
+  WFPG_HD light_sample sample(const scene_view& scene, vec3 from, const Draw& draw) const {
+    if (of_all.empty()) return {};
+    return sample(scene, from, pick_of_all(draw(dimension::light_choice)), draw);
   }
 
-  /// Samples a ray of light from all lights as one group. draw(dimension) returns random numbers in [0,1)².
+  /// Samples a ray of light from all lights. draw(dimension) returns random numbers in [0,1)².
   template <class Draw>
   WFPG_HD emitted_ray emit(const scene_view& scene, const Draw& draw) const {
-    if (table.empty()) return {};
-    const std::uint32_t light = pick(table, draw(dimension::light_choice));
+    if (of_all.empty()) return {};
+    const std::uint32_t light = pick_of_all(draw(dimension::light_choice));
     emitted_ray emitted = emit_from(scene, light, draw);
     emitted.light = light;
     return emitted;
@@ -216,26 +239,6 @@ struct light_view {
     return emitted;
   }
 
-  /// Samples light as if all lights were one group.
-  template <class Draw>
-  WFPG_HD light_sample sample_light(const scene_view& scene, vec3 from, std::uint32_t light,
-                                    const Draw& draw) const {
-    const std::uint32_t number = lights[light];
-    if ((number & grouped_lights::beyond_triangles) == 0)
-      return from_emitter(sample_emitter(scene, light, draw(dimension::light_point)), from);
-    const std::uint32_t beyond = number & ~grouped_lights::beyond_triangles;
-    if (beyond < punctual.size()) return from_punctual(punctual[beyond], from);
-    const vec3 direction =
-        scene.environment.sample(draw(dimension::light_texel), draw(dimension::light_point));
-    light_sample sky;
-    sky.direction = direction;
-    sky.pdf = environment_pdf(scene.environment, direction);
-    sky.radiance = scene.environment.radiance(direction);
-    sky.is_distant = true;
-    sky.source = distant_end(sky.pdf, false);
-    return sky;
-  }
-
   WFPG_HD static light_sample from_emitter(const emitter_point& point, vec3 from) {
     const vec3 toward = point.position - from;
     const float distance = glm::length(toward);
@@ -293,6 +296,7 @@ class light_distribution {
     v.lights = lights_.view();
     v.punctual = punctual_.view();
     v.table = table_.view();
+    v.of_all = shares_.size() > 1 ? of_all_.view() : v.table;
     v.groups = groups_.view();
     v.triangle_groups = triangle_groups_.view();
     v.total_power = total_power_;
@@ -324,6 +328,8 @@ class light_distribution {
       shares_.push_back(group.share);
     }
     table_ = wfpg::buffer<alias_column, Exec>(exec, table);
+    if (shares_.size() > 1)
+      of_all_ = wfpg::buffer<alias_column, Exec>(exec, make_alias_table(grouped.powers));
   }
 
   static float checked(double total_power) {
@@ -337,6 +343,7 @@ class light_distribution {
   wfpg::buffer<light_group, Exec> groups_;
   wfpg::buffer<std::uint8_t, Exec> triangle_groups_;
   wfpg::buffer<alias_column, Exec> table_;
+  wfpg::buffer<alias_column, Exec> of_all_;  // where there are several groups
   std::vector<float> shares_;
   float total_power_;
   float radius_;

@@ -124,9 +124,9 @@ struct sample_lights {
   WFPG_HD technique_sum sample_light(std::uint32_t id, const subpath_vertex& vertex,
                                      const scatterer& f) const {
     technique_sum sum;
-    const light_sample light =
-        world.lights.sample(world.scene, vertex.at.position, wfpg::light_choice{},
-                            [&](std::uint32_t use) { return world.draw(id, vertex.segments, use); });
+    const light_sample light = world.lights.sample(world.scene, vertex.at.position, [&](std::uint32_t use) {
+      return world.draw(id, vertex.segments, use);
+    });
     if (!(light.pdf > 0.0f)) return sum;
     const vec3 value = f.eval_rgb(vertex.at.outgoing, light.direction) * light.radiance / light.pdf;
     if (!(wfpg::luminance(value) > 0.0f)) return sum;

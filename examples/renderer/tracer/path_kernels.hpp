@@ -28,27 +28,32 @@ struct path_lights {
   scene_view scene;
   light_view lights;
   bool next_event = true;
-  wfpg::light_guide_view guide = {};  ///< empty: lights are chosen by power
+  wfpg::light_guide_view guide = {};  ///< rests: lights are chosen by power
 
-  /// Chooses the group of lights for a vertex. draw() returns a number in [0, 1) where there is a choice.
+  /// A light that was chosen for a vertex.
+  struct chosen_light {
+    std::uint32_t light = 0;  ///< a column of the lights' table
+    float preference = 1.0f;  ///< probability of its group, over that by power
+    std::uint32_t choice = wfpg::no_light_choice;
+  };
+  /// Chooses a light for a vertex. draw(dimension) returns random numbers in [0,1)². Precondition: there is
+  /// a light.
   template <class Draw>
-  WFPG_HD wfpg::light_choice choose(const path_vertex& vertex, const Draw& draw) const {
-    if (!guide.empty()) return guide.choose(row(vertex), draw());
-    return lights.groups.size() < 2 ? wfpg::light_choice() : choose_by_power(draw());
+  WFPG_HD chosen_light choose(const path_vertex& vertex, const Draw& draw) const {
+    const vec2 u = draw(dimension::light_choice);
+    if (guide.rests()) return {lights.pick_of_all(u), 1.0f, wfpg::no_light_choice};
+    const wfpg::light_choice choice = guide.choose(row(vertex), draw(dimension::light_group).x);
+    return {lights.pick_in(choice.group, u), choice.probability / lights.groups[choice.group].share,
+            choice.key};
   }
-  /// The probability of a group at a vertex, over its probability by power.
-  WFPG_HD float preference(const path_vertex& vertex, std::uint32_t group) const {
-    return guide.empty() ? 1.0f : guide.probability(row(vertex), group) / lights.groups[group].share;
+  /// The probability of a group at a vertex with this choice, over its probability by power.
+  WFPG_HD float preference(const path_vertex& vertex, std::uint32_t choice, std::uint32_t group) const {
+    if (guide.rests()) return 1.0f;
+    const std::uint32_t of = choice == wfpg::no_light_choice ? row(vertex) : guide.row_of(choice);
+    return guide.probability(of, group) / lights.groups[group].share;
   }
 
  private:
-  // Lights may be in groups also in a sample without a guide.
-  WFPG_HD wfpg::light_choice choose_by_power(float u) const {
-    std::uint32_t group = 0;
-    while (group + 1 < lights.groups.size() && u >= lights.groups[group].share)
-      u -= lights.groups[group++].share;
-    return {group, lights.groups[group].share, wfpg::no_light_choice};
-  }
   WFPG_HD std::uint32_t row(const path_vertex& vertex) const {
     return guide.find(vertex.position, vertex.geometric_normal);
   }
@@ -131,6 +136,7 @@ struct trace_paths {
   path_queue queue;  ///< of the previous vertex
   tiled_view<path_state> paths;
   tiled_view<path_vertex> vertices;
+  tiled_view<light_query> queries;       ///< of the previous vertex
   wfpg::array_view<std::uint32_t> keys;  ///< the material's kind, or excluded
   wfpg::array_view<vec3> radiance;
   wfpg::array_view<std::uint32_t> segments;
@@ -149,7 +155,7 @@ struct trace_paths {
       recorder.escape(id, at.depth, path.throughput);
       const vec3 sky = world.scene.environment.radiance(path.direction);
       count_light(id, sky);
-      gather(id, path.throughput * sky * environment_weight(id, path));
+      gather(id, path.throughput * sky * environment_weight(slot, id, path));
       return end(id);
     }
     const hit_surface found = world.scene.surface(hit, -path.direction, !at.is_last());
@@ -157,7 +163,7 @@ struct trace_paths {
     const vec3 before = path.throughput, throughput = before * absorb(id, path, found);
     recorder.vertex(id, at.depth, surface.position, surface.outgoing, throughput);
     count_light(id, found.emission);
-    gather(id, throughput * found.emission * emission_weight(id, path, hit, found));
+    gather(id, throughput * found.emission * emission_weight(slot, id, path, hit, found));
     if (at.is_last()) return end(id);
     vertices.emplace(id, found);
     keys[id] = static_cast<std::uint32_t>(surface.bsdf.kind);
@@ -190,22 +196,27 @@ struct trace_paths {
     recorder.emission(id, at.depth, contribution);
   }
 
-  WFPG_HD float environment_weight(std::uint32_t id, const path_state& path) const {
+  WFPG_HD float environment_weight(std::size_t slot, std::uint32_t id, const path_state& path) const {
     if (!world.next_event || !(path.pdf > 0.0f)) return 1.0f;
     const float pdf = world.lights.environment_pdf(world.scene.environment, path.direction);
     if (!(pdf > 0.0f)) return 1.0f;
-    return wfpg::power_heuristic(path.pdf, pdf * world.preference(vertices[id], world.lights.sky_group()));
+    return wfpg::power_heuristic(path.pdf, pdf * preference(slot, id, world.lights.sky_group()));
+  }
+
+  // Precondition: the path has a previous vertex.
+  WFPG_HD float preference(std::size_t slot, std::uint32_t id, std::uint32_t group) const {
+    return world.preference(vertices[id], queries[slot].choice, group);
   }
 
   // MIS weight against next-event estimation at the previous vertex, which could have found this point.
-  WFPG_HD float emission_weight(std::uint32_t id, const path_state& path, const triangle_hit& hit,
-                                const hit_surface& found) const {
+  WFPG_HD float emission_weight(std::size_t slot, std::uint32_t id, const path_state& path,
+                                const triangle_hit& hit, const hit_surface& found) const {
     if (!world.next_event || !(path.pdf > 0.0f) || found.emission == vec3(0.0f)) return 1.0f;
     const vec3 normal = found.surface.geometric_normal;
     const float cosine = std::abs(glm::dot(normal, path.direction));
     const float distance = glm::length(found.surface.position - path.origin);
-    const float pdf = world.lights.pdf(found.emitted_luminance) *
-                      world.preference(vertices[id], world.lights.group_of(hit.triangle));
+    const float pdf =
+        world.lights.pdf(found.emitted_luminance) * preference(slot, id, world.lights.group_of(hit.triangle));
     return wfpg::power_heuristic(path.pdf, solid_angle_pdf(pdf, distance, cosine));
   }
 };
@@ -230,12 +241,12 @@ struct query_lights {
   WFPG_HD light_query query(std::size_t slot, std::uint32_t path) const {
     const path_vertex& vertex = vertices[path];
     const bsdf scatters = vertex.bsdf();
-    if (scatters.is_delta()) return {};
-    const wfpg::light_choice choice =
-        world.choose(vertex, [&] { return at.draw(path, dimension::light_group).x; });
-    const light_sample light = world.lights.sample(world.scene, vertex.position, choice,
-                                                   [&](std::uint32_t use) { return at.draw(path, use); });
-    const light_query nothing(choice.key);
+    if (scatters.is_delta() || world.lights.of_all.empty()) return {};
+    const auto draw = [&](std::uint32_t use) { return at.draw(path, use); };
+    const path_lights::chosen_light chosen = world.choose(vertex, draw);
+    light_sample light = world.lights.sample(world.scene, vertex.position, chosen.light, draw);
+    light.pdf *= chosen.preference;
+    const light_query nothing(chosen.choice);
     if (!(light.pdf > 0.0f)) return nothing;
     light_query result = nothing;
     result.direction = light.direction;

@@ -152,7 +152,7 @@ struct add_volume_light {
 
  private:
   WFPG_HD light_sample sample(std::uint32_t id, vec3 from) const {
-    return world.lights.sample(world.scene, from, {}, [&](std::uint32_t use) { return at.draw(id, use); });
+    return world.lights.sample(world.scene, from, [&](std::uint32_t use) { return at.draw(id, use); });
   }
 
   WFPG_HD vec3 in_medium(std::uint32_t id, const volume_path& path) const {

@@ -199,6 +199,7 @@ class path_tracer {
             queue,
             paths_.view(),
             vertices_.view(),
+            queries_.view(),
             keys_.view(),
             radiance_.view(),
             film_.segment_counts(),

@@ -44,6 +44,9 @@ class light_guide_view {
  public:
   /// True: there are no groups to choose from, and the host samples its lights as it would without.
   WFPG_HD bool empty() const { return rows_.groups == 0; }
+  /// True: nothing is learnt in this sample, and choose() follows the weights alone. A host with a table of
+  /// all its lights may choose by that, which takes less time. Also true where it is empty.
+  WFPG_HD bool rests() const { return tree_.empty(); }
   /// Number of groups, at most 256.
   WFPG_HD std::uint32_t groups() const { return rows_.groups; }
 
@@ -57,6 +60,10 @@ class light_guide_view {
     const node_id node = tree_.nearest_node(position, level_);
     return static_cast<std::uint32_t>(rows_.row(node == invalid_node ? 0 : node, dominant_axis(normal)));
   }
+
+  /// Returns the row of a choice by its key. O(1), so that a host need not call find() again where a ray hits
+  /// an emitter. Precondition: the key is not no_light_choice.
+  WFPG_HD std::uint32_t row_of(std::uint32_t key) const { return first_row_ + key / rows_.groups; }
 
   /// Samples a group of lights for a row from u in [0, 1). O(log groups). Precondition: the row is from
   /// find().
@@ -86,7 +93,7 @@ class light_guide_view {
     const std::uint32_t entry = queue_.reserve(1);
     if (!queue_.fits(entry)) return;
     // Without the probability, so that means do not depend on how often a group is chosen.
-    const float scattered = estimate * probability(first_row_ + key / rows_.groups, key % rows_.groups);
+    const float scattered = estimate * probability(row_of(key), key % rows_.groups);
     if (!(scattered >= 0.0f) || !is_finite(scattered)) return queue_.drop(entry);
     queue_.write(entry, key, min(scattered, most));
   }
