@@ -34,6 +34,11 @@ class Programs:
         return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
 
 
+def seconds(stats):
+    """A rendering's time, without what stands before all methods."""
+    return stats["seconds"]["total"] - stats["seconds"].get("embree", 0.0) - stats["seconds"].get("bvh", 0.0)
+
+
 def unguided_options(options):
     """Those of a scene's options that path tracing has, too."""
     return [] if "--light-groups" in options else options

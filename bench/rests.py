@@ -13,7 +13,7 @@ import statistics
 import sys
 import tempfile
 
-from programs import SEEDS, Programs, begin_results, renderings_at_once, unguided_options, write_results
+from programs import SEEDS, Programs, begin_results, renderings_at_once, seconds, unguided_options, write_results
 
 BUILT_IN = {"ajar": "", "cornell-box": "", "cornell-enclosed": "--nee off", "cornell-wall": "", "furnace": "", "glossy-room": "--nee off",
             "materials": "", "outdoor": "", "thin-wall": "--max-depth 6"}
@@ -50,11 +50,6 @@ class Cell:
         return {"gain": round(gain, 3), "time": round(time, 3), "equal_time": round(gain / time, 3),
                 "seconds_pt": round(statistics.median(pt), 2),
                 "rested": [self.statistics["wfpg"][seed]["rest"]["samples"] for seed in SEEDS]}
-
-
-def seconds(stats):
-    """A rendering's time, without what stands before all methods."""
-    return stats["seconds"]["total"] - stats["seconds"].get("embree", 0.0) - stats["seconds"].get("bvh", 0.0)
 
 
 def main(directory, out, device, folder):

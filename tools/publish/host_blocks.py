@@ -104,9 +104,16 @@ def rests_gpu_loss(results: Results) -> str:
     return f"{100 * (1 - min(map(min, at_equal_time(results, 'gpu', '16', '64').values()))):.0f}%"
 
 
+def with_interval(of: List[float]) -> str:
+    """A median and the ends of its interval."""
+    return f"{of[0]:.2f} ({of[1]:.2f} to {of[2]:.2f})"
+
+
 @block
-def rests_cpu_loss(results: Results, samples: str) -> str:
-    """The most that guiding costs on a CPU in scenes whose guides rest."""
-    scenes = results.json(REST, "cpu", "scenes")
-    lost = [1 - scene[samples]["equal_time"] for scene in scenes.values() if all(scene["64"]["rested"])]
-    return f"{100 * max(lost):.0f}%"
+def pairs(results: Results, samples: str) -> Rows:
+    """Times of guided renderings over path tracing's, and gains at equal time, one after the other on a core."""
+    rows = [["scene", "time", "equal time", "products: time", "products: equal time", "samples that rest"]]
+    for scene, cell in results.json("pairs.json", samples, "scenes").items():
+        found = [with_interval(cell[method][what]) for method in ("wfpg", "wfpg-product") for what in ("time", "equal_time")]
+        rows.append([scene.replace(".glb", ""), *found, f"{cell['wfpg']['rested']:.0f}"])
+    return rows
