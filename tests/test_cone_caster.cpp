@@ -55,7 +55,7 @@ struct shining_box : cached_scene<Exec> {
 
   template <class Radiance>
   explicit shining_box(const Radiance& radiance)
-      : cached_scene<Exec>(box_mesh(), 32, 6 * 64 * 64), opacity(this->exec, this->tree) {
+      : cached_scene<Exec>(cuboid_mesh(), 32, 6 * 64 * 64), opacity(this->exec, this->tree) {
     constexpr int n = 64;
     std::vector<deposit> light;
     for (int i = 0; i < 6 * n * n; ++i) {
@@ -170,7 +170,7 @@ WFPG_TEST_CASE("cone caster: a wall hides light from cones of any width", "[cone
 
 /// The unit box without the wall y = 1.
 test_mesh open_box() {
-  test_mesh mesh = box_mesh();
+  test_mesh mesh = cuboid_mesh();
   mesh.triangles.resize(10);
   return mesh;
 }

@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace wfpg_test {
+namespace cone_caster_fields_test {
 
 /// Counts cones that do not have the expected width.
 struct width_caster {
@@ -25,11 +25,12 @@ struct width_caster {
   }
 };
 
-}  // namespace wfpg_test
+}  // namespace cone_caster_fields_test
 
 namespace {
 
 using namespace wfpg_test;
+using cone_caster_fields_test::width_caster;
 using wfpg::guiding_mode;
 using wfpg::svo_cone_caster;
 

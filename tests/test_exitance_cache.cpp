@@ -172,7 +172,7 @@ struct slot_of_deposit {
 };
 
 WFPG_TEST_CASE("leaf means equal the means of the deposits", "[exitance_cache]") {
-  const test_mesh mesh = box_mesh();
+  const test_mesh mesh = cuboid_mesh();
   cached_scene<Exec> scene(mesh, 8, 20000);
   std::vector<double> sums(2 * scene.octree().node_count(), 0.0), counts = sums;
   for (int round = 0; round < 3; ++round) {
@@ -436,7 +436,7 @@ TEST_CASE("a mean counts up to 2^32 - 1 values, in batches of any size", "[exita
 }
 
 WFPG_TEST_CASE("an octree and its cache use at most 29 bytes a node", "[exitance_cache]") {
-  for (const test_mesh& mesh : {sphere_mesh(24), box_mesh(), box_mesh({0, 0, 0}, {4, 3, 2.2f})})
+  for (const test_mesh& mesh : {sphere_mesh(24), cuboid_mesh(), cuboid_mesh({0, 0, 0}, {4, 3, 2.2f})})
     for (const std::uint32_t resolution : {32u, 128u}) {
       const cached_scene<Exec> scene(mesh, resolution, 100);
       const std::size_t nodes = scene.tree.node_count(), leaves = scene.tree.leaf_count();

@@ -62,12 +62,16 @@ WFPG_TEST_CASE("index lists have the marked elements in ascending order", "[inde
   }
 }
 
+namespace {
+
 struct kernel_that_waits : mark_some {
   static constexpr bool waits_for_memory = true;
 };
 struct kernel_that_computes : mark_some {
   static constexpr bool waits_for_memory = false;
 };
+
+}  // namespace
 
 TEST_CASE("index lists tell a policy which kernels wait for memory", "[index_list]") {
   using wfpg::detail::call_at_index;

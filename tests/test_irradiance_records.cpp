@@ -11,9 +11,6 @@
 #include <string>
 #include <vector>
 
-// All members compile, as a host's explicit instantiation needs.
-template class wfpg::path_guider<wfpg::exec::seq, wfpg::irradiance_records<wfpg::exec::seq>>;
-
 namespace {
 
 using namespace wfpg_test;

@@ -291,7 +291,7 @@ WFPG_TEST_CASE("BVHs and hits are equal on all policies", "[renderer][bvh]") {
 
 TEST_CASE("numbers of a leaf's triangles out of range are refused", "[renderer][bvh]") {
   const wfpg::exec::tbb exec;
-  const device_mesh<wfpg::exec::tbb> box(exec, box_mesh());
+  const device_mesh<wfpg::exec::tbb> box(exec, cuboid_mesh());
   CHECK_THROWS_AS(bvh_scene<wfpg::exec::tbb>(exec, box.view(), 0.0f, 0), std::invalid_argument);
   CHECK_THROWS_AS(bvh_scene<wfpg::exec::tbb>(exec, box.view(), 0.0f, 8), std::invalid_argument);
 }

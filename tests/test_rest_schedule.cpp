@@ -360,17 +360,17 @@ TEST_CASE("rest: a guide that waits is saved, restored and woken up", "[rest]") 
 }
 
 TEST_CASE("rest: where few paths find light, a gain of about 1 is enough to go on", "[rest]") {
-  const auto noisy_gain_of = [](double value) { return ::noisy_gain_of(value, 60.0); };
+  const auto gain_in_little_light = [](double value) { return noisy_gain_of(value, 60.0); };
   for (const std::uint32_t sample : {4u, 32u}) {
     rest_schedule calm(2.0f, 1), noisy(2.0f, 1), unsure(2.0f, 1), worse(2.0f, 1);
     calm.decide(sample, calm_gain_of(1.2));
     CHECK(calm.resting());
-    noisy.decide(sample, noisy_gain_of(0.96));
+    noisy.decide(sample, gain_in_little_light(0.96));
     CHECK(!noisy.resting());
     CHECK(!noisy.probes(sample + 1));
-    unsure.decide(sample, noisy_gain_of(0.93));
+    unsure.decide(sample, gain_in_little_light(0.93));
     CHECK(unsure.probes(sample + 1));
-    worse.decide(sample, noisy_gain_of(0.88));
+    worse.decide(sample, gain_in_little_light(0.88));
     CHECK(worse.resting());
   }
 }

@@ -10,9 +10,6 @@
 #include <string>
 #include <vector>
 
-// All members compile, as a host's explicit instantiation needs.
-template class wfpg::path_guider<wfpg::exec::seq, wfpg::sarsa_grid<wfpg::exec::seq>>;
-
 namespace {
 
 using namespace wfpg_test;

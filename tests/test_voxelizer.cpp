@@ -75,7 +75,7 @@ struct scenario {
 test_mesh snapped_triangles() {
   // The box makes voxels of 17/256 from -8/256. Whole steps are their faces, half steps their centres.
   random_numbers random(21);
-  test_mesh mesh = box_mesh();
+  test_mesh mesh = cuboid_mesh();
   const auto coordinate = [&] { return (8.5f * static_cast<float>(1 + random.below(31)) - 8.0f) / 256.0f; };
   while (mesh.triangles.size() < 150) {
     vec3 p[3];
@@ -91,7 +91,7 @@ test_mesh snapped_triangles() {
 }
 
 test_mesh walls() {
-  test_mesh mesh = box_mesh();
+  test_mesh mesh = cuboid_mesh();
   mesh.add_quad({0, 0, 0.3f}, {1, 0, 0}, {0, 1, 0});
   mesh.add_quad({0, 0, 0}, {1, 0, 1}, {0, 1, 0});
   mesh.add({0, 0, 1}, {1, 0, 0}, {0, 1, 0});

@@ -167,7 +167,7 @@ TEST_CASE("OptiX respects a ray's ends", "[optix]") {
   CHECK(count_hits(mesh, rays, ask(exec, scene.caster(), rays)) > 2000);
 
   const vec3 inside(0.5f), up(0.0f, 0.0f, 1.0f);
-  const test_mesh box = box_mesh();
+  const test_mesh box = cuboid_mesh();
   const render::optix_scene boxed = build(exec, box);
   const std::vector<wfpg::ray> sound{{inside, 0.0f, up, infinity},
                                      {inside, -1.0f, up, 1.0f},
@@ -205,7 +205,7 @@ TEST_CASE("all rays miss in a scene without triangles", "[optix]") {
   without_positions.triangles = {{0, 1, 2}};
   for (const test_mesh& mesh : {test_mesh(), without_triangles, without_positions})
     CHECK(all_miss(ask(exec, build(exec, mesh).caster(), rays)));
-  const answers nothing = ask(exec, build(exec, box_mesh()).caster(), {});
+  const answers nothing = ask(exec, build(exec, cuboid_mesh()).caster(), {});
   CHECK(nothing.hits.empty());
 }
 

@@ -19,8 +19,9 @@ bidirectional_options merges(bool points, bool beams) {
   return options;
 }
 
-float radiance_by(const bidirectional_options& options, std::uint32_t max_segments) {
-  return radiance(exec::tbb(), options, lamp, eye, ahead, max_segments, 32).x;
+float radiance_by(const bidirectional_options& options, std::uint32_t max_segments,
+                  std::uint32_t iterations = 32) {
+  return radiance(exec::tbb(), options, lamp, eye, ahead, max_segments, iterations).x;
 }
 
 /// Light of the lamp that scatters once toward the eye. The midpoint rule.
@@ -40,12 +41,17 @@ double scattered_once() {
 
 }  // namespace
 
-TEST_CASE("the host of docs/bidirectional.md finds the light that fog scatters once", "[pages]") {
+TEST_CASE("the host of docs/bidirectional.md finds light in an iteration", "[pages]") {
+  for (const bool beams : {false, true}) CHECK(radiance_by(merges(!beams, beams), 3, 1) > 0.0f);
+}
+
+// Sanitizers take minutes for the others.
+TEST_CASE("the host of docs/bidirectional.md finds the light that fog scatters once", "[pages][slow]") {
   CHECK(double(radiance_by(merges(false, true), 2)) == Approx(scattered_once()).epsilon(0.03));
   CHECK(double(radiance_by(merges(true, true), 2)) == Approx(scattered_once()).epsilon(0.03));
 }
 
-TEST_CASE("the host of docs/bidirectional.md finds the same light by points and by beams", "[pages]") {
+TEST_CASE("the host of docs/bidirectional.md finds the same light by points and by beams", "[pages][slow]") {
   const float by_beams = radiance_by(merges(false, true), 3);
   CHECK(by_beams > 1.2f * float(scattered_once()));
   CHECK(radiance_by(merges(true, false), 3) == Approx(by_beams).epsilon(0.08));

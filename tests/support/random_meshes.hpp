@@ -103,7 +103,7 @@ inline test_mesh sphere_mesh(int rings, wfpg::vec3 centre = wfpg::vec3(0.0f), fl
 }
 
 /// The six faces of a box, normals outward.
-inline test_mesh box_mesh(wfpg::vec3 lower = wfpg::vec3(0.0f), wfpg::vec3 upper = wfpg::vec3(1.0f)) {
+inline test_mesh cuboid_mesh(wfpg::vec3 lower = wfpg::vec3(0.0f), wfpg::vec3 upper = wfpg::vec3(1.0f)) {
   const wfpg::vec3 e = upper - lower, x(e.x, 0, 0), y(0, e.y, 0), z(0, 0, e.z);
   test_mesh mesh;
   mesh.add_quad(lower, y, x);
