@@ -39,3 +39,12 @@ function(wfpg_compile_cuda_fast target)
   target_compile_options(
     ${target} PRIVATE $<$<AND:$<COMPILE_LANGUAGE:CUDA>,$<BOOL:${WFPG_CUDA_COMPILES_FAST}>>:-Ofc=max>)
 endfunction()
+
+# Adds a library of PTX, which is compiled to find errors: of the first architecture, and hardly optimised.
+function(wfpg_add_ptx name source)
+  add_library(${name} OBJECT ${source})
+  list(GET CMAKE_CUDA_ARCHITECTURES 0 first)
+  string(REGEX REPLACE "^([0-9]+)$" "\\1-virtual" first "${first}")
+  set_target_properties(${name} PROPERTIES CUDA_PTX_COMPILATION ON CUDA_ARCHITECTURES "${first}")
+  wfpg_compile_cuda_fast(${name})
+endfunction()
