@@ -87,8 +87,8 @@ def source(root: pathlib.Path, name: str, page: str) -> str:
     """A file's commit and date, with a link to the list of results."""
     entry = provenance(root, name)
     link = "results.md" if page.startswith("docs/") else "docs/results.md"
-    before = "before " if entry["commit_is"] == "log" else ""
-    return f"[{name.split('#')[0]}]({link}), {before}commit {entry['commit']}, {entry['date']}"
+    before, older = "before " if entry["commit_is"] == "log" else "", " (older code)" if entry.get("stale") else ""
+    return f"[{name.split('#')[0]}]({link}), {before}commit {entry['commit']}{older}, {entry['date']}"
 
 
 def generate(results: Results, name: str, page: str) -> str:

@@ -2,6 +2,7 @@
 
 bench/results/index.json has what the files do not say themselves. `commit_is` tells how a commit is known: "measured" at
 it, as the file or its program said, or "log": the file came with that commit, so that it was measured shortly before.
+`stale` marks what was measured before the sources changed; pages then say "older code".
 Where a part of a JSON file has another commit, the index has an entry FILE#KEY for it, too. `sources` is a hash of what was
 measured.
 """
@@ -95,6 +96,11 @@ def sources(root: pathlib.Path) -> Optional[str]:
     """A hash of the sources that are checked out, which stays where commits are rebased. None without git."""
     done = _git(root, "ls-files", "--stage", "--", *SOURCES)
     return hashlib.sha256(done.stdout.encode()).hexdigest()[:12] if done and done.returncode == 0 and done.stdout else None
+
+
+def is_older(root: pathlib.Path, entry: Entry) -> bool:
+    """Whether an entry without a mark is known to be stale, by sources that are committed or staged."""
+    return not entry.get("stale") and "sources" in entry and sources(root) not in (None, entry["sources"])
 
 
 def is_stale(root: pathlib.Path, entry: Entry) -> Optional[bool]:

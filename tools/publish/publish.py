@@ -2,7 +2,7 @@
 """Keeps the figures of README.md and docs/ equal to the files of bench/results, and measures these files.
 
 usage: tools/publish/publish.py --check             fails where a block differs from its file, or a figure has no block
-       tools/publish/publish.py --write             generates all blocks anew
+       tools/publish/publish.py --write             marks stale results, and generates all blocks anew
        tools/publish/publish.py --list              prints all series, and whether they are current
        tools/publish/publish.py --measure [NAME...] measures all series or those, passing over current ones; then --write
        tools/publish/publish.py --planted           plants faults in copies of pages, and fails where one is not found
@@ -10,6 +10,7 @@ usage: tools/publish/publish.py --check             fails where a block differs 
 --help has all options. pages.py says what a block is, series.py what is measured, and exceptions.ini which figures are no results.
 """
 import argparse
+import json
 import pathlib
 import sys
 from typing import Dict, List, Set
@@ -26,7 +27,7 @@ from blocks import ROOT, Results, generate
 from measuring import Place, list_series, measure
 from pages import BLOCK, INLINE, Exempt, differing, faults_of_markers, outside, read_exceptions, rewrite
 from plots import differing_plots, drawn, write_plots
-from provenance import is_stale, provenance, read_index, result_files
+from provenance import RESULTS, Entry, is_older, is_stale, provenance, read_index, result_files, write_index
 
 EXCEPTIONS = pathlib.Path(__file__).resolve().parent / "exceptions.ini"
 
@@ -44,16 +45,38 @@ def check_page(results: Results, page: str, text: str, exceptions: List[Exempt],
     return [f"{page}:{line}: {what}" for line, what in sorted(found)]
 
 
-def check_index(root: pathlib.Path) -> List[str]:
-    """Result files without commit or date, and entries without a file. A file may have entries of its parts alone."""
-    index, files = read_index(root), result_files(root)
-    named = {name.split("#")[0] for name in index}
-    found = [f"bench/results/index.json has no {name}" for name in files if name not in named]
+def parts_of(root: pathlib.Path, name: str) -> Set[str]:
+    """The names FILE#KEY of a result file's parts."""
+    if not name.endswith(".json"):
+        return set()
+    return {f"{name}#{key}" for key, value in json.loads((root / RESULTS / name).read_text()).items() if isinstance(value, dict)}
+
+
+def check_index(root: pathlib.Path, index: Dict[str, Entry]) -> List[str]:
+    """Result files without commit or date, entries without a file, and stale ones without a mark. A file has an entry, or
+    each part of it has one."""
+    files, found = result_files(root), []
+    for name in files:
+        missing = {name} if not (parts := parts_of(root, name)) else parts
+        if name not in index:
+            found += [f"bench/results/index.json has no {wanted}" for wanted in sorted(missing - set(index))]
     gone = [name for name in index if name.split("#")[0] not in files]
     found += [f"bench/results/index.json has {name}, and there is no such file" for name in gone]
     found += [f"bench/results/index.json: {name} has no {key}" for name in index if name not in gone
               for key in ("commit", "commit_is", "date", "command", "machine") if not provenance(root, name).get(key)]
+    found += [f"bench/results/index.json: {name} is stale and not marked; publish.py --write marks it, and pages say so"
+              for name, entry in index.items() if is_older(root, entry)]
     return found
+
+
+def mark_stale(root: pathlib.Path) -> None:
+    """Marks what was measured before sources changed, so that pages say so."""
+    index = read_index(root)
+    for name, entry in index.items():
+        if not entry.get("stale") and is_stale(root, entry):
+            entry["stale"] = True
+            print(f"{name}: stale")
+    write_index(root, index)
 
 
 def report_stale(root: pathlib.Path) -> None:
@@ -73,7 +96,7 @@ def check(root: pathlib.Path) -> List[str]:
     """All faults of the pages, the plots and the index."""
     results, exceptions = Results(root), read_exceptions(EXCEPTIONS)
     used: Set[Exempt] = set()
-    found = check_index(root) + differing_plots(root, drawn(root))
+    found = check_index(root, read_index(root)) + differing_plots(root, drawn(root))
     for page in page_names(root):
         found += check_page(results, page, (root / page).read_text(encoding="utf-8"), exceptions, used)
     found += [f"exceptions.ini: [{e.kind}] {e.pattern.pattern} covers nothing in {e.pages}" for e in exceptions
@@ -82,7 +105,8 @@ def check(root: pathlib.Path) -> List[str]:
 
 
 def write(root: pathlib.Path) -> None:
-    """Generates the blocks of all pages, and draws the plots."""
+    """Marks stale results, generates the blocks of all pages, and draws the plots."""
+    mark_stale(root)
     write_plots(root)
     results = Results(root)
     for page in page_names(root):
@@ -131,6 +155,13 @@ def planted(root: pathlib.Path) -> List[str]:
         before = len(check_page(Results(root), page, text, exceptions, set()))
         if len(check_page(Results(root), page, changed, exceptions, set())) <= before:
             missed.append(f"not found: {name}")
+    index = read_index(root)
+    for name in (name for name in index if "#" not in name and not parts_of(root, name) or name.split("#")[0] not in index):
+        if not check_index(root, {other: entry for other, entry in index.items() if other != name}):
+            missed.append(f"not found: an index without {name}")
+    unmarked = {name: {**entry, "sources": "0" * 12, "stale": False} for name, entry in index.items()}
+    if len(check_index(root, unmarked)) < len(index):
+        missed.append("not found: results of other sources that are not marked")
     changed_plots = {path: plot + " " for path, plot in drawn(root).items()}
     if len(differing_plots(root, changed_plots)) < len(changed_plots):
         missed.append("not found: a changed plot")

@@ -6,11 +6,11 @@ from provenance import provenance
 @block
 def results_list(results: Results) -> str:
     """Each file of bench/results with its commit, date and machine."""
-    rows = [["file", "commit", "date", "machine"]]
+    rows = [["file", "commit", "code", "date", "machine"]]
     for name in results.index:
         entry = provenance(results.root, name)
         before = "before " if entry["commit_is"] == "log" else ""
-        rows.append([f"`{name}`", before + entry["commit"], entry["date"], entry["machine"]])
+        rows.append([f"`{name}`", before + entry["commit"], "older" if entry.get("stale") else "today's", entry["date"], entry["machine"]])
     return table(rows)
 
 
