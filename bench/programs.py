@@ -70,6 +70,7 @@ def write_results(out, results, part=""):
     gpu = gpu_and_driver()
     command = " ".join([os.path.basename(sys.argv[0]), *sys.argv[1:]])
     head = {f"{part}_command" if part else "command": command, **({"gpu_and_driver": gpu} if gpu else {})}
-    with open(out, "w") as file:
+    with open(out + ".new", "w") as file:
         json.dump({**results, **head}, file, indent=1)
         file.write("\n")
+    os.replace(out + ".new", out)  # so that one that is interrupted loses nothing
