@@ -27,6 +27,17 @@
 /// of them, too.
 #define WFPG_NOINLINE __attribute__((noinline))
 
+/// Stands before a kernel's function that takes most of a sample's time.
+/// All that it calls is inlined into it, and the compiler makes it once.
+/// Compilers stop inlining in large sources, such as a renderer's with several guides.
+/// Products took 1.5 times as long then.
+/// Expands to nothing under nvcc, which inlines anyway.
+#if defined(__CUDACC__)
+#define WFPG_FLATTEN
+#else
+#define WFPG_FLATTEN __attribute__((flatten, noinline))
+#endif
+
 /// Stands before a host's function that seldom runs, such as one that makes an exception.
 /// It is not inlined, and is compiled for size, which takes less time.
 #define WFPG_COLD __attribute__((cold, noinline))

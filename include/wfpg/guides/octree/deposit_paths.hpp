@@ -28,7 +28,7 @@ struct deposit_path {
 
   /// Deposits path `place` of those recorded. O(vertices). It begins at the last vertex, since what leaves a
   /// surface is the sum of all that arrives after it.
-  WFPG_HD void operator()(std::size_t place) const {
+  WFPG_HD WFPG_FLATTEN void operator()(std::size_t place) const {
     const recorded_path path(paths, place);
     const std::uint32_t vertices = path.vertices(), surfaces = path.surfaces();
     if (surfaces == 0) return;

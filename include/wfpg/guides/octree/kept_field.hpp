@@ -223,7 +223,7 @@ struct build_kept_fields {
 
   /// Builds the field of slot list[i]. F² or F²/R cones, then O(F²).
   template <class Block>
-  WFPG_HD void operator()(Block& block, std::size_t i) const {
+  WFPG_HD WFPG_FLATTEN void operator()(Block& block, std::size_t i) const {
     const std::uint32_t slot = list[i];
     const field_cells cells = builder.cells(slot, whole);
     const detail::aimed_cells aimed(block, builder.kept.bright, cells, !whole);

@@ -141,7 +141,7 @@ struct find_field {
   wanted_keys wanted;
   counted_rays counted;
 
-  WFPG_HD std::uint32_t operator()(std::size_t i, std::uint32_t& field) const {
+  WFPG_HD WFPG_FLATTEN std::uint32_t operator()(std::size_t i, std::uint32_t& field) const {
     const use_slot& use = ancestor.use;
     const ray_to_bin ray = rays(i);
     const node_id leaf = ray.active ? leaf_of(ancestor.tree, ray) : invalid_node;

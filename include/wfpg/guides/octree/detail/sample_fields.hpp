@@ -11,7 +11,7 @@ template <class Sampler>
 struct sample_field {
   Sampler sampler;
   resident_fields fields;
-  WFPG_HD void operator()(std::size_t ray, std::uint32_t field) const {
+  WFPG_HD WFPG_FLATTEN void operator()(std::size_t ray, std::uint32_t field) const {
     sampler(static_cast<std::uint32_t>(ray), [&](const auto&) { return fields.mixture(field); });
   }
 };
@@ -22,7 +22,7 @@ template <class Sampler>
 struct sample_product {
   Sampler sampler;
   resident_fields fields;
-  WFPG_HD void operator()(std::size_t ray, std::uint32_t field) const {
+  WFPG_HD WFPG_FLATTEN void operator()(std::size_t ray, std::uint32_t field) const {
     std::uint32_t words[max_product_words];
     sampler(static_cast<std::uint32_t>(ray), [&](const auto& s) { return fields.product(field, s, words); });
   }
