@@ -212,7 +212,12 @@ TEST_CASE("a flat emitter is one light, and lights near each other share a group
 }
 
 TEST_CASE("choices of groups change the lights' densities, not their radiance", "[renderer][lights]") {
-  const scene s = row_of_lamps(5);
+  scene s = row_of_lamps(5);
+  for (std::uint32_t lamp = 0; lamp < 5; ++lamp) {  // of radiance 1, 4, 16, 64, 256
+    s.materials.push_back(s.materials[1]);
+    s.materials.back().emission = vec3(std::pow(4.0f, static_cast<float>(lamp)));
+    for (const std::size_t half : {2, 3}) s.triangle_materials[2 * lamp + half] = 2 + lamp;
+  }
   const wfpg::exec::seq exec;
   const device_scene<wfpg::exec::seq> geometry(exec, s);
   const light_distribution<wfpg::exec::seq> whole(exec, s), parts(exec, s, 32);

@@ -7,7 +7,8 @@
 #include "scene/device_scene.hpp"
 #include "tracer/rng.hpp"
 
-#include <wfpg/guides/octree/light_guide.hpp>
+#include <wfpg/base/error.hpp>
+#include <wfpg/exec/buffer.hpp>
 #include <wfpg/light/path_weights.hpp>
 
 namespace render {
@@ -29,7 +30,7 @@ struct light_sample {
   bool is_delta = false;    ///< it has no extent
   bool is_distant = false;  ///< `end` has no meaning
   vec3 end{0.0f};           ///< where a ray toward it ends
-  wfpg::light_end source;   ///< the light as the end of a path that this sample ends, in one group alone
+  wfpg::light_end source;   ///< the light as the end of a path that this sample ends, picked of all
 };
 
 /// The ray from a point to a light sample. Its t_max is 0 where nothing can be between them.
@@ -118,8 +119,9 @@ struct light_view {
   /// A light of all. Precondition: there is one.
   WFPG_HD std::uint32_t pick_of_all(vec2 u) const { return pick(of_all, u); }
 
-  /// Samples one of the lights for a point, which was picked of all. draw(dimension) returns random numbers
-  /// in [0,1)².
+  /// Samples a light, which is a column of the table, for a point. Its density is that of a light picked of
+  /// all: if its group was chosen otherwise, it has to be multiplied with path_lights::chosen_light's
+  /// preference. draw(dimension) returns random numbers in [0,1)².
   template <class Draw>
   WFPG_HD light_sample sample(const scene_view& scene, vec3 from, std::uint32_t light,
                               const Draw& draw) const {

@@ -32,9 +32,9 @@ struct path_lights {
 
   /// A light that was chosen for a vertex.
   struct chosen_light {
-    std::uint32_t light = 0;  ///< a column of the lights' table
-    float preference = 1.0f;  ///< probability of its group, over that by power
-    std::uint32_t choice = wfpg::no_light_choice;
+    std::uint32_t light = 0;                       ///< a column of the lights' table
+    float preference = 1.0f;                       ///< probability of its group, over that by power
+    std::uint32_t choice = wfpg::no_light_choice;  ///< key of the choice of a group
   };
   /// Chooses a light for a vertex. draw(dimension) returns random numbers in [0,1)². Precondition: there is
   /// a light.

@@ -45,7 +45,7 @@ class light_guide_view {
   /// True: there are no groups to choose from, and the host samples its lights as it would without.
   WFPG_HD bool empty() const { return rows_.groups == 0; }
   /// True: nothing is learnt in this sample, and choose() follows the weights alone. A host with a table of
-  /// all its lights may choose by that, which takes less time. Also true where it is empty.
+  /// all its lights may choose by that, which takes less time. Also true where it is empty. O(1).
   WFPG_HD bool rests() const { return tree_.empty(); }
   /// Number of groups, at most 256.
   WFPG_HD std::uint32_t groups() const { return rows_.groups; }
