@@ -73,4 +73,4 @@ def write_results(out, results, part=""):
     with open(out + ".new", "w") as file:
         json.dump({**results, **head}, file, indent=1)
         file.write("\n")
-    os.replace(out + ".new", out)  # so that one that is interrupted loses nothing
+    os.replace(out + ".new", out)  # an interrupted run loses nothing

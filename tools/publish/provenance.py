@@ -2,7 +2,7 @@
 
 bench/results/index.json has what the files do not say themselves. `commit_is` tells how a commit is known: "measured" at
 it, as the file or its program said, or "log": the file came with that commit, so that it was measured shortly before.
-`stale` marks what was measured before the sources changed; pages then say "older code".
+`stale` marks what was measured from other sources than those that are checked out; pages then say "older code".
 Where a part of a JSON file has another commit, the index has an entry FILE#KEY for it, too. `sources` is a hash of what was
 measured.
 """
@@ -87,8 +87,8 @@ def head(root: pathlib.Path) -> Optional[str]:
 
 
 def is_dirty(root: pathlib.Path) -> bool:
-    """Whether sources differ from the commit that is checked out."""
-    done = _git(root, "status", "--porcelain", "--", *SOURCES)
+    """Whether sources that git tracks differ from the commit that is checked out."""
+    done = _git(root, "status", "--porcelain", "--untracked-files=no", "--", *SOURCES)
     return bool(done and done.stdout.strip())
 
 
@@ -96,11 +96,6 @@ def sources(root: pathlib.Path) -> Optional[str]:
     """A hash of the sources that are checked out, which stays where commits are rebased. None without git."""
     done = _git(root, "ls-files", "--stage", "--", *SOURCES)
     return hashlib.sha256(done.stdout.encode()).hexdigest()[:12] if done and done.returncode == 0 and done.stdout else None
-
-
-def is_older(root: pathlib.Path, entry: Entry) -> bool:
-    """Whether an entry without a mark is known to be stale, by sources that are committed or staged."""
-    return not entry.get("stale") and "sources" in entry and sources(root) not in (None, entry["sources"])
 
 
 def is_stale(root: pathlib.Path, entry: Entry) -> Optional[bool]:
@@ -112,3 +107,9 @@ def is_stale(root: pathlib.Path, entry: Entry) -> Optional[bool]:
         return is_dirty(root) or entry["sources"] != now
     done = _git(root, "diff", "--quiet", entry["commit"], "--", *SOURCES)
     return {0: False, 1: True}.get(done.returncode) if done else None
+
+
+def is_marked_wrongly(root: pathlib.Path, entry: Entry) -> bool:
+    """Whether an entry with a hash of its sources says the opposite of what holds."""
+    stale = is_stale(root, entry) if "sources" in entry else None
+    return stale is not None and stale != bool(entry.get("stale"))

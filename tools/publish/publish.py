@@ -27,7 +27,7 @@ from blocks import ROOT, Results, generate
 from measuring import Place, list_series, measure
 from pages import BLOCK, INLINE, Exempt, differing, faults_of_markers, outside, read_exceptions, rewrite
 from plots import differing_plots, drawn, write_plots
-from provenance import RESULTS, Entry, is_older, is_stale, provenance, read_index, result_files, write_index
+from provenance import RESULTS, Entry, is_marked_wrongly, is_stale, provenance, read_index, result_files, sources, write_index
 
 EXCEPTIONS = pathlib.Path(__file__).resolve().parent / "exceptions.ini"
 
@@ -49,11 +49,12 @@ def parts_of(root: pathlib.Path, name: str) -> Set[str]:
     """The names FILE#KEY of a result file's parts."""
     if not name.endswith(".json"):
         return set()
-    return {f"{name}#{key}" for key, value in json.loads((root / RESULTS / name).read_text()).items() if isinstance(value, dict)}
+    found = json.loads((root / RESULTS / name).read_text())
+    return {f"{name}#{key}" for key in found if f"{key}_command" in found}
 
 
 def check_index(root: pathlib.Path, index: Dict[str, Entry]) -> List[str]:
-    """Result files without commit or date, entries without a file, and stale ones without a mark. A file has an entry, or
+    """Result files without commit or date, entries without a file, and wrong marks of stale ones. A file has an entry, or
     each part of it has one."""
     files, found = result_files(root), []
     for name in files:
@@ -64,18 +65,20 @@ def check_index(root: pathlib.Path, index: Dict[str, Entry]) -> List[str]:
     found += [f"bench/results/index.json has {name}, and there is no such file" for name in gone]
     found += [f"bench/results/index.json: {name} has no {key}" for name in index if name not in gone
               for key in ("commit", "commit_is", "date", "command", "machine") if not provenance(root, name).get(key)]
-    found += [f"bench/results/index.json: {name} is stale and not marked; publish.py --write marks it, and pages say so"
-              for name, entry in index.items() if is_older(root, entry)]
+    found += [f"bench/results/index.json: {name} is {'not ' if entry.get('stale') else ''}stale, and not marked so; run publish.py --write"
+              for name, entry in index.items() if is_marked_wrongly(root, entry)]
     return found
 
 
 def mark_stale(root: pathlib.Path) -> None:
-    """Marks what was measured before sources changed, so that pages say so."""
+    """Marks what was measured from other sources, so that pages say so. Where that is unknown, marks stay."""
     index = read_index(root)
     for name, entry in index.items():
-        if not entry.get("stale") and is_stale(root, entry):
-            entry["stale"] = True
-            print(f"{name}: stale")
+        stale = is_stale(root, entry)
+        if stale is None or stale == bool(entry.get("stale")):
+            continue
+        entry["stale"] = stale
+        print(f"{name}: {'stale' if stale else 'current'}")
     write_index(root, index)
 
 
@@ -160,7 +163,7 @@ def planted(root: pathlib.Path) -> List[str]:
         if not check_index(root, {other: entry for other, entry in index.items() if other != name}):
             missed.append(f"not found: an index without {name}")
     unmarked = {name: {**entry, "sources": "0" * 12, "stale": False} for name, entry in index.items()}
-    if len(check_index(root, unmarked)) < len(index):
+    if sources(root) and len(check_index(root, unmarked)) < len(index):  # without git nothing is known
         missed.append("not found: results of other sources that are not marked")
     changed_plots = {path: plot + " " for path, plot in drawn(root).items()}
     if len(differing_plots(root, changed_plots)) < len(changed_plots):
