@@ -119,9 +119,9 @@ struct light_view {
   /// A light of all. Precondition: there is one.
   WFPG_HD std::uint32_t pick_of_all(vec2 u) const { return pick(of_all, u); }
 
-  /// Samples a light, which is a column of the table, for a point. Its density is that of a light picked of
-  /// all: if its group was chosen otherwise, it has to be multiplied with path_lights::chosen_light's
-  /// preference. draw(dimension) returns random numbers in [0,1)².
+  /// Samples a light, which is a column of the table, for a point. The density assumes pick_of_all(). After
+  /// another choice of group, multiply it by the preference of path_lights::chosen_light. draw(dimension)
+  /// returns random numbers in [0,1)².
   template <class Draw>
   WFPG_HD light_sample sample(const scene_view& scene, vec3 from, std::uint32_t light,
                               const Draw& draw) const {
