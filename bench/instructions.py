@@ -11,6 +11,7 @@ same program and libraries give the same counts, whatever else the machine does.
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -72,6 +73,10 @@ def main(arguments):
     if len(arguments) == 2 and all(a.endswith(".json") for a in arguments):
         compare(*arguments)
     elif len(arguments) in (2, 3) and not arguments[0].endswith(".json"):
+        if not os.access(arguments[0], os.X_OK):
+            sys.exit(f"instructions.py: {arguments[0]} is no program; the preset bench builds bench_cpu")
+        if not shutil.which("valgrind"):
+            sys.exit("instructions.py: valgrind is needed, and was not found")
         commit = arguments[2] if len(arguments) == 3 else output_of("git", "-C", ROOT, "describe", "--always", "--dirty")
         measure(os.path.abspath(arguments[0]), arguments[1], commit)
     else:

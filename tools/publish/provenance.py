@@ -86,9 +86,9 @@ def head(root: pathlib.Path) -> Optional[str]:
     return done.stdout.strip() if done and done.returncode == 0 else None
 
 
-def is_dirty(root: pathlib.Path) -> bool:
-    """Whether sources that git tracks differ from the commit that is checked out."""
-    done = _git(root, "status", "--porcelain", "--untracked-files=no", "--", *SOURCES)
+def is_dirty(root: pathlib.Path, untracked: bool = True) -> bool:
+    """Whether sources differ from the commit that is checked out. `untracked`: also by files that git does not track."""
+    done = _git(root, "status", "--porcelain", f"--untracked-files={'normal' if untracked else 'no'}", "--", *SOURCES)
     return bool(done and done.stdout.strip())
 
 
@@ -104,7 +104,7 @@ def is_stale(root: pathlib.Path, entry: Entry) -> Optional[bool]:
     if now is None:
         return None
     if "sources" in entry:
-        return is_dirty(root) or entry["sources"] != now
+        return is_dirty(root, untracked=False) or entry["sources"] != now
     done = _git(root, "diff", "--quiet", entry["commit"], "--", *SOURCES)
     return {0: False, 1: True}.get(done.returncode) if done else None
 
