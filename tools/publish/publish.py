@@ -54,8 +54,7 @@ def parts_of(root: pathlib.Path, name: str) -> Set[str]:
 
 
 def check_index(root: pathlib.Path, index: Dict[str, Entry]) -> List[str]:
-    """Result files without commit or date, entries without a file, and wrong marks of stale ones. A file has an entry, or
-    each part of it has one."""
+    """Result files without commit or date, and entries without a file. A file has an entry, or each part of it has one."""
     files, found = result_files(root), []
     for name in files:
         missing = {name} if not (parts := parts_of(root, name)) else parts
@@ -65,9 +64,13 @@ def check_index(root: pathlib.Path, index: Dict[str, Entry]) -> List[str]:
     found += [f"bench/results/index.json has {name}, and there is no such file" for name in gone]
     found += [f"bench/results/index.json: {name} has no {key}" for name in index if name not in gone
               for key in ("commit", "commit_is", "date", "command", "machine") if not provenance(root, name).get(key)]
-    found += [f"bench/results/index.json: {name} is {'not ' if entry.get('stale') else ''}stale, and not marked so; run publish.py --write"
-              for name, entry in index.items() if is_marked_wrongly(root, entry)]
     return found
+
+
+def check_marks(root: pathlib.Path, index: Dict[str, Entry]) -> List[str]:
+    """Entries that are marked stale and are not, or the reverse."""
+    return [f"bench/results/index.json: {name} is {'not ' if entry.get('stale') else ''}stale, and not marked so; run publish.py --write"
+            for name, entry in index.items() if is_marked_wrongly(root, entry)]
 
 
 def mark_stale(root: pathlib.Path) -> None:
@@ -99,7 +102,7 @@ def check(root: pathlib.Path) -> List[str]:
     """All faults of the pages, the plots and the index."""
     results, exceptions = Results(root), read_exceptions(EXCEPTIONS)
     used: Set[Exempt] = set()
-    found = check_index(root, read_index(root)) + differing_plots(root, drawn(root))
+    found = check_index(root, read_index(root)) + check_marks(root, read_index(root)) + differing_plots(root, drawn(root))
     for page in page_names(root):
         found += check_page(results, page, (root / page).read_text(encoding="utf-8"), exceptions, used)
     found += [f"exceptions.ini: [{e.kind}] {e.pattern.pattern} covers nothing in {e.pages}" for e in exceptions
@@ -163,7 +166,7 @@ def planted(root: pathlib.Path) -> List[str]:
         if not check_index(root, {other: entry for other, entry in index.items() if other != name}):
             missed.append(f"not found: an index without {name}")
     unmarked = {name: {**entry, "sources": "0" * 12, "stale": False} for name, entry in index.items()}
-    if sources(root) and len(check_index(root, unmarked)) < len(index):  # without git nothing is known
+    if sources(root) and len(check_marks(root, unmarked)) < len(index):  # without git nothing is known
         missed.append("not found: results of other sources that are not marked")
     changed_plots = {path: plot + " " for path, plot in drawn(root).items()}
     if len(differing_plots(root, changed_plots)) < len(changed_plots):
