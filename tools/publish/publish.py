@@ -62,8 +62,9 @@ def check_index(root: pathlib.Path, index: Dict[str, Entry]) -> List[str]:
             found += [f"bench/results/index.json has no {wanted}" for wanted in sorted(missing - set(index))]
     gone = [name for name in index if name.split("#")[0] not in files]
     found += [f"bench/results/index.json has {name}, and there is no such file" for name in gone]
-    found += [f"bench/results/index.json: {name} has no {key}" for name in index if name not in gone
-              for key in ("commit", "commit_is", "date", "command", "machine") if not provenance(root, name).get(key)]
+    entries = {name: provenance(root, name) for name in index if name not in gone}
+    found += [f"bench/results/index.json: {name} has no {key}" for name, entry in entries.items()
+              for key in ("commit", "commit_is", "date", "command", "machine") if not entry.get(key)]
     return found
 
 
