@@ -110,6 +110,6 @@ def is_stale(root: pathlib.Path, entry: Entry) -> Optional[bool]:
 
 
 def is_marked_wrongly(root: pathlib.Path, entry: Entry) -> bool:
-    """Whether an entry with a hash of its sources says the opposite of what holds."""
-    stale = is_stale(root, entry) if "sources" in entry else None
+    """Whether an entry is marked stale and is not, or the reverse. False where that is unknown."""
+    stale = is_stale(root, entry)
     return stale is not None and stale != bool(entry.get("stale"))

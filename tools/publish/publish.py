@@ -69,7 +69,7 @@ def check_index(root: pathlib.Path, index: Dict[str, Entry]) -> List[str]:
 
 
 def check_marks(root: pathlib.Path, index: Dict[str, Entry]) -> List[str]:
-    """Entries that are marked stale and are not, or the reverse."""
+    """Entries whose marks are wrong."""
     return [f"bench/results/index.json: {name} is {'not ' if entry.get('stale') else ''}stale, and not marked so; run publish.py --write"
             for name, entry in index.items() if is_marked_wrongly(root, entry)]
 
@@ -78,11 +78,9 @@ def mark_stale(root: pathlib.Path) -> None:
     """Marks what was measured from other sources, so that pages say so. Where that is unknown, marks stay."""
     index = read_index(root)
     for name, entry in index.items():
-        stale = is_stale(root, entry)
-        if stale is None or stale == bool(entry.get("stale")):
-            continue
-        entry["stale"] = stale
-        print(f"{name}: {'stale' if stale else 'current'}")
+        if is_marked_wrongly(root, entry):
+            entry["stale"] = not entry.get("stale")
+            print(f"{name}: {'stale' if entry['stale'] else 'current'}")
     write_index(root, index)
 
 
@@ -103,7 +101,8 @@ def check(root: pathlib.Path) -> List[str]:
     """All faults of the pages, the plots and the index."""
     results, exceptions = Results(root), read_exceptions(EXCEPTIONS)
     used: Set[Exempt] = set()
-    found = check_index(root, read_index(root)) + check_marks(root, read_index(root)) + differing_plots(root, drawn(root))
+    index = read_index(root)
+    found = check_index(root, index) + check_marks(root, index) + differing_plots(root, drawn(root))
     for page in page_names(root):
         found += check_page(results, page, (root / page).read_text(encoding="utf-8"), exceptions, used)
     found += [f"exceptions.ini: [{e.kind}] {e.pattern.pattern} covers nothing in {e.pages}" for e in exceptions
