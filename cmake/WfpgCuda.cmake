@@ -40,9 +40,10 @@ function(wfpg_compile_cuda_fast target)
     ${target} PRIVATE $<$<AND:$<COMPILE_LANGUAGE:CUDA>,$<BOOL:${WFPG_CUDA_COMPILES_FAST}>>:-Ofc=max>)
 endfunction()
 
-# Adds a library of PTX, which is compiled to find errors: of the first architecture, and hardly optimised.
+# Adds a library of PTX, which is compiled to find errors: of the first architecture, and hardly optimised. It is not part
+# of `all`.
 function(wfpg_add_ptx name source)
-  add_library(${name} OBJECT ${source})
+  add_library(${name} OBJECT EXCLUDE_FROM_ALL ${source})
   list(GET CMAKE_CUDA_ARCHITECTURES 0 first)
   if(first MATCHES "^[0-9]+[a-z]?$")
     string(APPEND first -virtual)
