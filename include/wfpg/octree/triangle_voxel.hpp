@@ -141,6 +141,18 @@ WFPG_HD inline int largest_axis(vec3 v) {
   return x > y ? (x > z ? 0 : 2) : (y > z ? 1 : 2);
 }
 
+/// Whether a triangle covers the unit square about the origin, seen along the third axis. `facing`: any
+/// number with the sign of its normal's third coordinate.
+WFPG_HD inline bool covers_square(const vec3 (&corners)[3], float facing) {
+  for (int i = 0; i < 3; ++i) {
+    const vec3 p = corners[i], q = corners[i < 2 ? i + 1 : 0];
+    // The origin's distance from the edge, times the edge's length.
+    const float inside = p.x * q.y - p.y * q.x;
+    if (!((facing > 0.0f ? inside : -inside) >= 0.5f * (fabsf(q.x - p.x) + fabsf(q.y - p.y)))) return false;
+  }
+  return true;
+}
+
 /// Area of a triangle inside the voxel, in square voxels. The triangle is relative to the voxel's centre. It
 /// is cut to the voxel's height along its dominant axis. What is left is projected along that axis and cut to
 /// the voxel's square.
@@ -155,6 +167,12 @@ WFPG_HD inline float area_inside(const grid_triangle& t) {
   // Turned so that the dominant axis is the third one.
   const auto turned = [w](vec3 v) { return w == 0 ? vec3(v.y, v.z, v.x) : w == 1 ? vec3(v.z, v.x, v.y) : v; };
   const vec3 corners[3] = {turned(t.a), turned(t.b), turned(t.c)};
+  const vec3 normal = turned(n);
+  // The projection is smaller than the triangle by the cosine n[w] / |n|.
+  const float scale = glm::length(n) / fabsf(normal.z);
+  // In most voxels of a large triangle no edge is near, and the plane leaves by the sides.
+  const float rise = fabsf(glm::dot(normal, corners[0])) + 0.5f * (fabsf(normal.x) + fabsf(normal.y));
+  if (rise <= 0.5f * fabsf(normal.z) && covers_square(corners, normal.z)) return scale;
   // The base line passes through the first corner, moved into the square.
   area_in_square area{clamp(corners[0].y, -0.5f, 0.5f)};
   bounding_plane upper{1.0f}, lower{-1.0f};
@@ -171,8 +189,7 @@ WFPG_HD inline float area_inside(const grid_triangle& t) {
   // Each plane that cuts the triangle adds one edge to the polygon.
   if (upper.crossed) area.edge(upper.leave, upper.enter);
   if (lower.crossed) area.edge(lower.leave, lower.enter);
-  // The projection is smaller than the triangle by the cosine n[w] / |n|.
-  return fabsf(area.sum) * glm::length(n) / fabsf(n[w]);
+  return fabsf(area.sum) * scale;
 }
 
 /// Normal of the counter-clockwise side; zero where an edge has no length. Its coordinates are at most 2.
@@ -269,9 +286,12 @@ class triangle_columns {
     // A triangle without area has no plane: its box alone bounds the runs.
     if (fabsf(n[w_]) > 0.0f) slope_ = {-n[u_] / n[w_], -n[v_] / n[w_]};
     // The normal of a sliver is rounded; how far its plane misses the vertices says by how much.
-    const float miss = max(fabsf(plane(t.b) - t.b[w_]), fabsf(plane(t.c) - t.c[w_]));
-    // The plane's rise over half a voxel, the error of the plane, and the tolerance with room for rounding.
-    reach_ = 0.5f * (fabsf(slope_.x) + fabsf(slope_.y)) + miss + 4.0f * touch_tolerance;
+    const float miss = max(fabsf(plane(flat(t.b)) - t.b[w_]), fabsf(plane(flat(t.c)) - t.c[w_]));
+    const float rise = fabsf(slope_.x) + fabsf(slope_.y);  // of the plane, over a voxel
+    // The error of the plane, and the tolerance with room for rounding.
+    reach_ = 0.5f * rise + miss + 4.0f * touch_tolerance;
+    touch_ = miss < touch_tolerance ? touch_tolerance + half_ * rise : 0.0f;
+    set_edges(normal_[w_] > 0.0f ? 1.0f : -1.0f);
   }
 
   /// The columns that the triangle's box covers.
@@ -283,16 +303,22 @@ class triangle_columns {
   /// convex. `box` runs along the axis of this object. Evaluate a column once and keep the answer: two calls
   /// may differ where a compiler fuses operations.
   WFPG_HD voxel_run run(const column_box& box, glm::uvec2 column) const {
-    int first, last;
-    // The plane bounds the run before any voxel is tested.
-    plane_range(column, first, last);
+    const vec2 middle = vec2(column) + 0.5f;
+    const placement place = placed(middle);
     voxel_run found;
+    if (place == placement::outside) return found;
+    // The plane bounds the run before any voxel is tested.
+    const bool is_certain = place == placement::inside;
+    const float height = plane(middle), reach = is_certain ? touch_ : reach_;
+    const int first = max(lower_[w_], voxel_at(height - reach));
+    const int last = min(upper_[w_], voxel_at(height + reach));
+    if (is_certain && first <= last)
+      return {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last - first + 1)};
     // The plane's range is a few voxels; each is tested on its own.
     for (int along = first; along <= last; ++along) {
       const auto at = static_cast<std::uint32_t>(along);
       const grid_triangle local = triangle_.relative_to(vec3(box.voxel(column, at)) + 0.5f);
-      // The cube is larger than the voxel by the tolerance on each side.
-      if (!overlaps_cube(local, normal_, 0.5f + touch_tolerance)) continue;
+      if (!overlaps_cube(local, normal_, half_)) continue;
       // A gap inside the run can only come from rounding, and is closed.
       if (found.count == 0) found.first = at;
       found.count = at - found.first + 1;
@@ -301,24 +327,46 @@ class triangle_columns {
   }
 
  private:
-  /// Coordinate along the axis at which the triangle's plane passes a point's column.
-  WFPG_HD float plane(vec3 p) const {
+  /// Half the side of a voxel that is larger by the tolerance on each side.
+  static constexpr float half_ = 0.5f + touch_tolerance;
+
+  /// Coordinate along the axis at which the triangle's plane passes a point, given by its other two.
+  WFPG_HD float plane(vec2 p) const {
     // Linear from the first vertex, with the plane's slopes along the two other axes.
-    return triangle_.a[w_] + slope_.x * (p[u_] - triangle_.a[u_]) + slope_.y * (p[v_] - triangle_.a[v_]);
+    return triangle_.a[w_] + slope_.x * (p.x - triangle_.a[u_]) + slope_.y * (p.y - triangle_.a[v_]);
   }
 
-  /// Range of voxels in a column that the plane comes near, inside the triangle's box; `last` < `first` for
-  /// none.
-  WFPG_HD void plane_range(glm::uvec2 column, int& first, int& last) const {
-    // The plane is evaluated at the column's middle; reach_ covers the rest of the column.
-    vec3 centre(0.0f);
-    centre[u_] = static_cast<float>(column.x) + 0.5f;
-    centre[v_] = static_cast<float>(column.y) + 0.5f;
-    // Keeps the conversion to integers defined for steep planes.
-    const float limit = 1.0e6f;
-    first = max(lower_[w_], static_cast<int>(floorf(clamp(plane(centre) - reach_, -limit, limit))));
-    last = min(upper_[w_], static_cast<int>(floorf(clamp(plane(centre) + reach_, -limit, limit))));
+  /// Where a column's square, larger by the tolerance, lies as seen along the axis.
+  enum class placement {
+    outside,  ///< of the triangle
+    at_edge,  ///< or it is not certain
+    inside    ///< of it: its plane alone decides which voxels of the column are touched
+  };
+  /// Where the square around a column's middle lies.
+  WFPG_HD placement placed(vec2 middle) const {
+    const vec2 corners[3] = {flat(triangle_.a), flat(triangle_.b), flat(triangle_.c)};
+    bool is_inside = touch_ > 0.0f;
+    for (int i = 0; i < 3; ++i) {
+      const vec3 edge = edges_[i];
+      const float distance = glm::dot(vec2(edge), middle - corners[i]);
+      if (distance < -edge.z) return placement::outside;
+      is_inside = is_inside && distance > edge.z;
+    }
+    return is_inside ? placement::inside : placement::at_edge;
   }
+  /// Prepares placed(). `facing`: sign of the normal along the axis.
+  WFPG_HD void set_edges(float facing) {
+    const vec2 corners[3] = {flat(triangle_.a), flat(triangle_.b), flat(triangle_.c)};
+    for (int i = 0; i < 3; ++i) {
+      const vec2 along = corners[i < 2 ? i + 1 : 0] - corners[i];
+      edges_[i] = {-facing * along.y, facing * along.x, half_ * (fabsf(along.x) + fabsf(along.y))};
+    }
+  }
+
+  /// A point's coordinates along u and v.
+  WFPG_HD vec2 flat(vec3 p) const { return {p[u_], p[v_]}; }
+  /// The voxel that has a coordinate. The limit keeps the conversion defined for steep planes.
+  WFPG_HD static int voxel_at(float along) { return static_cast<int>(floorf(clamp(along, -1.0e6f, 1.0e6f))); }
 
   grid_triangle triangle_;   ///< grid units
   vec3 normal_;              ///< of any length
@@ -326,6 +374,8 @@ class triangle_columns {
   int lower_[3], upper_[3];  ///< voxels of the box, both included
   vec2 slope_{0.0f};         ///< of the plane, along u and v
   float reach_;              ///< how far the plane may be from a touched voxel's centre
+  float touch_;              ///< how far it is from voxels that it touches; 0 where that is not certain
+  vec3 edges_[3];            ///< an edge: (u, v) inwards and as long; half of a square's extent along that
 };
 
 }  // namespace wfpg::detail

@@ -81,6 +81,7 @@ WFPG_HD weighted_normal dominant_normal(const Members& members, std::uint32_t n)
   constexpr int rounds = 8;
   // Opposite normals do not cancel out: each has a cluster of its own.
   const vec3 first = members(0).normal;
+  if (n == 1) return members(0);  // of most leaves
   normal_cluster ahead{first}, behind{-first};
   for (int round = 0; round < rounds; ++round) {
     float least_turn = 1.0f;
@@ -145,6 +146,12 @@ struct inner_normals {
       return weighted_normal{unpack_voxel_normal(normals[first + c]), areas[first + c]};
     };
     // Up to eight children, each with all of its area at its own N.
+    if (is_flat(first, n)) {
+      normals[node] = normals[first];
+      areas[node] = area_of(first, n);
+      swapped[node] = 0;
+      return;
+    }
     const weighted_normal dominant = dominant_normal(member, n);
     // Sides are compared by the packed normal, since it is what readers of the cache see.
     const std::uint16_t packed = pack_voxel_normal(dominant.normal);
@@ -156,6 +163,20 @@ struct inner_normals {
     normals[node] = packed;
     areas[node] = dominant.area;
     swapped[node] = static_cast<std::uint8_t>(bits);
+  }
+
+ private:
+  /// Whether n nodes from `first` on have one normal, so that there is nothing to cluster.
+  WFPG_HD bool is_flat(node_id first, std::uint32_t n) const {
+    for (std::uint32_t c = 1; c < n; ++c)
+      if (normals[first + c] != normals[first]) return false;
+    return true;
+  }
+  /// Area of n nodes from `first` on.
+  WFPG_HD float area_of(node_id first, std::uint32_t n) const {
+    float sum = 0.0f;
+    for (std::uint32_t c = 0; c < n; ++c) sum += areas[first + c];
+    return sum;
   }
 };
 

@@ -99,12 +99,13 @@ struct triangle_bounds {
 /// one thread while others wait.
 inline constexpr std::uint64_t columns_per_item = 16;
 
-/// Counts the items of each triangle and stores its box. Invalid triangles get none, and are counted by
-/// reason.
+/// Counts the items of each triangle, and stores its box and normal. Invalid triangles get no items, and are
+/// counted by reason.
 struct count_items {
   triangle_reader reader;
-  array_view<column_box> boxes;     // a triangle
-  array_view<std::uint64_t> items;  // a triangle
+  array_view<column_box> boxes;       // a triangle
+  array_view<std::uint32_t> normals;  // a triangle: packed
+  array_view<std::uint64_t> items;    // a triangle
   std::uint32_t* counters;
 
   WFPG_HD void operator()(std::size_t i) const {
@@ -115,6 +116,7 @@ struct count_items {
       atomic_add(counters + reason, 1);
       return;
     }
+    normals[i] = pack_direction(unit_normal(t.a, t.b, t.c));
     t = reader.in_grid(t);
     const column_box box = triangle_columns(t, reader.grid.resolution, column_axis(t)).box();
     boxes[i] = box;
@@ -193,20 +195,20 @@ struct emit_fragments {
   }
 };
 
-/// Computes normal and area of each fragment. Clipping takes longer than finding the voxels, so it has a loop
-/// of its own, in which all threads clip.
+/// Computes the area of each fragment, and gives it its triangle's normal. Clipping takes longer than finding
+/// the voxels, so it has a loop of its own, in which all threads clip.
 struct measure_fragments {
   triangle_reader reader;
+  array_view<const std::uint32_t> normals;  // a triangle: packed
   array_view<const morton_code> codes;
   array_view<fragment_surface> surfaces;
 
   WFPG_HD void operator()(std::size_t i) const {
-    const grid_triangle t = reader.checked(surfaces[i].normal);
+    const std::uint32_t triangle = surfaces[i].normal;
+    const grid_triangle t = reader.in_grid(reader.checked(triangle));
     const vec3 centre = vec3(morton_decode(codes[i])) + 0.5f;
     const float voxel = reader.grid.voxel_size();
-    const float area = area_inside(reader.in_grid(t).relative_to(centre)) * voxel * voxel;
-    const vec3 n = scaled_normal(t.a, t.b, t.c);  // that it has a length was decided before
-    surfaces[i] = {pack_direction(n / glm::length(n)), area};
+    surfaces[i] = {normals[triangle], area_inside(t.relative_to(centre)) * voxel * voxel};
   }
 };
 
@@ -307,8 +309,9 @@ voxel_fragments<Exec> voxelize(const Exec& exec, triangle_mesh_view mesh, std::u
 
   const buffer<std::uint32_t, Exec> counters(exec, std::vector<std::uint32_t>(detail::counters, 0));
   const buffer<detail::column_box, Exec> boxes(exec, n);
+  const buffer<std::uint32_t, Exec> normals(exec, n);
   buffer<std::uint64_t, Exec> items(exec, n);
-  exec.for_each(n, detail::count_items{reader, boxes.view(), items.view(), counters.data()});
+  exec.for_each(n, detail::count_items{reader, boxes.view(), normals.view(), items.view(), counters.data()});
   const std::uint64_t item_count = sum_prefix(exec, items);
   const buffer<std::uint32_t, Exec> triangles(exec, item_count);
   exec.fill_bytes(triangles.data(), 0, triangles.bytes());
@@ -326,8 +329,8 @@ voxel_fragments<Exec> voxelize(const Exec& exec, triangle_mesh_view mesh, std::u
   voxel_fragments<Exec> result(exec, fragment_count);
   exec.for_each(item_count,
                 detail::emit_fragments{columns, counts.view(), result.codes.view(), result.surfaces.view()});
-  exec.for_each(fragment_count,
-                detail::measure_fragments{reader, result.codes.view(), result.surfaces.view()});
+  exec.for_each(fragment_count, detail::measure_fragments{reader, normals.view(), result.codes.view(),
+                                                          result.surfaces.view()});
   result.grid = reader.grid;
   result.report = detail::read_report(exec, counters);
   return result;
