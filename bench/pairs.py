@@ -1,9 +1,7 @@
 #!/usr/bin/env python3
-"""Measures what guides cost where they have little to gain: the table of single-threaded pairs of docs/host.md.
+"""Measures what guides cost and gain on single threads: the tables of pairs of docs/host.md.
 
-usage: bench/pairs.py DIRECTORY_OF_PROGRAMS OUT.json SAMPLES FOLDER_OF_GLTF [SCENE...]
-
-Path tracing and both guided methods render each scene one after the other, 21 times with other seeds and in turned order. Each
+Path tracing and guided methods render each scene one after the other, 21 times with other seeds and in turned order. Each
 rendering has one thread and a core of its own. Two run at once, of the same method on both cores. A variance is half of the mean
 difference of two seeds' pictures. Let the machine idle else. OUT.json is written after each scene, and keeps other scenes and numbers
 of samples.
@@ -11,6 +9,7 @@ of samples.
 A ratio of times is a median, with an interval that holds it with more than 95% probability. Equal time is the gain over that. Its
 interval of 95% has the gain's error by leaving out one seed at a time, and the median's by drawing seeds anew.
 """
+import argparse
 import concurrent.futures
 import math
 import os
@@ -21,8 +20,12 @@ import tempfile
 
 from programs import Programs, begin_results, seconds, unguided_options, write_results
 
-SCENES = {"cornell-box": "", "staircase2.glb": "", "veach-mis.glb": "--light-groups 1", "materials": "", "outdoor": "", "furnace": ""}
-METHODS = ("pt", "wfpg", "wfpg-product")
+# Those where a guide has little to gain, and those where it has much.
+QUIET = {"cornell-box": "", "staircase2.glb": "", "veach-mis.glb": "--light-groups 1", "materials": "", "outdoor": "", "furnace": ""}
+HARD = {"ajar": "", "bathroom.glb": "", "cornell-enclosed": "--nee off", "glossy-room": "--nee off", "thin-wall": "--max-depth 6",
+        "veach-ajar.glb": ""}
+SCENES = {**QUIET, **HARD}
+GUIDED = ("wfpg", "wfpg-product")
 ROUNDS = 21
 INTERVAL = (5, 15)  # of 21 sorted values: one below or above has a probability of 1.3% each
 REDRAWN = 4000  # sets of seeds
@@ -30,13 +33,30 @@ STUDENT = 2.09  # of 20 degrees of freedom: an interval of 95%, in standard erro
 SIZE = "256x256"
 
 
+def parsed_arguments():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("directory", help="of wfpg-render and wfpg-compare")
+    parser.add_argument("out", metavar="OUT.json")
+    parser.add_argument("samples", type=int)
+    parser.add_argument("folder", help="of .glb files")
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", help="of " + ", ".join(SCENES) + f" (default: {', '.join(QUIET)})")
+    parser.add_argument("--methods", default=",".join(GUIDED), help="guided ones (default: %(default)s)")
+    parser.add_argument("--older", metavar="DIRECTORY", help="of another wfpg-render, whose path tracing takes its turn, too")
+    arguments = parser.parse_args()
+    for given, known in ((arguments.scenes, SCENES), (arguments.methods.split(","), GUIDED)):
+        if not set(given) <= set(known):
+            parser.error(f"unknown: {', '.join(set(given) - set(known))}; known are {', '.join(known)}")
+    return arguments
+
+
 def render_round(programs, scene, options, samples, number, cores):
-    """Renders a seed by all methods on one core. Returns their statistics."""
+    """Renders a seed by all methods on one core. `programs`: of each method. Returns their statistics."""
     os.sched_setaffinity(0, {cores[number % len(cores)]})  # of this thread, and of the programs that it starts
     found = {}
-    for method in METHODS if number // len(cores) % 2 == 0 else reversed(METHODS):
-        own = unguided_options(options) if method == "pt" else options
-        found[method] = programs.render(scene, f"{method}{number}", ["--spp", samples, "--seed", str(number + 1), "--method", method, *own])
+    for method in programs if number // len(cores) % 2 == 0 else reversed(programs):
+        guides = method in GUIDED
+        own = ["--method", method if guides else "pt", *(options if guides else unguided_options(options))]
+        found[method] = programs[method].render(scene, f"{method}{number}", ["--spp", str(samples), "--seed", str(number + 1), *own])
     return found
 
 
@@ -68,7 +88,7 @@ def equal_time(unguided, guided, times):
 
 
 def measure(programs, scene, options, samples, cores):
-    """Times over path tracing's, gains, and samples that rested, of both guided methods."""
+    """Times over path tracing's, gains, and samples that rested, of guided methods. `programs`: of each method."""
     rounds = []
     for first in range(0, ROUNDS, len(cores)):
         numbers = range(first, min(first + len(cores), ROUNDS))
@@ -76,30 +96,38 @@ def measure(programs, scene, options, samples, cores):
             rounds += threads.map(lambda n: render_round(programs, scene, options, samples, n, cores), numbers)
         print(f"{os.path.basename(scene)}, {samples} samples: {len(rounds)} of {ROUNDS}", file=sys.stderr, flush=True)
     cell = {"seconds_pt": round(statistics.median(seconds(found["pt"]) for found in rounds), 2)}
-    unguided = differences(programs, "pt")
-    for method in METHODS[1:]:
-        guided = differences(programs, method)
-        times = [seconds(found[method]) / seconds(found["pt"]) for found in rounds]
-        cell[method] = {"gain": round(gain_of(unguided, guided), 3), "time": with_interval(times),
-                        "equal_time": equal_time(unguided, guided, times),
+    unguided = differences(programs["pt"], "pt")
+    for method in programs:
+        times = {base: [seconds(found[method]) / seconds(found[base]) for found in rounds] for base in {"pt", "older"} & set(programs)}
+        if method == "older":
+            cell[method] = {"time": with_interval(times["pt"])}
+        if method not in GUIDED:
+            continue
+        guided = differences(programs[method], method)
+        cell[method] = {"gain": round(gain_of(unguided, guided), 3), "time": with_interval(times["pt"]),
+                        "equal_time": equal_time(unguided, guided, times["pt"]),
                         "rested": round(statistics.mean(found[method]["rest"]["samples"] for found in rounds), 1)}
+        if "older" in times:
+            cell[method]["equal_time_older"] = equal_time(unguided, guided, times["older"])
     return cell
 
 
-def main(directory, out, samples, folder, *names):
-    results = begin_results(out)
+def main(arguments):
+    results = begin_results(arguments.out)
     cores = sorted(os.sched_getaffinity(0))[:2]
+    samples = str(arguments.samples)
     part = results.setdefault(samples, {"scenes": {}})
     part.update(size=SIZE, rounds=ROUNDS)
-    for name in names or SCENES:
+    for name in arguments.scenes or QUIET:
         with tempfile.TemporaryDirectory() as pictures:
-            programs = Programs(directory, SIZE, pictures, "seq")
-            scene = os.path.join(folder, name) if name.endswith(".glb") else name
+            own = Programs(arguments.directory, SIZE, pictures, "seq")
+            programs = {method: own for method in ("pt", *arguments.methods.split(","))}
+            if arguments.older:
+                programs["older"] = Programs(arguments.older, SIZE, pictures, "seq")
+            scene = os.path.join(arguments.folder, name) if name.endswith(".glb") else name
             part["scenes"][name] = measure(programs, scene, SCENES[name].split(), samples, cores)
-        write_results(out, results, samples)
+        write_results(arguments.out, results, samples)
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 5 or not sys.argv[3].isdigit() or not set(sys.argv[5:]) <= set(SCENES):
-        sys.exit(__doc__.strip())
-    main(*sys.argv[1:])
+    main(parsed_arguments())

@@ -141,12 +141,14 @@ WFPG_HD inline int largest_axis(vec3 v) {
   return x > y ? (x > z ? 0 : 2) : (y > z ? 1 : 2);
 }
 
-/// Whether a triangle covers the unit square about the origin, seen along the third axis. `facing`: any
-/// number with the sign of its normal's third coordinate.
+/// Whether a triangle covers the unit square about the origin, seen along the third axis. Where a square and
+/// an edge nearly touch, rounding decides. `facing`: any number with the sign of its normal's third
+/// coordinate.
 WFPG_HD inline bool covers_square(const vec3 (&corners)[3], float facing) {
   for (int i = 0; i < 3; ++i) {
     const vec3 p = corners[i], q = corners[i < 2 ? i + 1 : 0];
-    // The origin's distance from the edge, times the edge's length.
+    // The origin's distance from the edge, times the edge's length. The nearest corner of the square is less
+    // far inside, by half of the square's extent across the edge.
     const float inside = p.x * q.y - p.y * q.x;
     if (!((facing > 0.0f ? inside : -inside) >= 0.5f * (fabsf(q.x - p.x) + fabsf(q.y - p.y)))) return false;
   }
@@ -170,7 +172,8 @@ WFPG_HD inline float area_inside(const grid_triangle& t) {
   const vec3 normal = turned(n);
   // The projection is smaller than the triangle by the cosine n[w] / |n|.
   const float scale = glm::length(n) / fabsf(normal.z);
-  // In most voxels of a large triangle no edge is near, and the plane leaves by the sides.
+  // In most voxels of a large triangle no edge is near, and the plane leaves by the sides. The plane's height
+  // at the square's corners differs from that at its middle by at most half of its slopes.
   const float rise = fabsf(glm::dot(normal, corners[0])) + 0.5f * (fabsf(normal.x) + fabsf(normal.y));
   if (rise <= 0.5f * fabsf(normal.z) && covers_square(corners, normal.z)) return scale;
   // The base line passes through the first corner, moved into the square.
@@ -290,6 +293,7 @@ class triangle_columns {
     const float rise = fabsf(slope_.x) + fabsf(slope_.y);  // of the plane, over a voxel
     // The error of the plane, and the tolerance with room for rounding.
     reach_ = 0.5f * rise + miss + 4.0f * touch_tolerance;
+    // A plane that misses its vertices decides nothing: voxels of slivers are tested one by one.
     touch_ = miss < touch_tolerance ? touch_tolerance + half_ * rise : 0.0f;
     set_edges(normal_[w_] > 0.0f ? 1.0f : -1.0f);
   }
@@ -304,10 +308,11 @@ class triangle_columns {
   /// may differ where a compiler fuses operations.
   WFPG_HD voxel_run run(const column_box& box, glm::uvec2 column) const {
     const vec2 middle = vec2(column) + 0.5f;
+    // Most columns of a large triangle's box lie wholly beside it or inside it.
     const placement place = placed(middle);
     voxel_run found;
     if (place == placement::outside) return found;
-    // The plane bounds the run before any voxel is tested.
+    // The plane bounds the run before any voxel is tested. Inside a triangle that range is exact.
     const bool is_certain = place == placement::inside;
     const float height = plane(middle), reach = is_certain ? touch_ : reach_;
     const int first = max(lower_[w_], voxel_at(height - reach));
@@ -338,15 +343,20 @@ class triangle_columns {
 
   /// Where a column's square, larger by the tolerance, lies as seen along the axis.
   enum class placement {
-    outside,  ///< of the triangle
-    at_edge,  ///< or it is not certain
-    inside    ///< of it: its plane alone decides which voxels of the column are touched
+    /// Of the triangle: it touches no voxel of the column.
+    outside,
+    /// At an edge of the triangle, or it is not certain.
+    at_edge,
+    /// Of the triangle: its plane alone decides which voxels of the column are touched.
+    inside
   };
-  /// Where the square around a column's middle lies.
+  /// Where the square around a column's middle lies. Rounding is less than the tolerance: squares that an
+  /// edge touches are at the edge.
   WFPG_HD placement placed(vec2 middle) const {
     const vec2 corners[3] = {flat(triangle_.a), flat(triangle_.b), flat(triangle_.c)};
     bool is_inside = touch_ > 0.0f;
     for (int i = 0; i < 3; ++i) {
+      // The middle's distance from the edge, positive inside, times the edge's length.
       const vec3 edge = edges_[i];
       const float distance = glm::dot(vec2(edge), middle - corners[i]);
       if (distance < -edge.z) return placement::outside;
@@ -354,10 +364,15 @@ class triangle_columns {
     }
     return is_inside ? placement::inside : placement::at_edge;
   }
-  /// Prepares placed(). `facing`: sign of the normal along the axis.
+  /// Prepares placed(), for all columns of the triangle. Of a triangle without area edges face both ways, so
+  /// that no column lies inside of it.
+  ///
+  /// `facing`: 1 or -1, the sign of the normal along the axis. It comes from products in double precision,
+  /// since floats may not tell the sign of a sliver's.
   WFPG_HD void set_edges(float facing) {
     const vec2 corners[3] = {flat(triangle_.a), flat(triangle_.b), flat(triangle_.c)};
     for (int i = 0; i < 3; ++i) {
+      // The edge turned by a quarter, and half of the square's extent across it.
       const vec2 along = corners[i < 2 ? i + 1 : 0] - corners[i];
       edges_[i] = {-facing * along.y, facing * along.x, half_ * (fabsf(along.x) + fabsf(along.y))};
     }
@@ -365,7 +380,8 @@ class triangle_columns {
 
   /// A point's coordinates along u and v.
   WFPG_HD vec2 flat(vec3 p) const { return {p[u_], p[v_]}; }
-  /// The voxel that has a coordinate. The limit keeps the conversion defined for steep planes.
+  /// Coordinate of the voxel that a point lies in, along one axis. The limit keeps the conversion defined for
+  /// steep planes.
   WFPG_HD static int voxel_at(float along) { return static_cast<int>(floorf(clamp(along, -1.0e6f, 1.0e6f))); }
 
   grid_triangle triangle_;   ///< grid units

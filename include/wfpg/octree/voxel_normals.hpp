@@ -106,7 +106,8 @@ WFPG_HD weighted_normal dominant_normal(const Members& members, std::uint32_t n)
   return {behind.area > ahead.area ? behind.mean : ahead.mean, ahead.area + behind.area};
 }
 
-/// Computes the normal and area of a leaf from its fragments, which lie in a row in the sorted order.
+/// Computes the normal and area of a leaf from its fragments, which lie in a row in the sorted order. Most
+/// leaves have one fragment, whose normal and area they take.
 struct leaf_normals {
   array_view<const std::uint32_t> fragment_begin;  ///< a leaf: its first fragment
   array_view<const fragment_surface> fragments;    ///< in the order of their Morton codes
@@ -116,6 +117,7 @@ struct leaf_normals {
 
   /// Writes the packed normal and the area of all fragments of one leaf.
   WFPG_HD void operator()(std::size_t leaf) const {
+    // Fragments were sorted by voxel, so that those of a leaf lie in a row.
     const std::size_t begin = fragment_begin[leaf];
     // The last leaf's fragments end with the array.
     const std::size_t end = leaf + 1 < fragment_begin.size() ? fragment_begin[leaf + 1] : fragments.size();
@@ -131,7 +133,8 @@ struct leaf_normals {
 };
 
 /// Computes the normal of an inner node from its children's. It also finds the children whose sides are
-/// swapped: those whose N faces away from the node's.
+/// swapped: those whose N faces away from the node's. Children are clustered by the area of all surface below
+/// them.
 struct inner_normals {
   sparse_voxel_octree_view tree;      ///< the nodes' structure
   array_view<std::uint16_t> normals;  ///< a node: packed; children's are known
@@ -146,6 +149,8 @@ struct inner_normals {
       return weighted_normal{unpack_voxel_normal(normals[first + c]), areas[first + c]};
     };
     // Up to eight children, each with all of its area at its own N.
+    // Most nodes lie on flat surfaces. Their children have one packed normal, so that clusters would be that
+    // normal, and no child has its sides swapped.
     if (is_flat(first, n)) {
       normals[node] = normals[first];
       areas[node] = area_of(first, n);
@@ -161,18 +166,20 @@ struct inner_normals {
     for (std::uint32_t c = 0; c < n; ++c)
       if (glm::dot(normal, unpack_voxel_direction(normals[first + c])) < 0.0f) bits |= 1u << c;
     normals[node] = packed;
+    // Both clusters count: a parent weighs this node by all of its surface.
     areas[node] = dominant.area;
     swapped[node] = static_cast<std::uint8_t>(bits);
   }
 
  private:
-  /// Whether n nodes from `first` on have one normal, so that there is nothing to cluster.
+  /// Whether n nodes from `first` on have one normal, so that there is nothing to cluster. Packed normals are
+  /// compared: they are equal to the bit on one wall.
   WFPG_HD bool is_flat(node_id first, std::uint32_t n) const {
     for (std::uint32_t c = 1; c < n; ++c)
       if (normals[first + c] != normals[first]) return false;
     return true;
   }
-  /// Area of n nodes from `first` on.
+  /// Area of surface below n nodes from `first` on, square scene units.
   WFPG_HD float area_of(node_id first, std::uint32_t n) const {
     float sum = 0.0f;
     for (std::uint32_t c = 0; c < n; ++c) sum += areas[first + c];
