@@ -2,7 +2,7 @@
 """Measures what guides cost and gain on single threads: the tables of pairs of docs/host.md.
 
 Path tracing and guided methods render each scene one after the other, 21 times with other seeds and in turned order. Each
-rendering has one thread and a core of its own. Two run at once, of the same method on both cores. A variance is half of the mean
+rendering has one thread and a core of its own. As many run at once as there are --cores, of the same method on all of them. A variance is half of the mean
 difference of two seeds' pictures. Let the machine idle else. OUT.json is written after each scene, and keeps other scenes and numbers
 of samples.
 
@@ -41,8 +41,11 @@ def parsed_arguments():
     parser.add_argument("folder", help="of .glb files")
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help="of " + ", ".join(SCENES) + f" (default: {', '.join(QUIET)})")
     parser.add_argument("--methods", default=",".join(GUIDED), help="guided ones (default: %(default)s)")
+    parser.add_argument("--cores", type=int, default=2, help="renderings at once (default: %(default)s)")
     parser.add_argument("--older", metavar="DIRECTORY", help="of another wfpg-render, whose path tracing takes its turn, too")
     arguments = parser.parse_args()
+    if not 1 <= arguments.cores <= len(os.sched_getaffinity(0)):
+        parser.error(f"--cores is {arguments.cores}, expected 1 to {len(os.sched_getaffinity(0))}")
     for given, known in ((arguments.scenes, SCENES), (arguments.methods.split(","), GUIDED)):
         if not set(given) <= set(known):
             parser.error(f"unknown: {', '.join(set(given) - set(known))}; known are {', '.join(known)}")
@@ -114,7 +117,7 @@ def measure(programs, scene, options, samples, cores):
 
 def main(arguments):
     results = begin_results(arguments.out)
-    cores = sorted(os.sched_getaffinity(0))[:2]
+    cores = sorted(os.sched_getaffinity(0))[:arguments.cores]
     samples = str(arguments.samples)
     part = results.setdefault(samples, {"scenes": {}})
     part.update(size=SIZE, rounds=ROUNDS)
