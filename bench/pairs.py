@@ -2,9 +2,9 @@
 """Measures what guides cost and gain on single threads: the tables of pairs of docs/host.md.
 
 Path tracing and guided methods render each scene one after the other, 21 times with other seeds and in turned order. Each
-rendering has one thread and a core of its own. As many run at once as there are --cores, of the same method on all of them. A variance is half of the mean
-difference of two seeds' pictures. Let the machine idle else. OUT.json is written after each scene, and keeps other scenes and numbers
-of samples.
+rendering has one thread and a core. As many seeds run at once as there are --cores. They share the machine's load: intervals
+are right for two, and too narrow for many. A variance is half of the mean difference of two seeds' pictures. Let the machine idle
+else. OUT.json is written after each scene, and keeps other scenes and numbers of samples.
 
 A ratio of times is a median, with an interval that holds it with more than 95% probability. Equal time is the gain over that. Its
 interval of 95% has the gain's error by leaving out one seed at a time, and the median's by drawing seeds anew.
@@ -21,7 +21,8 @@ import tempfile
 from programs import Programs, begin_results, seconds, unguided_options, write_results
 
 # Those where a guide has little to gain, and those where it has much.
-QUIET = {"cornell-box": "", "staircase2.glb": "", "veach-mis.glb": "--light-groups 1", "materials": "", "outdoor": "", "furnace": ""}
+QUIET = {"cornell-box": "", "staircase2.glb": "", "veach-mis.glb": "--light-groups 1", "materials": "", "outdoor": "",
+         "furnace": ""}
 HARD = {"ajar": "", "bathroom.glb": "", "cornell-enclosed": "--nee off", "glossy-room": "--nee off", "thin-wall": "--max-depth 6",
         "veach-ajar.glb": ""}
 SCENES = {**QUIET, **HARD}
@@ -44,11 +45,20 @@ def parsed_arguments():
     parser.add_argument("--cores", type=int, default=2, help="renderings at once (default: %(default)s)")
     parser.add_argument("--older", metavar="DIRECTORY", help="of another wfpg-render, whose path tracing takes its turn, too")
     arguments = parser.parse_args()
-    if not 1 <= arguments.cores <= len(os.sched_getaffinity(0)):
-        parser.error(f"--cores is {arguments.cores}, expected 1 to {len(os.sched_getaffinity(0))}")
+    most = min(len(os.sched_getaffinity(0)), ROUNDS // 2 + 1)  # half of the rounds turn the order
+    if not 1 <= arguments.cores <= most:
+        parser.error(f"--cores is {arguments.cores}, expected 1 to {most}")
+    if arguments.samples < 1:
+        parser.error(f"samples is {arguments.samples}, expected at least 1")
     for given, known in ((arguments.scenes, SCENES), (arguments.methods.split(","), GUIDED)):
         if not set(given) <= set(known):
-            parser.error(f"unknown: {', '.join(set(given) - set(known))}; known are {', '.join(known)}")
+            parser.error(f"unknown: {', '.join(sorted(set(given) - set(known)))}; known are {', '.join(known)}")
+    needed = [os.path.join(arguments.directory, program) for program in ("wfpg-render", "wfpg-compare")]
+    needed += [os.path.join(arguments.older, "wfpg-render")] if arguments.older else []
+    needed += [os.path.join(arguments.folder, scene) for scene in arguments.scenes or QUIET if scene.endswith(".glb")]
+    for path in needed:
+        if not os.path.exists(path):
+            parser.error(f"there is no {path}")
     return arguments
 
 
@@ -59,13 +69,21 @@ def render_round(programs, scene, options, samples, number, cores):
     for method in programs if number // len(cores) % 2 == 0 else reversed(programs):
         guides = method in GUIDED
         own = ["--method", method if guides else "pt", *(options if guides else unguided_options(options))]
-        found[method] = programs[method].render(scene, f"{method}{number}", ["--spp", str(samples), "--seed", str(number + 1), *own])
+        arguments = ["--spp", str(samples), "--seed", str(number + 1), *own]
+        found[method] = programs[method].render(scene, f"{method}{number}", arguments)
     return found
 
 
 def differences(programs, method):
     """Of each seed's picture and the next one's."""
     return [programs.compare(f"{method}{n}", f"{method}{n + 1}")["mse_reinhard"] for n in range(ROUNDS - 1)]
+
+
+def require_equal_pictures(programs):
+    """Of both path tracings: gains are over one's pictures, and times over the other's."""
+    unequal = [n for n in range(ROUNDS) if programs.compare(f"pt{n}", f"older{n}")["mse_reinhard"] > 0]
+    if unequal:
+        sys.exit(f"pairs.py: the older program's pictures of {len(unequal)} seeds are others than today's")
 
 
 def with_interval(values):
@@ -98,11 +116,13 @@ def measure(programs, scene, options, samples, cores):
         with concurrent.futures.ThreadPoolExecutor(len(cores)) as threads:
             rounds += threads.map(lambda n: render_round(programs, scene, options, samples, n, cores), numbers)
         print(f"{os.path.basename(scene)}, {samples} samples: {len(rounds)} of {ROUNDS}", file=sys.stderr, flush=True)
-    cell = {"seconds_pt": round(statistics.median(seconds(found["pt"]) for found in rounds), 2)}
+    cell = {"cores": len(cores), "seconds_pt": round(statistics.median(seconds(found["pt"]) for found in rounds), 2)}
     unguided = differences(programs["pt"], "pt")
     for method in programs:
-        times = {base: [seconds(found[method]) / seconds(found[base]) for found in rounds] for base in {"pt", "older"} & set(programs)}
+        times = {base: [seconds(found[method]) / seconds(found[base]) for found in rounds]
+                 for base in programs if base not in GUIDED}
         if method == "older":
+            require_equal_pictures(programs["pt"])
             cell[method] = {"time": with_interval(times["pt"])}
         if method not in GUIDED:
             continue

@@ -113,6 +113,20 @@ test_mesh flat_mesh() {
   return kept;
 }
 
+/// Needles of which the short edge is shorter than the spacing of floats at the tip. They begin with one of
+/// its ends: a triangle that begins with its tip has no area in floats.
+test_mesh needles() {
+  test_mesh mesh;
+  for (const float height : {0.25f, 0.55f}) {
+    const vec3 tip(1.0f, 0.625f, height), ends[2] = {{0.0f, 0.0f, 0.25f}, {0.0f, 3.0e-8f, 0.25f}};
+    for (const int i : {0, 1}) {
+      mesh.add(ends[i], tip, ends[1 - i]);
+      mesh.add(ends[i], ends[1 - i], tip);
+    }
+  }
+  return mesh;
+}
+
 test_mesh huge_with_details() {
   test_mesh mesh;
   mesh.add({-5.0e5f, -4.0e5f, -3.0e5f}, {5.0e5f, 1.0e5f, 0}, {0, 5.0e5f, 3.0e5f});
@@ -140,6 +154,10 @@ std::vector<scenario> all_scenarios() {
   add("far below a voxel", mixed_triangles(2000, 1.0e-6f, 1.0e-4f, 32), 64);
   add("slivers", long_slivers(60, 33), 64);
   add("slivers, fine", long_slivers(1, 15), 1024);
+  add("needles", needles(), 64, false);
+  test_mesh sliver;  // three voxels wide, and it begins with its tip, where rounding tilts its normal most
+  sliver.add({0.0116f, 0.0244f, 0.1466f}, {0.7656f, 0.9090f, 0.6714f}, {0.76503f, 0.90937f, 0.67161f});
+  add("sliver, finest", std::move(sliver), 4096);
   add("snapped", snapped_triangles(), 16, false);
   add("walls", walls(), 32, false);
   add("flat", flat_mesh(), 32, false);

@@ -174,8 +174,12 @@ WFPG_HD inline float area_inside(const grid_triangle& t) {
   const float scale = glm::length(n) / fabsf(normal.z);
   // In most voxels of a large triangle no edge is near, and the plane leaves by the sides. The plane's height
   // at the square's corners differs from that at its middle by at most half of its slopes.
-  const float rise = fabsf(glm::dot(normal, corners[0])) + 0.5f * (fabsf(normal.x) + fabsf(normal.y));
-  if (rise <= 0.5f * fabsf(normal.z) && covers_square(corners, normal.z)) return scale;
+  // Normals of slivers are tilted by rounding. Of the three corners' heights one is then right, or the right
+  // one lies between them.
+  float height = 0.0f;  // times normal.z
+  for (const vec3& corner : corners) height = max(height, fabsf(glm::dot(normal, corner)));
+  height += 0.5f * (fabsf(normal.x) + fabsf(normal.y));
+  if (height <= 0.5f * fabsf(normal.z) && covers_square(corners, normal.z)) return scale;
   // The base line passes through the first corner, moved into the square.
   area_in_square area{clamp(corners[0].y, -0.5f, 0.5f)};
   bounding_plane upper{1.0f}, lower{-1.0f};
@@ -293,9 +297,9 @@ class triangle_columns {
     const float rise = fabsf(slope_.x) + fabsf(slope_.y);  // of the plane, over a voxel
     // The error of the plane, and the tolerance with room for rounding.
     reach_ = 0.5f * rise + miss + 4.0f * touch_tolerance;
-    // A plane that misses its vertices decides nothing: voxels of slivers are tested one by one.
-    touch_ = miss < touch_tolerance ? touch_tolerance + half_ * rise : 0.0f;
-    set_edges(normal_[w_] > 0.0f ? 1.0f : -1.0f);
+    touch_ = touch_tolerance + half_ * rise;
+    error_ = miss + 2.0f * touch_tolerance;
+    set_edges();
   }
 
   /// The columns that the triangle's box covers.
@@ -308,17 +312,19 @@ class triangle_columns {
   /// may differ where a compiler fuses operations.
   WFPG_HD voxel_run run(const column_box& box, glm::uvec2 column) const {
     const vec2 middle = vec2(column) + 0.5f;
-    // Most columns of a large triangle's box lie wholly beside it or inside it.
+    // Most columns of a large triangle's box lie wholly beside it or inside it. Separating axes are then not
+    // needed.
     const placement place = placed(middle);
+    if (place == placement::outside) return {};
+    const float height = plane(middle), low = height - touch_, high = height + touch_;
+    // Inside of it the plane alone tells the run, unless its error decides.
+    if (place == placement::inside && voxel_at(low - error_) == voxel_at(low + error_) &&
+        voxel_at(high - error_) == voxel_at(high + error_))
+      return run_between(voxel_at(low), voxel_at(high));
+    // The plane bounds the run before any voxel is tested.
+    const int first = max(lower_[w_], voxel_at(height - reach_));
+    const int last = min(upper_[w_], voxel_at(height + reach_));
     voxel_run found;
-    if (place == placement::outside) return found;
-    // The plane bounds the run before any voxel is tested. Inside a triangle that range is exact.
-    const bool is_certain = place == placement::inside;
-    const float height = plane(middle), reach = is_certain ? touch_ : reach_;
-    const int first = max(lower_[w_], voxel_at(height - reach));
-    const int last = min(upper_[w_], voxel_at(height + reach));
-    if (is_certain && first <= last)
-      return {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last - first + 1)};
     // The plane's range is a few voxels; each is tested on its own.
     for (int along = first; along <= last; ++along) {
       const auto at = static_cast<std::uint32_t>(along);
@@ -343,18 +349,14 @@ class triangle_columns {
 
   /// Where a column's square, larger by the tolerance, lies as seen along the axis.
   enum class placement {
-    /// Of the triangle: it touches no voxel of the column.
-    outside,
-    /// At an edge of the triangle, or it is not certain.
-    at_edge,
-    /// Of the triangle: its plane alone decides which voxels of the column are touched.
-    inside
+    outside,  ///< beside the triangle, which touches no voxel of the column
+    at_edge,  ///< at an edge, or it is not certain
+    inside    ///< inside the triangle: its plane tells which voxels it touches
   };
-  /// Where the square around a column's middle lies. Rounding is less than the tolerance: squares that an
-  /// edge touches are at the edge.
+  /// Where the square around a column's middle lies. Rounding is less than the tolerance.
   WFPG_HD placement placed(vec2 middle) const {
     const vec2 corners[3] = {flat(triangle_.a), flat(triangle_.b), flat(triangle_.c)};
-    bool is_inside = touch_ > 0.0f;
+    bool is_inside = true;
     for (int i = 0; i < 3; ++i) {
       // The middle's distance from the edge, positive inside, times the edge's length.
       const vec3 edge = edges_[i];
@@ -364,18 +366,27 @@ class triangle_columns {
     }
     return is_inside ? placement::inside : placement::at_edge;
   }
-  /// Prepares placed(), for all columns of the triangle. Of a triangle without area edges face both ways, so
-  /// that no column lies inside of it.
-  ///
-  /// `facing`: 1 or -1, the sign of the normal along the axis. It comes from products in double precision,
-  /// since floats may not tell the sign of a sliver's.
-  WFPG_HD void set_edges(float facing) {
+  /// Prepares placed(), for all columns of the triangle. With the wrong sign of its area, a needle's short
+  /// edge would face the other way, and leave the whole needle outside. Floats do not tell that sign, nor do
+  /// products of rounded edges. Differences in double precision are exact.
+  WFPG_HD void set_edges() {
+    const glm::dvec2 a(flat(triangle_.a));
+    const glm::dvec2 b = glm::dvec2(flat(triangle_.b)) - a, c = glm::dvec2(flat(triangle_.c)) - a;
+    const float facing = b.x * c.y - b.y * c.x > 0.0 ? 1.0f : -1.0f;
     const vec2 corners[3] = {flat(triangle_.a), flat(triangle_.b), flat(triangle_.c)};
     for (int i = 0; i < 3; ++i) {
       // The edge turned by a quarter, and half of the square's extent across it.
       const vec2 along = corners[i < 2 ? i + 1 : 0] - corners[i];
       edges_[i] = {-facing * along.y, facing * along.x, half_ * (fabsf(along.x) + fabsf(along.y))};
     }
+  }
+
+  /// Voxels of a column from `low` to `high`, both included, that lie in the triangle's box. None where `low`
+  /// is above `high`.
+  WFPG_HD voxel_run run_between(int low, int high) const {
+    const int first = max(lower_[w_], low), last = min(upper_[w_], high);
+    if (first > last) return {};
+    return {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last - first + 1)};
   }
 
   /// A point's coordinates along u and v.
@@ -389,9 +400,10 @@ class triangle_columns {
   int u_, v_, w_;            ///< the two axes after the columns' axis, and that axis
   int lower_[3], upper_[3];  ///< voxels of the box, both included
   vec2 slope_{0.0f};         ///< of the plane, along u and v
-  float reach_;              ///< how far the plane may be from a touched voxel's centre
-  float touch_;              ///< how far it is from voxels that it touches; 0 where that is not certain
-  vec3 edges_[3];            ///< an edge: (u, v) inwards and as long; half of a square's extent along that
+  float reach_;    ///< how far the plane may be from a voxel that may be touched, at the column's middle
+  float touch_;    ///< how far it is at most from one that is touched, where the square is inside
+  float error_;    ///< of both
+  vec3 edges_[3];  ///< an edge: (u, v) inwards and as long; half of a square's extent along that
 };
 
 }  // namespace wfpg::detail

@@ -80,8 +80,10 @@ WFPG_HD weighted_normal dominant_normal(const Members& members, std::uint32_t n)
   // The bound keeps the time of a voxel with many fragments in hand.
   constexpr int rounds = 8;
   // Opposite normals do not cancel out: each has a cluster of its own.
-  const vec3 first = members(0).normal;
-  if (n == 1) return members(0);  // of most leaves
+  // One member is its own cluster: that is so in most leaves.
+  const weighted_normal only = members(0);
+  if (n == 1) return only;
+  const vec3 first = only.normal;
   normal_cluster ahead{first}, behind{-first};
   for (int round = 0; round < rounds; ++round) {
     float least_turn = 1.0f;
@@ -106,8 +108,8 @@ WFPG_HD weighted_normal dominant_normal(const Members& members, std::uint32_t n)
   return {behind.area > ahead.area ? behind.mean : ahead.mean, ahead.area + behind.area};
 }
 
-/// Computes the normal and area of a leaf from its fragments, which lie in a row in the sorted order. Most
-/// leaves have one fragment, whose normal and area they take.
+/// Computes the normal and area of a leaf from its fragments. Most leaves have one, whose normal and area
+/// they take.
 struct leaf_normals {
   array_view<const std::uint32_t> fragment_begin;  ///< a leaf: its first fragment
   array_view<const fragment_surface> fragments;    ///< in the order of their Morton codes
@@ -148,7 +150,6 @@ struct inner_normals {
     const auto member = [&](std::uint32_t c) {
       return weighted_normal{unpack_voxel_normal(normals[first + c]), areas[first + c]};
     };
-    // Up to eight children, each with all of its area at its own N.
     // Most nodes lie on flat surfaces. Their children have one packed normal, so that clusters would be that
     // normal, and no child has its sides swapped.
     if (is_flat(first, n)) {
@@ -157,6 +158,7 @@ struct inner_normals {
       swapped[node] = 0;
       return;
     }
+    // Up to eight children, each with all of its area at its own N.
     const weighted_normal dominant = dominant_normal(member, n);
     // Sides are compared by the packed normal, since it is what readers of the cache see.
     const std::uint16_t packed = pack_voxel_normal(dominant.normal);

@@ -2,7 +2,7 @@
 // voxel: its Morton code, normal and area (paper, section 3.2; conservative as in Crassin & Green 2012). The
 // octree and its exitance cache are built from fragments.
 //
-// Cost: O(voxels touched + columns of the triangles' boxes). Memory: 16 bytes a fragment. While it runs, 16
+// Cost: O(voxels touched + columns of the triangles' boxes). Memory: 16 bytes a fragment. While it runs, 20
 // more a triangle and 76 for each item of up to 16 columns.
 #pragma once
 
