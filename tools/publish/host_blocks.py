@@ -117,3 +117,14 @@ def pairs(results: Results, samples: str) -> Rows:
         found = [with_interval(cell[method][what]) for method in ("wfpg", "wfpg-product") for what in ("time", "equal_time")]
         rows.append([scene.replace(".glb", ""), *found, f"{cell['wfpg']['rested']:.0f}"])
     return rows
+
+
+@block
+def pairs_gains(results: Results) -> Rows:
+    """What guides gain on single threads where light is hard to find; beside it over an older path tracer's time."""
+    rows = [["scene", "gain", "time", "equal time", "over the older path tracing", "its time"]]
+    for scene, cell in results.json("pairs-hard.json", "64", "scenes").items():
+        of = cell["wfpg"]
+        found = [with_interval(x) for x in (of["time"], of["equal_time"], of["equal_time_older"], cell["older"]["time"])]
+        rows.append([scene.replace(".glb", ""), three(of["gain"]), *found])
+    return rows

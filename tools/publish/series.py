@@ -70,6 +70,8 @@ ALL: Tuple[Series, ...] = (
     Series("ceiling.json", ("guide_ceiling.py bin ceiling.json scenes",), ("scenes",), 120, "ceiling.json"),
     Series("rest.json#cpu", ("rests.py bin rest.json cpu scenes",), ("scenes",), 90, "rest.json"),
     Series("pairs.json#16", ("pairs.py bin pairs.json 16 scenes",), ("scenes",), 10, "pairs.json"),
+    Series("pairs.json#64", ("pairs.py bin pairs.json 64 scenes",), ("scenes",), 35, "pairs.json"),
+    Series("pairs.json#256", ("pairs.py bin pairs.json 256 scenes",), ("scenes",), 150, "pairs.json"),
     Series("room.json", (f"wfpg-room --methods {ROOM} --json room.json",), ("Open PGL",), 20, "room.json"),
     Series("room-64.json", ("wfpg-room --methods wfpg,openpgl-pavmm --samples 64 --json room-64.json",), ("Open PGL",), 10,
            "room-64.json"),
