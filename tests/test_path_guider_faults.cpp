@@ -68,7 +68,7 @@ struct throwing_caster {
 };
 
 WFPG_TEST_CASE("path guider: an exception in an inline caster leaves the guider usable",
-               "[path_guider][faults]") {
+               "[path_guider][faults][bits]") {
   for_each_kind([](const guider_options& options) {
     guided_box<Exec> box(options), other(options);
     box.learn();

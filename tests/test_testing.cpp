@@ -312,7 +312,7 @@ TEST_CASE("check_bsdf: options out of range are refused", "[testing]") {
   CHECK_THROWS_AS(check([](auto& o) { o.albedo_limit = -1.0f; }), std::invalid_argument);
 }
 
-TEST_CASE("sphere bins: integrals, sizes and descriptions are right", "[testing]") {
+TEST_CASE("sphere bins: integrals, sizes and descriptions are right", "[testing][bits]") {
   const wfpg::frame axes(tilted);
   const auto each = [](const auto& f) {
     return [f](const std::vector<vec3>& directions) {
