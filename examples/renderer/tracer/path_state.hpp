@@ -100,14 +100,14 @@ struct light_query {
   WFPG_HD explicit light_query(std::uint32_t of) : choice(of) {}
 };
 
-/// The active paths in the order of their materials: slot -> path.
+/// The active paths, in the order in which a wave's kernels take them: slot -> path.
 struct path_queue {
-  wfpg::partition_view by_material;
+  wfpg::partition_view active;
   bool all = false;  ///< every path in its own slot
 
-  WFPG_HD bool holds(std::size_t slot) const { return all || slot < by_material.offsets[*by_material.count]; }
+  WFPG_HD bool holds(std::size_t slot) const { return all || slot < active.offsets[*active.count]; }
   WFPG_HD std::uint32_t operator[](std::size_t slot) const {
-    return all ? static_cast<std::uint32_t>(slot) : by_material.permutation[slot];
+    return all ? static_cast<std::uint32_t>(slot) : active.permutation[slot];
   }
 };
 

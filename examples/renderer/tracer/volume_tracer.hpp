@@ -3,11 +3,11 @@
 
 #include "tracer/path_film.hpp"
 #include "tracer/stage_clock.hpp"
+#include "tracer/staged_paths.hpp"
 #include "tracer/unguided.hpp"
 #include "tracer/volume_kernels.hpp"
 #include "tracer/wavefront.hpp"
 
-#include <wfpg/bins/partitioner.hpp>
 #include <wfpg/exec/buffer.hpp>
 
 #include <cstdint>
@@ -34,7 +34,7 @@ class volume_tracer {
         keys_(exec, count_),
         radiance_(exec, count_),
         film_(exec, share_, settings.ranks),
-        partitioner_(exec, count_),
+        queues_(exec, count_),
         clock_(exec) {}
 
   /// Renders a wave as path_tracer does. A Camera is one of path_tracer.
@@ -46,9 +46,7 @@ class volume_tracer {
     for (path_queue queue{{}, true}; at.depth < at.max_depth; ++at.depth) {
       find_vertices(at, queue);
       if (at.is_last()) break;
-      clock_.measure("sort", [&] {
-        queue = {partitioner_.partition(exec_, keys_.view(), material_key_bits), false};
-      });
+      clock_.measure("sort", [&] { queue = queues_.of_all(exec_, keys_.view()); });
       if (at.depth % depths_between_looks == depths_between_looks - 1 && is_empty(queue)) break;
       if (world_.next_event) add_light(at, queue);
       scatter(at, queue);
@@ -81,16 +79,14 @@ class volume_tracer {
 
   void find_vertices(const volume_position& at, const path_queue& queue) {
     clock_.measure("trace", [&] {
-      exec_.for_each(
-          count_, find_volume_vertices<Caster>{at, world_, caster_, queue, paths_.view(), vertices_.view(),
-                                               keys_.view(), radiance_.view(), film_.segment_counts(),
-                                               film_.light_hit_counts(), wfpg::partitioner<Exec>::excluded});
+      exec_.for_each(count_,
+                     find_volume_vertices<Caster>{at, world_, caster_, queue, paths_.view(), vertices_.view(),
+                                                  keys_.view(), radiance_.view(), film_.segment_counts(),
+                                                  film_.light_hit_counts(), queue_maker<Exec>::ended});
     });
   }
 
-  bool is_empty(const path_queue& queue) const {
-    return wfpg::read_element(exec_, queue.by_material.count) == 0;
-  }
+  bool is_empty(const path_queue& queue) const { return wfpg::read_element(exec_, queue.active.count) == 0; }
 
   void add_light(const volume_position& at, const path_queue& queue) {
     clock_.measure("lights", [&] {
@@ -118,7 +114,7 @@ class volume_tracer {
   wfpg::buffer<std::uint32_t, Exec> keys_;
   wfpg::buffer<vec3, Exec> radiance_;
   path_film<Exec> film_;
-  wfpg::partitioner<Exec> partitioner_;
+  queue_maker<Exec> queues_;
   policy_clock<Exec> clock_;
 };
 

@@ -11,7 +11,6 @@
 #include "tracer/wave_share.hpp"
 #include "tracer/whole_paths.hpp"
 
-#include <wfpg/bins/partitioner.hpp>
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/exec/cpu_policy.hpp>
 #include <wfpg/host/ray_caster.hpp>
@@ -86,7 +85,7 @@ class path_tracer {
         keys_(exec, count_),
         radiance_(exec, count_),
         film_(exec, share_, settings.ranks),
-        partitioner_(exec, count_),
+        queues_(exec, count_),
         all_(count_),
         rays_(exec, is_inline ? 0 : count_),
         hits_(exec, is_inline ? 0 : count_),
@@ -204,7 +203,7 @@ class path_tracer {
             radiance_.view(),
             film_.segment_counts(),
             film_.light_hit_counts(),
-            wfpg::partitioner<Exec>::excluded};
+            queue_maker<Exec>::ended};
   }
   template <class Answers>
   query_lights<Answers> querying(const wave_position& at, const path_queue& queue, const Answers& answers) {
@@ -231,7 +230,7 @@ class path_tracer {
     for (wave_slots now{at, staged.first(), staged.size()}; now.at.depth < at.max_depth; ++now.at.depth) {
       trace(guider, now);
       if (now.at.is_last()) break;
-      clock_.measure("sort", [&] { now.queue = staged.by_material(exec_, partitioner_, keys_.view()); });
+      clock_.measure("sort", [&] { now.queue = staged.active(exec_, queues_, keys_.view()); });
       if (world_.next_event) query(now);
       sample_directions(guider, now);
       shade(guider, now);
@@ -317,7 +316,7 @@ class path_tracer {
   wfpg::buffer<std::uint32_t, Exec> keys_;
   wfpg::buffer<vec3, Exec> radiance_;
   path_film<Exec> film_;
-  wfpg::partitioner<Exec> partitioner_;
+  queue_maker<Exec> queues_;
   staged_paths<Exec> all_;
   std::optional<listed_part> guided_;   // while a guide probes
   std::optional<listed_part> others_;   // for a batch caster
