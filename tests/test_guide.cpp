@@ -164,15 +164,15 @@ TEST_CASE("recorded_fraction() records enough paths for the wanted vertices, at 
   const auto is = [](const wfpg::recording_needs& n, std::uint32_t shift, std::uint32_t stride) {
     return n.directions && n.fraction_shift == shift && n.sample_stride == stride;
   };
-  CHECK(is(needs(1000, 0), 0, 1));  // no number wanted: all
-  CHECK(is(needs(1000, 16000), 0, 1));
-  CHECK(is(needs(1000, 8000), 0, 2));  // a quarter is 2000 of 4000
+  CHECK(is(needs(1000, 0), 0, 1));       // no number wanted: all
+  CHECK(is(needs(1000, 128001), 0, 2));  // 4000 are few
+  CHECK(is(needs(1000, 128000), 0, 4));
   CHECK(is(needs(1000, 4000), 0, 4));
   CHECK(is(needs(1000, 2004), 0, 4));
   CHECK(is(needs(1000, 2000), 1, 4));
   CHECK(is(needs(1000000, 2000), 10, 4));
-  CHECK(is(needs(8, 7), 2, 4));  // a quarter is 2 of 32, rounded up
-  CHECK(is(needs(1000, 3), 10, 2));
+  CHECK(is(needs(8, 7), 2, 4));
+  CHECK(is(needs(1000, 3), 10, 4));
 }
 
 /// A guider in its n-th sample.
