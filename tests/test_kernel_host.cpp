@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <sstream>
 #include <string>
+#include <vector>
 
 using namespace wfpg_test;
 using wfpg::testing::sample_mean;
@@ -66,6 +67,58 @@ WFPG_TEST_CASE("kernel host: guiding gains where fields know all light", "[kerne
   CHECK(distance_in_errors(guided, plain) < 4.0);
   // At equal samples the variance is a third, or less.
   CHECK(guided.error() * guided.error() / 2.0 < plain.error() * plain.error() / 3.0);
+}
+
+/// How a guider comes to the samples that are compared.
+enum class before_samples { is_new, is_told, is_not_told };
+
+/// Means of 16 samples of each path, after a guider learnt from 48 with the lamp elsewhere, or from none.
+std::vector<double> means_of_paths(std::uint64_t seed, before_samples before) {
+  constexpr std::uint32_t learnt = 48, samples = 16, paths_of_picture = 1024;
+  const one_policy exec;
+  const box_mesh<one_policy> mesh(exec);
+  wfpg::kept_guide_options options = kernel_host_options(paths_of_picture);
+  options.seed = seed;
+  wfpg::path_guider<one_policy> guider(exec, mesh.view(), options);
+  const auto paths_of = [&](const room& in, std::uint64_t sample) {
+    const auto paths =
+        trace_sample(exec, guider, {in, host_fault::none, paths_of_picture, 1000 * seed + sample});
+    guider.end_sample();
+    return paths.to_host(exec);
+  };
+  if (before != before_samples::is_new)
+    for (std::uint32_t sample = 0; sample < learnt; ++sample) paths_of({}, 500 + sample);
+  if (before == before_samples::is_told) guider.forget_light();
+  room turned;
+  turned.turned = true;
+  std::vector<double> means(paths_of_picture);
+  for (std::uint32_t sample = 0; sample < samples; ++sample) {
+    const auto paths = paths_of(turned, sample);
+    for (std::size_t i = 0; i < paths.size(); ++i) means[i] += double(paths[i].radiance) / samples;
+  }
+  return means;
+}
+
+/// The variance of those means: half of the mean squared difference of two seeds' means.
+double variance_of_means(before_samples before) {
+  constexpr std::uint64_t seeds = 6;
+  double sum = 0.0;
+  std::vector<double> last = means_of_paths(seeds, before);
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    const std::vector<double> next = means_of_paths(seed, before);
+    for (std::size_t i = 0; i < next.size(); ++i) sum += (next[i] - last[i]) * (next[i] - last[i]);
+    last = next;
+  }
+  return 0.5 * sum / double(seeds * last.size());
+}
+
+TEST_CASE("kernel host: after a lamp moves, a guide is as good as a new one", "[kernel_host][slow]") {
+  const double anew = variance_of_means(before_samples::is_new),
+               told = variance_of_means(before_samples::is_told),
+               untold = variance_of_means(before_samples::is_not_told);
+  INFO("variance of a new guide " << anew << ", of one that is told " << told << ", of another " << untold);
+  CHECK(told < 1.1 * anew);
+  CHECK(untold > 1.1 * anew);
 }
 
 /// What a guide has learnt in some samples of a room whose floor is a hole to the dark, as a guide file.

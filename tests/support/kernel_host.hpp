@@ -78,6 +78,7 @@ struct room {
   bool open = false;        ///< there is no ceiling; light comes from the sky
   bool floor = true;        ///< without it paths leave the room into the dark
   bool silent = false;      ///< the recorder does not hear of escapes, and is not to
+  bool turned = false;      ///< light comes from the opposite side, as if the lamp were moved
   host_roulette roulette = host_roulette::by_throughput;
 };
 
@@ -223,13 +224,14 @@ struct find_hits {
     else if (!at.in.silent && at.fault != host_fault::silent_escapes)
       at.recorder.escape(i, at.depth, mean_of(path.throughput));
     // What the camera sees directly is as noisy with and without a guide.
-    const float light = escapes ? at.in.open ? sky_radiance : 0.0f : emitted(path.position);
+    const float light = escapes ? at.in.open ? sky_radiance : 0.0f : light_of_wall(path.position);
     if (at.depth > 0) path.radiance += mean_of(path.throughput) * light;
     if (at.fault != host_fault::lost_light || at.depth < 2) at.recorder.total(i, at.depth, path.radiance);
     at.checker.radiance(i, path.radiance);
   }
 
  private:
+  WFPG_HD float light_of_wall(vec3 p) const { return emitted(at.in.turned ? vec3(1.0f) - p : p); }
   WFPG_HD material material_of_wall(vec3 normal) const {
     if (at.in.coats && std::fabs(normal.x) > 0.5f) return material::coated;
     return at.in.alpha > 0.0f && std::fabs(normal.z) > 0.5f ? material::glossy : material::diffuse;
