@@ -40,7 +40,7 @@ struct demo_device {
   int size;      // pixels along a side
   int shown_at;  // screen pixels for a pixel of the PNGs
 };
-constexpr demo_device demo_devices[] = {{"cpu", render::device::cpu, 128, 3},
+constexpr demo_device demo_devices[] = {{"cpu", render::device::cpu, 112, 3},
                                         {"cuda", render::device::cuda, 512, 1}};
 
 struct demo_method {

@@ -369,8 +369,8 @@ void take_more(const bidirectional_tracer<Exec, Caster>& tracer, const render_op
 /// Renders by a tracer that has no guide. Its kernels trace all rays. Throws std::runtime_error for a caster
 /// of batches.
 template <class Accelerated, template <class, class> class Tracer, class Exec>
-render_result render_in_kernels(const Exec& exec, const scene& scene, const render_options& options,
-                                const progress_callback& progress) {
+render_result render_without_guide(const Exec& exec, const scene& scene, const render_options& options,
+                                   const progress_callback& progress) {
   using caster_type = decltype(std::declval<const Accelerated&>().caster());
   if constexpr (wfpg::is_inline_caster_v<caster_type>)
     return render_by<Accelerated, Tracer>(exec, scene, options, progress, [](const auto& job) {
@@ -382,13 +382,21 @@ render_result render_in_kernels(const Exec& exec, const scene& scene, const rend
     refuse_batches(options.method);
 }
 
+/// Renders through media, or from both ends. A policy's source may leave it to another, so that both compile
+/// at once.
+template <class Accelerated, class Exec>
+render_result render_in_kernels(const Exec& exec, const scene& scene, const render_options& options,
+                                const progress_callback& progress) {
+  if (options.method == sampling_method::vpt)
+    return render_without_guide<Accelerated, volume_tracer>(exec, scene, options, progress);
+  return render_without_guide<Accelerated, bidirectional_tracer>(exec, scene, options, progress);
+}
+
 template <class Accelerated, class Exec>
 render_result render_on(const Exec& exec, const scene& scene, const render_options& options,
                         const progress_callback& progress) {
-  if (options.method == sampling_method::vpt)
-    return render_in_kernels<Accelerated, volume_tracer>(exec, scene, options, progress);
-  if (is_bidirectional(options.method))
-    return render_in_kernels<Accelerated, bidirectional_tracer>(exec, scene, options, progress);
+  if (options.method == sampling_method::vpt || is_bidirectional(options.method))
+    return render_in_kernels<Accelerated>(exec, scene, options, progress);
   return render_by<Accelerated>(exec, scene, options, progress, [](const auto& job) { take_by_method(job); });
 }
 
