@@ -2,6 +2,7 @@
 #include "support/guiding.hpp"
 #include "support/kernel_host.hpp"
 #include "support/policies.hpp"
+#include "support/statistics.hpp"
 
 #include <wfpg/guide_file.hpp>
 #include <wfpg/path_guider.hpp>
@@ -72,9 +73,11 @@ WFPG_TEST_CASE("kernel host: guiding gains where fields know all light", "[kerne
 /// How a guider comes to the samples that are compared.
 enum class before_samples { is_new, is_told, is_not_told };
 
+constexpr std::uint32_t paths_of_picture = 1024;
+
 /// Means of 16 samples of each path, after a guider learnt from 48 with the lamp elsewhere, or from none.
 std::vector<double> means_of_paths(std::uint64_t seed, before_samples before) {
-  constexpr std::uint32_t learnt = 48, samples = 16, paths_of_picture = 1024;
+  constexpr std::uint32_t learnt = 48, samples = 16;
   const one_policy exec;
   const box_mesh<one_policy> mesh(exec);
   wfpg::kept_guide_options options = kernel_host_options(paths_of_picture);
@@ -99,17 +102,14 @@ std::vector<double> means_of_paths(std::uint64_t seed, before_samples before) {
   return means;
 }
 
-/// The variance of those means: half of the mean squared difference of two seeds' means.
+/// The mean variance of those means, over seeds.
 double variance_of_means(before_samples before) {
-  constexpr std::uint64_t seeds = 6;
+  constexpr std::uint64_t seeds = 7;
+  tile_means paths(paths_of_picture);
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) paths.add(means_of_paths(seed, before));
   double sum = 0.0;
-  std::vector<double> last = means_of_paths(seeds, before);
-  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
-    const std::vector<double> next = means_of_paths(seed, before);
-    for (std::size_t i = 0; i < next.size(); ++i) sum += (next[i] - last[i]) * (next[i] - last[i]);
-    last = next;
-  }
-  return 0.5 * sum / double(seeds * last.size());
+  for (std::size_t i = 0; i < paths.size(); ++i) sum += seeds * paths.variance_of_mean(i);
+  return sum / paths_of_picture;
 }
 
 TEST_CASE("kernel host: after a lamp moves, a guide is as good as a new one", "[kernel_host][slow]") {
