@@ -8,6 +8,8 @@
 
 #include <wfpg/base/error.hpp>
 
+#include <tbb/global_control.h>
+
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -48,7 +50,6 @@ render_options options_of(const std::string& bytes) {
   options.mode = has("plain") ? guiding::plain : guiding::oriented;
   options.lifetime = has("transient") ? fields::transient : fields::kept;
   options.nee = has("--light-groups");
-  options.where = device::seq;
   options.width = options.height = 4;
   options.max_depth = 3;
   options.spp = 5;
@@ -66,6 +67,7 @@ render_options options_of(const std::string& bytes) {
 render_result go_on(const std::string& state, render_options options, bool is_whole) {
   static const scene world = make_scene();
   static const wfpg_fuzz::memory_file file;
+  static const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   file.hold(state);
   options.resume = file.path();
   if (!is_whole) options.is_stopped = [] { return true; };
