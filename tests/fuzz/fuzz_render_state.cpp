@@ -67,6 +67,7 @@ render_options options_of(const std::string& bytes) {
 render_result go_on(const std::string& state, render_options options, bool is_whole) {
   static const scene world = make_scene();
   static const wfpg_fuzz::memory_file file;
+  // Several threads would take longer for these few paths.
   static const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   file.hold(state);
   options.resume = file.path();

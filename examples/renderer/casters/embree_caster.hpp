@@ -11,6 +11,8 @@
 #include <embree3/rtcore.h>
 #endif
 
+#include <cstddef>
+#include <cstring>
 #include <memory>
 
 namespace render {
@@ -28,12 +30,14 @@ class embree_caster {
     return {found.distance, 0.0f};
   }
 
-  triangle_hit intersect(const wfpg::ray& ray) const { return nearest(ray).triangle; }
+  // Inline, as cast_through_cut_outs() is.
+  [[gnu::always_inline]] triangle_hit intersect(const wfpg::ray& ray) const { return nearest(ray).triangle; }
 
   /// Whether anything is hit inside (t_min, t_max).
   bool occluded(const wfpg::ray& ray) const {
     if (cut_outs_) return nearest(ray).triangle.is_hit();
-    RTCRay shadow = convert(ray);
+    RTCRay shadow{};
+    write(ray, shadow);
     ask(rtcOccluded1, shadow);
     return shadow.tfar < 0.0f;
   }
@@ -44,22 +48,21 @@ class embree_caster {
     float distance = 0.0f;
   };
 
-  hit nearest(const wfpg::ray& ray) const {
+  [[gnu::always_inline]] hit nearest(const wfpg::ray& ray) const {
     return cast_through_cut_outs(cut_outs_, ray, [this](const wfpg::ray& r) { return cast(r); });
   }
 
-  static RTCRay convert(const wfpg::ray& ray) {
-    RTCRay result{};
-    result.org_x = ray.origin.x;
-    result.org_y = ray.origin.y;
-    result.org_z = ray.origin.z;
-    result.tnear = ray.t_min;
-    result.dir_x = ray.direction.x;
-    result.dir_y = ray.direction.y;
-    result.dir_z = ray.direction.z;
+  /// Writes a ray whose other members are 0. Embree reads it in pieces of 16 bytes, and so it is written. A
+  /// read of several smaller stores would wait until all earlier ones have reached the cache.
+  static void write(const wfpg::ray& ray, RTCRay& result) {
+    using four_floats = float __attribute__((vector_size(16)));
+    static_assert(offsetof(RTCRay, tnear) == 12 && offsetof(RTCRay, dir_x) == 16 &&
+                  offsetof(RTCRay, time) == 28);
+    const four_floats pieces[2] = {{ray.origin.x, ray.origin.y, ray.origin.z, ray.t_min},
+                                   {ray.direction.x, ray.direction.y, ray.direction.z, 0.0f}};
+    std::memcpy(&result, pieces, sizeof pieces);
     result.tfar = ray.t_max;
     result.mask = 0xffffffffu;
-    return result;
   }
 
   /// Calls Embree with default arguments, which version 3 needs explicitly.
@@ -76,7 +79,7 @@ class embree_caster {
 
   hit cast(const wfpg::ray& ray) const {
     RTCRayHit result{};
-    result.ray = convert(ray);
+    write(ray, result.ray);
     result.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     ask(rtcIntersect1, result);
     if (result.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};

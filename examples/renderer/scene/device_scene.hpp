@@ -120,9 +120,10 @@ struct scene_view {
     return materials[triangle_materials[triangle]];
   }
 
-  WFPG_HD surface_point point(triangle_hit hit) const {
-    const uvec3 corners = triangles[hit.triangle];
-    const vec3 a = positions[corners.x], b = positions[corners.y], c = positions[corners.z];
+  WFPG_HD surface_point point(const triangle_hit& hit) const {
+    // Copies would go to the stack.
+    const uvec3& corners = triangles[hit.triangle];
+    const vec3 &a = positions[corners.x], &b = positions[corners.y], &c = positions[corners.z];
     const float w = 1.0f - hit.u - hit.v;
     surface_point point;
     point.material = triangle_materials[hit.triangle];
@@ -142,9 +143,9 @@ struct scene_view {
   }
 
   /// Texture coordinates, or 0 if there are none.
-  WFPG_HD vec2 uv_at(triangle_hit hit) const {
+  WFPG_HD vec2 uv_at(const triangle_hit& hit) const {
     if (uvs.empty()) return vec2(0.0f);
-    const uvec3 corners = triangles[hit.triangle];
+    const uvec3& corners = triangles[hit.triangle];
     return (1.0f - hit.u - hit.v) * uvs[corners.x] + hit.u * uvs[corners.y] + hit.v * uvs[corners.z];
   }
 
@@ -167,7 +168,7 @@ struct scene_view {
   }
 
   /// Whether the material of a triangle has a hole at the hit.
-  WFPG_HD bool is_cut_out(triangle_hit hit) const {
+  WFPG_HD bool is_cut_out(const triangle_hit& hit) const {
     const material& m = material_of(hit.triangle);
     if (!(m.alpha_cutoff > 0.0f)) return false;
     const float alpha = m.base_texture.index >= 0 ? texel(m.base_texture, uv_at(hit)).w : 1.0f;
@@ -176,7 +177,7 @@ struct scene_view {
 
   /// The surface at `hit` seen along `outgoing` (unit length, away from the surface). Its BSDF has a value
   /// only where paths go on.
-  WFPG_HD hit_surface surface(triangle_hit hit, vec3 outgoing, bool goes_on = true) const {
+  WFPG_HD hit_surface surface(const triangle_hit& hit, vec3 outgoing, bool goes_on = true) const {
     const surface_point at = point(hit);
     const material& scatters = materials[at.material];
     const bool front = glm::dot(at.geometric_normal, outgoing) >= 0.0f;

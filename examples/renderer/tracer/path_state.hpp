@@ -80,8 +80,8 @@ struct path_vertex {
     f.factors = factors;
     return f;
   }
-  WFPG_HD wfpg::surface<render::bsdf> surface() const {
-    return {position, geometric_normal, normal, outgoing, bsdf(), true};
+  WFPG_HD wfpg::surface<render::bsdf> surface(std::uint32_t path) const {
+    return {position, geometric_normal, normal, outgoing, bsdf(), true, path};
   }
 };
 
@@ -117,16 +117,21 @@ struct queued_surfaces {
   tiled_view<path_vertex> vertices;
 
   WFPG_HD wfpg::surface<bsdf> operator()(std::uint32_t slot) const {
-    wfpg::surface<bsdf> result;
-    result.active = queue.holds(slot);
-    if (!result.active) return result;
-    result = vertices[queue[slot]].surface();
-    result.path = path(slot);
-    return result;
+    // Each result is made in place: a copy on the stack takes longer than all else here.
+    if (!queue.holds(slot)) return inactive();
+    const std::uint32_t id = queue[slot];
+    return vertices[id].surface(id);
   }
   /// Slots beyond the queue belong to no path.
   WFPG_HD std::uint32_t path(std::uint32_t slot) const {
     return queue.holds(slot) ? static_cast<std::uint32_t>(queue[slot]) : wfpg::no_path;
+  }
+
+ private:
+  WFPG_HD static wfpg::surface<bsdf> inactive() {
+    wfpg::surface<bsdf> result;
+    result.active = false;
+    return result;
   }
 };
 

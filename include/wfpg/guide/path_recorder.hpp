@@ -28,7 +28,7 @@ namespace detail {
 
 struct close_path;
 
-/// Position of a vertex. 16 bytes, so that a thread writes it with one store.
+/// Position of a vertex. 16 bytes, so that a GPU's thread writes it with one store.
 struct alignas(16) recorded_place {
   vec3 position;           ///< world space
   std::uint32_t outgoing;  ///< pack_direction() of the direction toward the previous vertex; 0: a gap
@@ -238,8 +238,12 @@ class path_recorder_view {
   WFPG_HD void write_vertex(std::uint32_t place, std::uint32_t depth, const detail::recorded_place& at,
                             const detail::recorded_light& light) const {
     const std::size_t slot = depth * recorded_ + place;
-    places_[slot] = at;
-    light_[slot] = light;
+    // By members, which a compiler for GPUs joins. Copies would be made on the stack and read back in wider
+    // pieces, which waits for all earlier stores.
+    places_[slot].position = at.position;
+    places_[slot].outgoing = at.outgoing;
+    light_[slot].throughput = light.throughput;
+    light_[slot].contribution = light.contribution;
     if (records_directions()) directions_[slot] = {no_field, 0};
   }
   /// Notes that the last direction has found something. Only silent escapes ask for it.
