@@ -105,9 +105,9 @@ class path_recorder_view {
     const std::uint32_t flags = lengths_[place], length = flags & length_mask;
     const bool in_order = (flags & escaped) == 0 && depth >= length && depth < max_depth_;
     if (!in_order || !is_direction(outgoing)) return drop();
-    for (std::uint32_t gap = length; gap < depth; ++gap) write_vertex(place, gap, {}, {});
+    for (std::uint32_t gap = length; gap < depth; ++gap) write_vertex(place, gap, vec3(0.0f), 0, vec3(0.0f));
     if (depth > length) atomic_add(counters_ + counter_gaps, 1);
-    write_vertex(place, depth, {position, pack_marked(outgoing)}, {throughput.rgb, vec3(0.0f)});
+    write_vertex(place, depth, position, pack_marked(outgoing), throughput.rgb);
     lengths_[place] = (depth + 1) | (depth > length ? gaps : flags & gaps);
   }
   /// Records a vertex for path_guider::prepare(depth, caster) as well: all that a host says of a hit.
@@ -151,7 +151,7 @@ class path_recorder_view {
     if (length == ~0u || depth < length) return drop();
     // From a medium: what the last direction finds is not known.
     if (depth > length || depth >= max_depth_) return;
-    light_[depth * recorded_ + place] = {throughput.rgb, vec3(0.0f)};
+    write_light(place, depth, throughput.rgb);
     lengths_[place] = (depth + 1) | escaped | (lengths_[place] & gaps);
   }
 
@@ -231,20 +231,24 @@ class path_recorder_view {
     const std::uint32_t flags = lengths_[place], length = flags & length_mask;
     if ((flags & (escaped | heard)) != 0 || length == 0 || length >= max_depth_) return;
     if (directions_[(length - 1) * recorded_ + place].direction == 0) return;
-    light_[length * recorded_ + place] = {vec3(0.0f), vec3(0.0f)};
+    write_light(place, length, vec3(0.0f));
     lengths_[place] = (length + 1) | escaped | (flags & gaps);
   }
-  /// Writes one vertex, without a direction yet.
-  WFPG_HD void write_vertex(std::uint32_t place, std::uint32_t depth, const detail::recorded_place& at,
-                            const detail::recorded_light& light) const {
+  /// Writes one vertex, without a direction yet. By members, which a compiler for GPUs joins. Copies would be
+  /// made on the stack and read back in wider pieces, which waits for all earlier stores.
+  WFPG_HD void write_vertex(std::uint32_t place, std::uint32_t depth, vec3 position, std::uint32_t outgoing,
+                            vec3 throughput) const {
     const std::size_t slot = depth * recorded_ + place;
-    // By members, which a compiler for GPUs joins. Copies would be made on the stack and read back in wider
-    // pieces, which waits for all earlier stores.
-    places_[slot].position = at.position;
-    places_[slot].outgoing = at.outgoing;
-    light_[slot].throughput = light.throughput;
-    light_[slot].contribution = light.contribution;
+    places_[slot].position = position;
+    places_[slot].outgoing = outgoing;
+    write_light(place, depth, throughput);
     if (records_directions()) directions_[slot] = {no_field, 0};
+  }
+  /// Writes the light of a vertex that has brought nothing yet.
+  WFPG_HD void write_light(std::uint32_t place, std::uint32_t depth, vec3 throughput) const {
+    detail::recorded_light& light = light_[depth * recorded_ + place];
+    light.throughput = throughput;
+    light.contribution = vec3(0.0f);
   }
   /// Notes that the last direction has found something. Only silent escapes ask for it.
   WFPG_HD void hear(std::uint32_t place) const {
