@@ -153,29 +153,28 @@ struct basic_guide_mixture {
     float rescaled = u_technique;
     sampled_direction result;
     result.field = number;
+    float of_field;
     if (mixture.choose(rescaled)) {
-      float of_field;
       result.direction = field.sample(u, of_field);
       result.technique = sampling_technique::guide;
-      result.pdf = parts.guide * of_field + bsdf_pdf(s, parts, result.direction);
-      result.share = guide_share::of(parts.guide * of_field, result.pdf, kept);
-      return result;
+    } else {
+      // The technique's number chooses among three intervals: the guide's, the narrow part's, the rest's.
+      // Where there is no rest, rounding must not choose it.
+      const bool is_narrow = u_technique < parts.guide + parts.glossy || !(parts.smooth > 0.0f);
+      const bsdf_sample drawn = draw(s, is_narrow, u);
+      // The whole sample fails: drawing again from the guide would change the density.
+      if (!is_drawn(drawn)) return {};
+      if (drawn.is_delta)
+        return {drawn.direction, part_probability<Bsdf>(parts, is_narrow) * drawn.pdf,
+                sampling_technique::delta, guide_share(), no_field};
+      result.direction = drawn.direction;
+      result.technique = sampling_technique::bsdf;
+      of_field = field.pdf(drawn.direction);
     }
-    // The technique's number chooses among three intervals: the guide's, the narrow part's, the rest's.
-    // Where there is no rest, rounding must not choose it.
-    const bool is_narrow = u_technique < parts.guide + parts.glossy || !(parts.smooth > 0.0f);
-    const bsdf_sample drawn = draw(s, is_narrow, u);
-    // The whole sample fails: drawing again from the guide would change the density.
-    if (!is_drawn(drawn)) return {};
-    if (drawn.is_delta)
-      return {drawn.direction, part_probability<Bsdf>(parts, is_narrow) * drawn.pdf,
-              sampling_technique::delta, guide_share(), no_field};
-    result.direction = drawn.direction;
-    result.technique = sampling_technique::bsdf;
     // All techniques' densities count, whichever drew the direction. This is one-sample MIS with the balance
-    // heuristic, so the estimate's weight is simply value / pdf.
-    const float of_guide = mixture.guided_pdf(drawn.direction);
-    result.pdf = of_guide + bsdf_pdf(s, parts, drawn.direction);
+    // heuristic, so the estimate's weight is simply value / pdf. A GPU's threads are together again here.
+    const float of_guide = parts.guide * of_field;
+    result.pdf = of_guide + bsdf_pdf(s, parts, result.direction);
     result.share = guide_share::of(of_guide, result.pdf, kept);
     return result;
   }
