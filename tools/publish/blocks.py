@@ -7,7 +7,7 @@ import json
 import pathlib
 import re
 import sys
-from typing import Any, Callable, Dict, List, Union
+from typing import Any, Callable, Dict, List, Set, Union
 
 from provenance import RESULTS, provenance, read_index
 
@@ -51,6 +51,10 @@ class Results:
                 raise KeyError(f"{name} has no {'/'.join(map(str, keys))}")
             value = value[key]
         return value
+
+    def files(self) -> Set[str]:
+        """All files that blocks were made from so far."""
+        return set(self._texts)
 
     def found(self, name: str, pattern: str) -> "re.Match[str]":
         """The one match of a pattern in a text file; lines are matched singly."""

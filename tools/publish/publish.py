@@ -74,6 +74,14 @@ def check_marks(root: pathlib.Path, index: Dict[str, Entry]) -> List[str]:
             for name, entry in index.items() if is_marked_wrongly(root, entry)]
 
 
+def check_shown(root: pathlib.Path, files: List[str], in_blocks: Set[str]) -> List[str]:
+    """Result files that nobody sees: no block or plot is made from them, and no page but the list of all names them."""
+    pages = [root / page for page in (*page_names(root), "CONTRIBUTING.md") if page != "docs/results.md"]
+    texts = [path.read_text(encoding="utf-8") for path in (*pages, *(root / "bench").rglob("*.py"))]
+    return [f"bench/results/{name} is in no page and no plot: show it or remove it" for name in files
+            if name not in in_blocks and not any(name in text for text in texts)]
+
+
 def mark_stale(root: pathlib.Path) -> None:
     """Marks what was measured from other sources, so that pages say so. Where that is unknown, marks stay."""
     index = read_index(root)
@@ -105,6 +113,7 @@ def check(root: pathlib.Path) -> List[str]:
     found = check_index(root, index) + check_marks(root, index) + differing_plots(root, drawn(root))
     for page in page_names(root):
         found += check_page(results, page, (root / page).read_text(encoding="utf-8"), exceptions, used)
+    found += check_shown(root, result_files(root), results.files())
     found += [f"exceptions.ini: [{e.kind}] {e.pattern.pattern} covers nothing in {e.pages}" for e in exceptions
               if e not in used]
     return found
@@ -165,6 +174,8 @@ def planted(root: pathlib.Path) -> List[str]:
     for name in (name for name in index if "#" not in name and not parts_of(root, name) or name.split("#")[0] not in index):
         if not check_index(root, {other: entry for other, entry in index.items() if other != name}):
             missed.append(f"not found: an index without {name}")
+    if len(check_shown(root, ["no-such-result.json"], set())) != 1:
+        missed.append("not found: a result that no page shows")
     unmarked = {name: {**entry, "sources": "0" * 12, "stale": False} for name, entry in index.items()}
     if sources(root) and len(check_marks(root, unmarked)) < len(index):  # without git nothing is known
         missed.append("not found: results of other sources that are not marked")
