@@ -155,11 +155,12 @@ def without_groups(results: Results, scene: str) -> str:
 
 
 @block
-def combining(results: Results) -> str:
-    """What `pt-linear` gains over the plain mean of samples of kept fields."""
-    combined = results.json("quality-series.json", "scenes", 0, "single_samples", "wfpg", "combined")
-    plain, weighed = (combined[way]["mse_reinhard"][-1] for way in ("constant", "pt-linear"))
-    return f"{100 * (plain / weighed - 1):.0f}%"
+def combining(results: Results, way: str) -> str:
+    """The error of combined samples of kept fields over that of their plain mean, after the last one."""
+    scene = results.json("quality-series.json", "scenes", 0)
+    combined, noise = scene["single_samples"]["wfpg"]["combined"], scene["reference"]["noise"]["mse_reinhard"]
+    plain, weighed = (combined[w]["mse_reinhard"][-1] - noise for w in ("constant", way))
+    return f"{weighed / plain:.2f}"
 
 
 def rested(cell: Dict[str, Any]) -> str:
