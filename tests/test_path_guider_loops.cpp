@@ -6,6 +6,7 @@
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
 #include "support/stepwise_samples.hpp"
+#include "support/wall_paths.hpp"
 
 #include <wfpg/base/error.hpp>
 #include <wfpg/exec/cpu_policy.hpp>
@@ -121,34 +122,13 @@ TEST_CASE("path guider: each loop of a sample may fail, and the next sample work
   SUCCEED(covered << " loops");
 }
 
-/// Paths with one vertex on a wall, which bring 2.5 or nothing: noisy enough to be compared at once.
-struct record_noisy_path {
-  wfpg::path_recorder_view recorder;
-  std::uint32_t sample;
-
-  void operator()(std::size_t i) const {
-    const auto path = static_cast<std::uint32_t>(i);
-    const vec2 at = wfpg::unit_vec2(wfpg::hash(7u, path)) * 0.6f + 0.2f;
-    const bool lit = wfpg::unit_vec2(wfpg::hash(wfpg::hash(sample, path), 11u)).x < 0.4f;
-    recorder.vertex(i, 0, face_point(path % 6, at.x, at.y), face_normal(path % 6), 1.0f);
-    recorder.radiance(i, 0, lit ? 2.5f : 0.0f);
-  }
-};
-
 /// The gain after four samples, of which the k-th loop fails and its call is repeated. Sets `failed` where
 /// there are so many loops.
 wfpg::guiding_gain gain_with_fault(std::size_t k, bool& failed) {
-  constexpr std::size_t paths = 3000;  // enough to be measured
-  wfpg::kept_guide_options options;
-  options.octree_resolution = 8;
-  options.max_paths = paths;
-  options.max_depth = 2;
-  options.kept.budget_bytes = std::size_t(1) << 18;
-  options.least_gain = 1.25f;
   const failing_policy host;
   loop_count loops;
   wfpg::path_guider<failing_policy> guider(failing_policy(loops), box_mesh<failing_policy>(host).view(),
-                                           options);
+                                           rest_options());
   const auto repeated = [&](const auto& call) {
     try {
       call();
@@ -159,7 +139,7 @@ wfpg::guiding_gain gain_with_fault(std::size_t k, bool& failed) {
   loops.fail_loop(k);
   for (std::uint32_t sample = 1; sample <= 4; ++sample) {
     repeated([&] { guider.begin_sample(); });
-    host.for_each(paths, record_noisy_path{guider.recorder(), sample});
+    host.for_each(wall_path::count, record_wall_paths{guider.recorder(), sample, 0.4f, 0});
     repeated([&] { guider.end_sample(); });
   }
   failed = loops.failed();

@@ -3,6 +3,7 @@
 #include "support/guiding.hpp"
 #include "support/policies.hpp"
 #include "support/scenes.hpp"
+#include "support/wall_paths.hpp"
 
 #include <wfpg/guide_file.hpp>
 #include <wfpg/path_guider.hpp>
@@ -24,51 +25,7 @@ namespace {
 
 using numbers = std::vector<std::uint32_t>;
 
-// A host whose paths have one vertex on a wall. A path brings 0, or its pixel's mean over the probability of
-// not bringing 0: that probability sets the variance.
-
-constexpr std::uint32_t path_count = 6000;
-
-struct wall_path {
-  vec3 position, normal;
-  float mean;  ///< luminance
-
-  WFPG_HD static wall_path of(std::uint32_t path) {
-    const vec2 u = wfpg::unit_vec2(wfpg::hash(7u, path)) * 0.6f + 0.2f;
-    const std::uint32_t face = path % 6;
-    return {face_point(face, u.x, u.y), face_normal(face), 1.0f + static_cast<float>(face)};
-  }
-  /// What path `path` brings in a sample, with this probability.
-  WFPG_HD static float radiance(std::uint32_t path, std::uint32_t sample, float probability) {
-    const bool lit = wfpg::unit_vec2(wfpg::hash(wfpg::hash(sample, path), 11u)).x < probability;
-    return lit ? of(path).mean / probability : 0.0f;
-  }
-};
-
-struct record_wall_paths {
-  wfpg::path_recorder_view recorder;
-  std::uint32_t sample;
-  float probability;
-  std::uint32_t shift;  ///< above 0: a path has another index in each sample
-
-  WFPG_HD void operator()(std::size_t i) const {
-    const auto index = static_cast<std::uint32_t>(i);
-    const std::uint32_t path = shift > 0 ? (index + shift * sample) % path_count : index;
-    const wall_path at = wall_path::of(path);
-    recorder.vertex(i, 0, at.position, at.normal, 1.0f);
-    recorder.radiance(i, 0, wall_path::radiance(path, sample, probability));
-  }
-};
-
-wfpg::kept_guide_options rest_options() {
-  wfpg::kept_guide_options options;
-  options.octree_resolution = 32;
-  options.max_paths = path_count;
-  options.max_depth = 2;
-  options.kept.budget_bytes = std::size_t(1) << 20;
-  options.least_gain = 1.25f;  // for all policies
-  return options;
-}
+constexpr std::uint32_t path_count = wall_path::count;
 
 /// Probabilities of unguided and of guided paths. The variance of a pixel is its squared mean times
 /// 1 / probability - 1. Unguided ones are noisy enough to be compared at once.
