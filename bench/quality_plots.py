@@ -224,6 +224,13 @@ def linear_plot(left: float, top: float, curves: Dict[str, Points], title: str, 
     return Plot(left, top, 350, 190, (1, last), (low, high), (1, 2, 4, 8, 16, 32, 64), ticks, title, along, True, False)
 
 
+def over_plain_mean(scene: Scene, way: str) -> Points:
+    """Error of combined samples of kept fields over that of their plain mean, by their number."""
+    combined, noise = scene["single_samples"]["wfpg"]["combined"], scene["reference"]["noise"][MEASURE]
+    errors = zip(combined[way][MEASURE], combined["constant"][MEASURE])
+    return [(i, (e - noise) / (plain - noise)) for i, (e, plain) in enumerate(errors, 1) if e is not None]
+
+
 def draw_single_samples(folder: pathlib.Path) -> str:
     """Each sample's own error over path tracing's, and combined samples' over that of the plain mean."""
     alone = {"pt": ("path tracing", GREY), "paper": ("the paper's method", PURPLE), "wfpg-transient-oriented": ("transient, oriented", GOLD),
@@ -240,10 +247,7 @@ def draw_single_samples(folder: pathlib.Path) -> str:
             one.curve(curves[method], colour)
         for k, (name, colour) in enumerate(alone.values()):
             one.label(one.left + 70 + 130 * (k % 2), one.top + one.height - 24 + 15 * (k // 2), name, colour)
-        all_ways = found["wfpg"]["combined"]
-        plain = all_ways["constant"][MEASURE]
-        curves = {way: [(i + 1, (e - noise) / (p - noise)) for i, (e, p) in enumerate(zip(all_ways[way][MEASURE], plain)) if e is not None]
-                  for way in ways}
+        curves = {way: over_plain_mean(scene, way) for way in ways}
         other = linear_plot(476, top, curves, f"{short(scene)}: samples of kept fields combined", "samples", False)
         for way, colour in ways.items():
             other.curve(curves[way], colour)

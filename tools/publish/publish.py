@@ -26,7 +26,7 @@ import results_blocks  # registers its blocks
 from blocks import ROOT, Results, generate
 from measuring import Place, list_series, measure
 from pages import BLOCK, INLINE, Exempt, differing, faults_of_markers, outside, read_exceptions, rewrite
-from plots import differing_plots, drawn, write_plots
+from plots import PLOTS, differing_plots, drawn, write_plots
 from provenance import RESULTS, Entry, is_marked_wrongly, is_stale, provenance, read_index, result_files, sources, write_index
 
 EXCEPTIONS = pathlib.Path(__file__).resolve().parent / "exceptions.ini"
@@ -76,10 +76,11 @@ def check_marks(root: pathlib.Path, index: Dict[str, Entry]) -> List[str]:
 
 def check_shown(root: pathlib.Path, files: List[str], in_blocks: Set[str]) -> List[str]:
     """Result files that nobody sees: no block or plot is made from them, and no page but the list of all names them."""
-    pages = [root / page for page in (*page_names(root), "CONTRIBUTING.md") if page != "docs/results.md"]
-    texts = [path.read_text(encoding="utf-8") for path in (*pages, *(root / "bench").rglob("*.py"))]
+    pages = [page for page in (*page_names(root), "CONTRIBUTING.md") if page != "docs/results.md"]
+    texts = [(root / path).read_text(encoding="utf-8") for path in (*pages, *(script for script, *_ in PLOTS))]
+    shown = {*in_blocks, *(result for _, result, *_ in PLOTS)}
     return [f"bench/results/{name} is in no page and no plot: show it or remove it" for name in files
-            if name not in in_blocks and not any(name in text for text in texts)]
+            if name not in shown and not any(name in text for text in texts)]
 
 
 def mark_stale(root: pathlib.Path) -> None:

@@ -4,7 +4,7 @@ from typing import Any, Dict, List
 
 from blocks import Results, Rows, block, span, three
 
-from quality_plots import Errors, budget_of, equal_time, gain, short  # bench/quality_plots.py
+from quality_plots import Errors, budget_of, equal_time, gain, over_plain_mean, short  # bench/quality_plots.py
 from table import errors_at  # bench/table.py
 
 
@@ -157,10 +157,7 @@ def without_groups(results: Results, scene: str) -> str:
 @block
 def combining(results: Results, way: str) -> str:
     """The error of combined samples of kept fields over that of their plain mean, after the last one."""
-    scene = results.json("quality-series.json", "scenes", 0)
-    combined, noise = scene["single_samples"]["wfpg"]["combined"], scene["reference"]["noise"]["mse_reinhard"]
-    plain, weighed = (combined[w]["mse_reinhard"][-1] - noise for w in ("constant", way))
-    return f"{weighed / plain:.2f}"
+    return f"{over_plain_mean(results.json('quality-series.json', 'scenes', 0), way)[-1][1]:.2f}"
 
 
 def rested(cell: Dict[str, Any]) -> str:
