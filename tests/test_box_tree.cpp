@@ -108,6 +108,25 @@ struct list_found {
   }
 };
 
+/// Counts boxes by calls that wait for others: for rays, and then for their origins.
+struct count_waiting {
+  box_tree_view tree;
+  wfpg::array_view<const ray> rays;
+  std::uint8_t* found;
+  std::size_t boxes;  ///< given ones
+
+  /// Whether a box is to be found.
+  WFPG_HD static bool is_wanted(std::uint32_t index) { return index % 3 != 0; }
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const auto holds = [&](std::uint32_t place) { return is_wanted(tree.index(place)); };
+    const counter along{found + i * boxes}, around{found + (rays.size() + i) * boxes};
+    tree.for_each_place_along(rays[i], holds, [&](std::uint32_t place) { along(tree.index(place)); });
+    const vec3 at = rays[i].origin;
+    tree.for_each_place(bounds3{at, at}, holds, [&](std::uint32_t place) { around(tree.index(place)); });
+  }
+};
+
 }  // namespace box_tree_test
 
 namespace {
@@ -485,6 +504,35 @@ WFPG_TEST_CASE("trees and the order of what is found are equal on all policies",
     boxes.push_back(box);  // equal codes
   const std::vector<ray> rays = rays_near(boxes, 500, 22);
   CHECK((lists<Exec>(boxes, rays) == lists<reference<Exec>>(boxes, rays)));
+}
+
+WFPG_TEST_CASE("calls that wait for others find the same boxes, each once", "[box_tree]") {
+  const Exec exec;
+  // Some queries find more boxes than wait at once.
+  const box_list boxes = random_boxes(3000, 0.2f, 23);
+  const std::vector<ray> rays = rays_near(boxes, 100, 24);
+  std::vector<vec3> origins;
+  for (const ray& r : rays) origins.push_back(r.origin);
+  const wfpg::buffer<bounds3, Exec> given(exec, boxes);
+  const wfpg::buffer<ray, Exec> asked(exec, rays);
+  for (const std::uint32_t leaf_boxes : {1u, 7u}) {
+    box_tree<Exec> tree;
+    tree.build(exec, given.view(), leaf_boxes);
+    counts expected = count(exec, tree, boxes.size(), rays);
+    const counts by_origins = count(exec, tree, boxes.size(), origins);
+    expected.insert(expected.end(), by_origins.begin(), by_origins.end());
+    for (std::size_t k = 0; k < expected.size(); ++k)
+      if (!count_waiting::is_wanted(static_cast<std::uint32_t>(k % boxes.size()))) expected[k] = 0;
+    std::ptrdiff_t most = 0;
+    for (auto query = expected.begin(); query != expected.end(); query += 3000)
+      most = std::max(most, std::count(query, query + 3000, 1));
+    CHECK(most > 100);
+
+    const wfpg::buffer<std::uint8_t, Exec> found(exec, expected.size());
+    exec.fill_bytes(found.data(), 0, found.bytes());
+    exec.for_each(rays.size(), count_waiting{tree.view(), asked.view(), found.data(), boxes.size()});
+    CHECK((found.to_host(exec) == expected));
+  }
 }
 
 static_assert(std::is_trivially_copyable_v<box_tree_view> && sizeof(box_tree_view) == 24);

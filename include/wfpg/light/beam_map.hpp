@@ -61,13 +61,12 @@ class beam_map_view {
   /// `shape`: of the kernel, which merge_geometry has the value of.
   template <class F>
   WFPG_HD void for_each_beam_along(const path_beam& camera, merge_kernel shape, const F& f) const {
-    tree_.nearest_first(camera.as_ray(), [&](std::uint32_t place, float&) {
-      const detail::beam_piece piece = pieces_[place];
-      const path_beam light = cut_.cut(piece);
-      const merge_geometry found = beam_beam_merge(shape, camera, light, radius_);
-      if (found.kernel > 0.0f) f(piece.beam, found);
-      return false;
-    });
+    const auto merge = [&](std::uint32_t place) {
+      return beam_beam_merge(shape, camera, cut_.cut(pieces_[place]), radius_);
+    };
+    tree_.for_each_place_along(
+        camera.as_ray(), [&](std::uint32_t place) { return merge(place).kernel > 0.0f; },
+        [&](std::uint32_t place) { f(pieces_[place].beam, merge(place)); });
   }
 
  private:

@@ -64,7 +64,12 @@ class box_tree_view {
   /// finite, has none.
   template <class F>
   WFPG_HD void overlaps(const bounds3& box, const F& f) const {
-    for_each_place(box, [&](std::uint32_t place) { f(order_[place]); });
+    if (!is_query(box)) return;
+    detail::box_query query{box};
+    traverse(query, [&](std::uint32_t place) {
+      f(order_[place]);
+      return false;
+    });
   }
   /// Calls f(index) for each box that a ray crosses between t_min and t_max. Rays may begin inside a box.
   /// Nearer boxes tend to come first. Nothing is found where origin or direction is not finite.
@@ -76,52 +81,66 @@ class box_tree_view {
     });
   }
 
-  /// Calls f(place) for each box that has a point in common with `box`, as overlaps() does for indices.
-  template <class F>
-  WFPG_HD void for_each_place(const bounds3& box, const F& f) const {
-    if (!is_finite(box.lower) || !is_finite(box.upper) || box.empty()) return;
-    detail::box_query query{box};
-    traverse(query, [&](std::uint32_t place) {
-      f(place);
-      return false;
-    });
+  /// Calls f(place) for each box that has a point in common with `box`, and for which holds(place) is true.
+  /// The order depends on the tree alone. Calls of f wait until up to 32 places were found, so that the lanes
+  /// of a warp make them together. A long f thus takes less time on a GPU than in overlaps(), where few lanes
+  /// call it at once.
+  template <class Test, class F>
+  WFPG_HD void for_each_place(const bounds3& box, const Test& holds, const F& f) const {
+    if (is_query(box)) find_then_call(detail::box_query{box}, holds, f);
+  }
+  /// Likewise for each box that a ray crosses between t_min and t_max.
+  template <class Test, class F>
+  WFPG_HD void for_each_place_along(const ray& along, const Test& holds, const F& f) const {
+    if (is_query(along)) find_then_call(detail::box_line{{along, one_}}, holds, f);
   }
   /// Calls f(place, t_max) for boxes that a ray crosses between t_min and t_max, nearer nodes first. f may
   /// lower t_max, a float&, to the distance of what it has found: boxes beyond are then left out. The search
   /// ends where f returns true.
   template <class F>
   WFPG_HD void nearest_first(const ray& along, const F& f) const {
-    // An invalid ray would cross every box.
-    if (!is_finite(along.origin) || !is_finite(along.direction)) return;
+    if (!is_query(along)) return;
     detail::box_ray query(along, one_);
     traverse(query, [&](std::uint32_t place) { return f(place, query.t_max); });
   }
 
  private:
-  /// If fewer lanes are still descending, the lanes at leaves do not wait for them.
-  static constexpr int least_company = 24;
+  // Places that wait for f. On an H200, 16 take a tenth more time for ten photons a query. Among clusters, 16
+  // take a third more, and 24 a twentieth.
+  static constexpr std::uint32_t most_waiting = 32;
+
+  WFPG_HD static bool is_query(const bounds3& box) {
+    return is_finite(box.lower) && is_finite(box.upper) && !box.empty();
+  }
+  // An invalid ray would cross every box.
+  WFPG_HD static bool is_query(const ray& along) {
+    return is_finite(along.origin) && is_finite(along.direction);
+  }
 
   /// Calls f(place) for each box in a leaf that the query reaches, until f returns true.
   template <class Query, class F>
   WFPG_HD void traverse(Query& query, const F& f) const {
-    if (size_ == 0) return;
-    typename Query::waiting stack[detail::box_stack::size];
-    std::uint32_t depth = 0;
-    detail::box_child at = detail::box_child::node(0);
-    for (;;) {
-      if (!at.is_leaf()) {
-        do at = query.descend(detail::box_node(nodes_[at.index()]), stack, depth);
-        while (!at.is_leaf() && detail::lanes_here() >= least_company);
-        if (!at.is_leaf()) continue;
-      }
-      const std::uint32_t end = at.first() + at.count();
-      for (std::uint32_t place = at.first(); place < end; ++place)
+    detail::box_walk<Query> walk(nodes_, size_);
+    while (walk.next(query)) {
+      const std::uint32_t end = walk.leaf().first() + walk.leaf().count();
+      for (std::uint32_t place = walk.leaf().first(); place < end; ++place)
         if (f(place)) return;
-      do {
-        if (depth == 0) return;
-        --depth;
-      } while (!query.wants(stack[depth]));
-      at = query.child_of(stack[depth]);
+    }
+  }
+  /// Finds the places in leaves that the query reaches for which `holds` is true, and then calls f for them.
+  template <class Query, class Test, class F>
+  WFPG_HD void find_then_call(const Query& query, const Test& holds, const F& f) const {
+    detail::box_walk<Query> walk(nodes_, size_);
+    std::uint32_t found[most_waiting];
+    for (bool more = true; more;) {
+      std::uint32_t n = 0;
+      while (n + detail::box_child::largest_leaf <= most_waiting && (more = walk.next(query))) {
+        const detail::box_child leaf = walk.leaf();
+        // The number of steps is fixed, so that reads of one do not wait for those before.
+        for (std::uint32_t i = 0; i < detail::box_child::largest_leaf; ++i)
+          if (i < leaf.count() && holds(leaf.first() + i)) found[n++] = leaf.first() + i;
+      }
+      for (std::uint32_t i = 0; i < n; ++i) f(found[i]);
     }
   }
 

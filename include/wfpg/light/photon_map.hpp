@@ -15,7 +15,8 @@
 // Simulation", section 5, which queries boxes of spheres too. The tree is that of Karras 2012, "Maximizing
 // Parallelism in the Construction of BVHs, Octrees, and k-d Trees".
 // Cost: a build is that of the tree. A query tests about twice as many photons as it finds. Clusters cost no
-// more than photons that are spread evenly.
+// more than photons that are spread evenly. Queries first find up to 32 photons and then call f for them, so
+// that a warp's lanes call it together.
 // Memory: 12 bytes a photon for positions, and about 11 of the tree.
 #pragma once
 
@@ -73,6 +74,7 @@ class photon_map_view {
 
   /// Calls f(index) for each photon whose distance from `p` is at most the radius, once each. The order
   /// depends on the photons alone. Distances are rounded as floats. A point that is not finite has no photon.
+  /// Calls of f wait for others, as box_tree_view::for_each_place() says. O(log photons + found).
   template <class F>
   WFPG_HD void for_each_point(vec3 p, const F& f) const {
     for_each_place(p, [&](std::uint32_t place) { f(tree_.index(place)); });
@@ -81,15 +83,15 @@ class photon_map_view {
   /// which are near each other, have neighbouring places.
   template <class F>
   WFPG_HD void for_each_place(vec3 p, const F& f) const {
-    tree_.for_each_place(bounds3{p, p}, [&](std::uint32_t place) {
+    const auto is_near = [&](std::uint32_t place) {
       const vec3 away = positions_[place] - p;
-      if (glm::dot(away, away) <= radius_ * radius_) f(place);
-    });
+      return glm::dot(away, away) <= radius_ * radius_;
+    };
+    tree_.for_each_place(bounds3{p, p}, is_near, f);
   }
 
   /// Calls f(index, merge_geometry) for each photon that merges with a camera beam, once each: whose kernel
-  /// is not 0. The order depends on the photons and the beam's direction. A beam that is not finite merges
-  /// with none.
+  /// is not 0. The order depends on the photons alone. A beam that is not finite merges with none.
   /// `camera`: an interval of a ray in one medium, begin at least 0.
   /// `shape`: of the kernel, which merge_geometry has the value of.
   template <class F>
@@ -101,11 +103,12 @@ class photon_map_view {
   /// Likewise f(place, merge_geometry), for hosts that keep what photons carry in the order of places.
   template <class F>
   WFPG_HD void for_each_place_along(const path_beam& camera, merge_kernel shape, const F& f) const {
-    tree_.nearest_first(camera.as_ray(), [&](std::uint32_t place, float&) {
-      const merge_geometry found = beam_point_merge(shape, camera, positions_[place], radius_);
-      if (found.kernel > 0.0f) f(place, found);
-      return false;
-    });
+    const auto merge = [&](std::uint32_t place) {
+      return beam_point_merge(shape, camera, positions_[place], radius_);
+    };
+    tree_.for_each_place_along(
+        camera.as_ray(), [&](std::uint32_t place) { return merge(place).kernel > 0.0f; },
+        [&](std::uint32_t place) { f(place, merge(place)); });
   }
 
  private:

@@ -169,6 +169,21 @@ struct box_slabs {
   WFPG_HD float exit(int child) const { return byte_float(last, child, one) * slope + far; }
 };
 
+/// Where a ray crosses a node's children: those that it enters before it leaves them.
+struct box_crossings {
+  box_slabs x, y, z;
+  float t_min, t_max;
+
+  WFPG_HD box_crossings(const box_node& node, const box_ray& ray)
+      : x(node, ray, 0), y(node, ray, 1), z(node, ray, 2), t_min(ray.t_min), t_max(ray.t_max) {}
+  WFPG_HD float entry(int child) const {
+    return largest_of(x.entry(child), y.entry(child), z.entry(child), t_min);
+  }
+  WFPG_HD float exit(int child) const {
+    return smallest_of(x.exit(child), y.exit(child), z.exit(child), t_max);
+  }
+};
+
 /// The children of a node that a ray crosses, nearest first. Each is its entry distance as bits of a float,
 /// whose last two bits are the child's number. `none` follows the last.
 struct box_entries {
@@ -176,12 +191,10 @@ struct box_entries {
   std::uint32_t keys[box_node::width];
 
   WFPG_HD box_entries(const box_node& node, const box_ray& ray) {
-    const box_slabs x(node, ray, 0), y(node, ray, 1), z(node, ray, 2);
+    const box_crossings crossings(node, ray);
     for (int i = 0; i < box_node::width; ++i) {
-      const float entry = largest_of(x.entry(i), y.entry(i), z.entry(i), ray.t_min);
-      const float exit = smallest_of(x.exit(i), y.exit(i), z.exit(i), ray.t_max);
-      const std::uint32_t bits = float_bits(entry);
-      keys[i] = entry <= exit ? (bits & ~3u) | static_cast<std::uint32_t>(i) : none;
+      const float entry = crossings.entry(i);
+      keys[i] = entry <= crossings.exit(i) ? (float_bits(entry) & ~3u) | static_cast<std::uint32_t>(i) : none;
     }
     order(0, 1), order(2, 3), order(0, 2), order(1, 3), order(1, 2);
   }
@@ -203,7 +216,37 @@ WFPG_HD inline box_child box_ray::descend(const box_node& node, waiting* stack, 
   return entries.keys[0] != box_entries::none ? node.child(entries.keys[0]) : box_child::none();
 }
 
-// --- boxes ---
+// --- queries that visit all ---
+
+/// Returns the first child for which f(i) is true, and pushes the others onto the stack.
+template <class F>
+WFPG_HD box_child first_of(const box_node& node, std::uint32_t* stack, std::uint32_t& depth, const F& f) {
+  box_child first = box_child::none();
+  for (std::uint32_t i = box_node::width; i-- > 0;) {
+    if (!f(i)) continue;
+    // The last one found is the first: it is returned, and those before it wait.
+    if (first.word() != box_child::none().word()) stack[depth++] = first.word();
+    first = node.child(i);
+  }
+  return first;
+}
+
+/// A ray that visits all boxes that it crosses, in the tree's order.
+struct box_line {
+  using waiting = std::uint32_t;  ///< a child on the stack
+
+  box_ray along;
+
+  /// Returns the first child that the ray crosses, and pushes the others onto the stack.
+  WFPG_HD box_child descend(const box_node& node, waiting* stack, std::uint32_t& depth) const {
+    const box_crossings crossings(node, along);
+    return first_of(node, stack, depth, [&](std::uint32_t i) {
+      return crossings.entry(static_cast<int>(i)) <= crossings.exit(static_cast<int>(i));
+    });
+  }
+  WFPG_HD bool wants(waiting) const { return true; }
+  WFPG_HD static box_child child_of(waiting child) { return box_child(child); }
+};
 
 /// A box that visits the boxes that it overlaps, in the tree's order. A point is a box of one point.
 struct box_query {
@@ -213,15 +256,8 @@ struct box_query {
 
   /// Returns the first child that the box overlaps, and pushes the others onto the stack.
   WFPG_HD box_child descend(const box_node& node, waiting* stack, std::uint32_t& depth) const {
-    std::uint32_t children = overlapped(node);
-    box_child first = box_child::none();
-    for (std::uint32_t i = box_node::width; i-- > 0; children <<= 8) {
-      if ((children & 0x80000000u) == 0) continue;
-      // The last one found is the first: it is returned, and those before it wait.
-      if (first.word() != box_child::none().word()) stack[depth++] = first.word();
-      first = node.child(i);
-    }
-    return first;
+    const std::uint32_t children = overlapped(node);
+    return first_of(node, stack, depth, [&](std::uint32_t i) { return (children >> 8 * i & 0x80u) != 0; });
   }
   WFPG_HD bool wants(waiting) const { return true; }
   WFPG_HD static box_child child_of(waiting child) { return box_child(child); }
@@ -245,6 +281,44 @@ struct box_query {
   WFPG_HD static std::uint32_t four_of(float steps) {
     return static_cast<std::uint32_t>(min(max(steps, 0.0f), 255.0f)) * 0x01010101u;
   }
+};
+
+// --- traversals ---
+
+/// A traversal that stops at each leaf. `Query`: box_ray or box_query.
+template <class Query>
+class box_walk {
+ public:
+  /// Begins at the root of a tree of `size` boxes.
+  WFPG_HD box_walk(const box_node* nodes, std::uint32_t size)
+      : nodes_(nodes), at_(size > 0 ? box_child::node(0) : box_child::none()) {}
+
+  /// Moves on towards the next leaf. Returns false after the last one.
+  WFPG_HD bool next(const Query& query) {
+    if (at_.is_leaf()) {
+      do {
+        if (depth_ == 0) return false;
+        --depth_;
+      } while (!query.wants(stack_[depth_]));
+      at_ = query.child_of(stack_[depth_]);
+    }
+    while (!at_.is_leaf()) {
+      at_ = query.descend(box_node(nodes_[at_.index()]), stack_, depth_);
+      if (lanes_here() < least_company) break;
+    }
+    return true;
+  }
+  /// Where it has come to: a leaf, or a node while lanes of its warp are at leaves. A node has a count of 0.
+  WFPG_HD box_child leaf() const { return at_; }
+
+ private:
+  // If fewer lanes are still descending, the lanes at leaves do not wait for them.
+  static constexpr int least_company = 24;
+
+  const box_node* nodes_;
+  box_child at_;
+  std::uint32_t depth_ = 0;
+  typename Query::waiting stack_[box_stack::size];
 };
 
 }  // namespace wfpg::detail
