@@ -59,7 +59,7 @@ struct merge_all {
     vec3 found(0.0f);
     map.for_each_place(camera.at.position, [&](std::uint32_t place) {
       const render::photon light = photons[place];
-      if (light.segments + camera.segments <= max_depth) found += merge(camera, f, light);
+      if (light.segments() + camera.segments <= max_depth) found += merge(camera, f, light);
     });
     radiance[i] = camera.throughput * found / techniques.surface_points;
   }

@@ -17,6 +17,7 @@
 #include "tracer/unguided.hpp"
 #include "tracer/wavefront.hpp"
 
+#include <wfpg/base/error.hpp>
 #include <wfpg/exec/index_list.hpp>
 #include <wfpg/host/ray_caster.hpp>
 #include <wfpg/light/bidirectional.hpp>
@@ -110,6 +111,10 @@ class observed_bidirectional_tracer {
  private:
   static world_type world_of(const tracer_settings& settings, const path_lights& given,
                              const Caster& caster) {
+    wfpg::require(settings.max_depth <= photon::most_segments, "max_depth", settings.max_depth,
+                  "at most 2047 with paths from lights");
+    wfpg::require(given.scene.materials.size() <= photon::most_solids, "number of materials",
+                  given.scene.materials.size(), "at most 2097151 with paths from lights");
     world_type world{given.scene, given.lights, caster};
     world.max_depth = settings.max_depth;
     world.roulette_depth = settings.roulette_depth;

@@ -10,22 +10,34 @@
 
 namespace render {
 
-/// What merges read of a light path's vertex.
-struct photon {
-  vec3 incident;           ///< where it came from, unit length
-  std::uint32_t segments;  ///< of its path
-  vec3 flux;               ///< in a medium with scattering
-  std::uint32_t solid;     ///< whose medium it is in
+/// What merges read of a light path's vertex. Kernels load it in three pieces.
+struct alignas(16) photon {
+  static constexpr int segment_bits = 11;
+  static constexpr std::uint32_t most_segments = (1u << segment_bits) - 1;
+  static constexpr std::uint32_t most_solids = solid_stack::none >> segment_bits;
+
+  vec3 incident;  ///< where it came from, unit length
+  vec3 flux;      ///< in a medium with scattering
   wfpg::vertex_weights weights;
+  std::uint32_t packed;  ///< segments(), and above these bits solid()
 
   photon() = default;
   WFPG_HD explicit photon(const subpath_vertex& vertex)
       : incident(vertex.at.outgoing),
-        segments(vertex.segments),
         flux(vertex.throughput),
-        solid(vertex.material),
-        weights(vertex.weights) {}
+        weights(vertex.weights),
+        packed(vertex.segments | vertex.material << segment_bits) {}
+
+  /// Of its path.
+  WFPG_HD std::uint32_t segments() const { return packed & most_segments; }
+  /// Whose medium it is in.
+  WFPG_HD std::uint32_t solid() const {
+    const std::uint32_t number = packed >> segment_bits;
+    return number == most_solids ? solid_stack::none : number;
+  }
 };
+
+static_assert(sizeof(photon) == 48);
 
 /// The light paths of a sample, as kernels of camera paths find them.
 using photon_gather = wfpg::light_gather_view<subpath_vertex, photon, light_beam>;
@@ -50,7 +62,7 @@ struct merge_at_vertex {
     technique_sum found;
     photons.merge_on_surface(vertex.at.position, [&](const photon& light, const wfpg::photon_merge& at) {
       world.observer.reach(pixel, {technique::surf, vertex.segments, at});
-      if (light.segments + vertex.segments > world.max_depth) return;
+      if (light.segments() + vertex.segments > world.max_depth) return;
       // The photon's flux is that of a surface with the geometric normal.
       add(found, light, wfpg::merge_technique::surface_points,
           f.eval_rgb(vertex.at.outgoing, light.incident) * light.flux *
@@ -64,8 +76,8 @@ struct merge_at_vertex {
     technique_sum found;
     photons.merge_in_medium(vertex.at.position, [&](const photon& light, const wfpg::photon_merge& at) {
       world.observer.reach(pixel, {technique::pp3d, vertex.segments, at});
-      if (light.segments + vertex.segments > world.max_depth ||
-          !have_one_medium(world.scene, light.solid, vertex.material))
+      if (light.segments() + vertex.segments > world.max_depth ||
+          !have_one_medium(world.scene, light.solid(), vertex.material))
         return;
       // Both paths have scattered here.
       const vec3 flux = light.flux / glm::max(scattering, vec3(1e-30f));
@@ -116,7 +128,7 @@ class merge_along_piece {
     technique_sum found;
     photons_.merge_points_along(along_, [&](const photon& light, const wfpg::photon_merge& at) {
       world_.observer.reach(pixel_, {technique::pb2d, segments_, at});
-      if (!may_merge(light.segments, light.solid)) return;
+      if (!may_merge(light.segments(), light.solid())) return;
       const vec3 value = arriving(at.t_camera) * light.flux * (phase(light.incident) * at.scale);
       add(found, light.weights, wfpg::merge_technique::beam_points, at.t_camera, light.incident, value);
     });

@@ -135,10 +135,9 @@ class box_tree_view {
     for (bool more = true; more;) {
       std::uint32_t n = 0;
       while (n + detail::box_child::largest_leaf <= most_waiting && (more = walk.next(query))) {
-        const detail::box_child leaf = walk.leaf();
-        // The number of steps is fixed, so that reads of one do not wait for those before.
-        for (std::uint32_t i = 0; i < detail::box_child::largest_leaf; ++i)
-          if (i < leaf.count() && holds(leaf.first() + i)) found[n++] = leaf.first() + i;
+        const std::uint32_t end = walk.leaf().first() + walk.leaf().count();
+        for (std::uint32_t place = walk.leaf().first(); place < end; ++place)
+          if (holds(place)) found[n++] = place;
       }
       for (std::uint32_t i = 0; i < n; ++i) f(found[i]);
     }

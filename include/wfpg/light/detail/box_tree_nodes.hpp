@@ -218,12 +218,13 @@ WFPG_HD inline box_child box_ray::descend(const box_node& node, waiting* stack, 
 
 // --- queries that visit all ---
 
-/// Returns the first child for which f(i) is true, and pushes the others onto the stack.
-template <class F>
-WFPG_HD box_child first_of(const box_node& node, std::uint32_t* stack, std::uint32_t& depth, const F& f) {
+/// Returns the first child of those to visit, and pushes the others onto the stack. `children`: bit 7 of each
+/// one's byte.
+WFPG_HD inline box_child first_of(const box_node& node, std::uint32_t children, std::uint32_t* stack,
+                                  std::uint32_t& depth) {
   box_child first = box_child::none();
-  for (std::uint32_t i = box_node::width; i-- > 0;) {
-    if (!f(i)) continue;
+  for (std::uint32_t i = box_node::width; i-- > 0; children <<= 8) {
+    if ((children & 0x80000000u) == 0) continue;
     // The last one found is the first: it is returned, and those before it wait.
     if (first.word() != box_child::none().word()) stack[depth++] = first.word();
     first = node.child(i);
@@ -240,9 +241,10 @@ struct box_line {
   /// Returns the first child that the ray crosses, and pushes the others onto the stack.
   WFPG_HD box_child descend(const box_node& node, waiting* stack, std::uint32_t& depth) const {
     const box_crossings crossings(node, along);
-    return first_of(node, stack, depth, [&](std::uint32_t i) {
-      return crossings.entry(static_cast<int>(i)) <= crossings.exit(static_cast<int>(i));
-    });
+    std::uint32_t children = 0;
+    for (int i = 0; i < box_node::width; ++i)
+      if (crossings.entry(i) <= crossings.exit(i)) children |= 0x80u << 8 * i;
+    return first_of(node, children, stack, depth);
   }
   WFPG_HD bool wants(waiting) const { return true; }
   WFPG_HD static box_child child_of(waiting child) { return box_child(child); }
@@ -256,8 +258,7 @@ struct box_query {
 
   /// Returns the first child that the box overlaps, and pushes the others onto the stack.
   WFPG_HD box_child descend(const box_node& node, waiting* stack, std::uint32_t& depth) const {
-    const std::uint32_t children = overlapped(node);
-    return first_of(node, stack, depth, [&](std::uint32_t i) { return (children >> 8 * i & 0x80u) != 0; });
+    return first_of(node, overlapped(node), stack, depth);
   }
   WFPG_HD bool wants(waiting) const { return true; }
   WFPG_HD static box_child child_of(waiting child) { return box_child(child); }
