@@ -1,0 +1,47 @@
+#!/usr/bin/env python3
+"""Times samples of methods with paths from lights on the GPU, stage by stage, and writes results for tools/publish.
+
+usage: bench/light_times.py DIRECTORY_OF_PROGRAMS OUT.json [RUNS [SIZE]]
+
+A run renders each scene with 2 and 8 samples. The difference is the time of samples alone. Times are medians over RUNS (3)
+runs, after one that warms up.
+"""
+import statistics
+import sys
+import tempfile
+
+from programs import Programs, write_results
+
+SAMPLES = {"caustic-pool": ("bpt", "vcm"), "mirror-balls": ("bpt", "vcm"), "veach-bidir": ("bpt", "vcm"), "fog-spot": ("upbp",),
+           "glass-caustic-fog": ("upbp",), "bottles": ("upbp",), "wax": ("upbp",)}
+FIRST, LAST = 2, 8
+STAGES = ("light paths", "splats", "photon map", "camera", "trace", "lights", "connections", "merges", "shade", "film")
+
+
+def a_sample(programs, scene, method):
+    """Milliseconds of one sample, by stage."""
+    first, last = (programs.render(scene, "x", ["--method", method, "--spp", str(n)])["seconds"] for n in (FIRST, LAST))
+    line = {s: 1e3 * (last.get(s, 0.0) - first.get(s, 0.0)) / (LAST - FIRST) for s in STAGES}
+    return {**line, "total": sum(line.values())}
+
+
+def measure(programs, scene, method, runs):
+    lines = [a_sample(programs, scene, method) for _ in range(runs + 1)][1:]
+    return {"scene": scene, "method": method, "milliseconds": {s: statistics.median(x[s] for x in lines) for s in lines[0]}}
+
+
+def main(directory, out, runs="3", size="1920x1080"):
+    samples = []
+    with tempfile.TemporaryDirectory() as folder:
+        programs = Programs(directory, size, folder)
+        for scene, methods in SAMPLES.items():
+            for method in methods:
+                print(scene, method, file=sys.stderr)
+                samples.append(measure(programs, scene, method, int(runs)))
+    write_results(out, {"runs": int(runs), "size": size, "samples": samples})
+
+
+if __name__ == "__main__":
+    if not 3 <= len(sys.argv) <= 5:
+        sys.exit(__doc__.strip())
+    main(*sys.argv[1:])
