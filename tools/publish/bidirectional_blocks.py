@@ -3,9 +3,10 @@ import math
 import re
 from typing import Dict, List, NamedTuple, Tuple
 
-from blocks import Results, Rows, block, span
+from blocks import Results, Rows, block, span, three
 
 GPU, TECHNIQUES, VCM, UPBP = "bidirectional-gpu.txt", "techniques.txt", "smallvcm.txt", "smallupbp.txt"
+STAGES, TIMES = "cuda-stages.json", "cuda-light-times.json"
 
 
 def two(value: float) -> str:
@@ -75,37 +76,37 @@ def ordered_photons(results: Results) -> str:
     return span(ratios, 2)
 
 
-BENCH = r"^  {} +(?:caustic-pool )?([\d.]+) ms, ([\d.]+) of its rays; (?:clustered|mirror-balls) ([\d.]+)(?: ms)?, ([\d.]+)$"
+def stage_ratio(results: Results, name: str) -> float:
+    """Time of a stage over its floor, by the begin of its name."""
+    (found,) = [b["ratio"] for b in results.json(STAGES, "benchmarks") if b["name"].startswith(name + "/")]
+    return float(found)
 
 
 @block
-def merging_ratio(results: Results) -> str:
-    """Time of merging over its floor."""
-    return f"{float(results.found(GPU, BENCH.format('merging'))[2]):.1f} times"
+def merging_ratio(results: Results, photons: str) -> str:
+    """Time of merging over its floor, with `spread` or `clustered` photons."""
+    clustered = {"spread": 0, "clustered": 1}[photons]
+    return f"{stage_ratio(results, f'merging/thousands:2000/clustered:{clustered}'):.2g}"
 
 
 @block
 def iteration_ratio(results: Results) -> str:
     """Time of an iteration of bpt over its rays', in caustic-pool and mirror-balls."""
-    found = results.found(GPU, BENCH.format("iteration"))
-    return f"{float(found[2]):.1f} and {float(found[4]):.1f} times"
+    first, second = (stage_ratio(results, f"iteration/mirror_balls:{scene}/merges:0") for scene in (0, 1))
+    return f"{first:.1f} and {second:.1f} times"
 
 
 @block
-def iteration_ms(results: Results, method: str) -> str:
-    """Milliseconds of an iteration of bpt or vcm, in caustic-pool and mirror-balls."""
-    if method == "bpt":
-        found = results.found(GPU, BENCH.format("iteration"))
-        return f"{float(found[1]):.0f} and {float(found[3]):.0f} ms"
-    lines = registers(results)
-    return f"{cell(lines, 'sample', 4):.0f} and {cell(lines, 'sample', 8):.0f} ms"
-
-
-@block
-def iteration_upbp(results: Results, scene: str) -> str:
-    """Seconds of an iteration of upbp."""
-    row = {"fog-spot": 12, "bottles": 15}[scene]
-    return f"{cell(registers(results), 'sample', row) / 1e3:.2f} s"
+def light_times(results: Results) -> Rows:
+    """Milliseconds of a sample, by stage."""
+    stages = {"light paths": ("light paths", "splats"), "maps": ("photon map",), "camera paths": ("camera", "trace", "shade"),
+              "light samples": ("lights",), "connections": ("connections",), "merges": ("merges",), "all": ("total",)}
+    rows = [["scene", "method", *stages]]
+    for sample in results.json(TIMES, "samples"):
+        found = sample["milliseconds"]
+        sums = [sum(found[part] for part in parts) for parts in stages.values()]
+        rows.append([f"`{sample['scene']}`", sample["method"], *(three(x) if x > 0 else "" for x in sums)])
+    return rows
 
 
 def registers(results: Results) -> List[str]:
