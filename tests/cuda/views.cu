@@ -81,7 +81,8 @@ __global__ void use_box_tree(wfpg::box_tree_view tree, wfpg::ray along, float* o
   tree.overlaps(along, add);
   tree.overlaps(along.origin, add);
   tree.nearest_first(along, [&](std::uint32_t place, float& t_max) { return (out[place] = t_max) > 1.0f; });
-  tree.for_each_place_along(along, [&](std::uint32_t place) { return out[place] > 0.0f; }, add);
+  tree.for_each_place_along(
+      along, [&](std::uint32_t place) { return out[place] > 0.0f; }, add);
 }
 
 __global__ void use_photon_map(wfpg::photon_map_view map, wfpg::vec3 at, float* out) {
