@@ -6,11 +6,10 @@ usage: bench/light_times.py DIRECTORY_OF_PROGRAMS OUT.json [RUNS [SIZE]]
 A run renders each scene with 2 and 8 samples. The difference is the time of samples alone. Times are medians over RUNS (3)
 runs, after one that warms up.
 """
-import statistics
 import sys
 import tempfile
 
-from programs import Programs, write_results
+from programs import Programs, medians, milliseconds_a_sample, write_results
 
 SAMPLES = {"caustic-pool": ("bpt", "vcm"), "mirror-balls": ("bpt", "vcm"), "veach-bidir": ("bpt", "vcm"), "fog-spot": ("upbp",),
            "glass-caustic-fog": ("upbp",), "bottles": ("upbp",), "wax": ("upbp",)}
@@ -20,14 +19,13 @@ STAGES = ("light paths", "splats", "photon map", "camera", "trace", "lights", "c
 
 def a_sample(programs, scene, method):
     """Milliseconds of one sample, by stage."""
-    first, last = (programs.render(scene, "x", ["--method", method, "--spp", str(n)])["seconds"] for n in (FIRST, LAST))
-    line = {s: 1e3 * (last.get(s, 0.0) - first.get(s, 0.0)) / (LAST - FIRST) for s in STAGES}
-    return {**line, "total": sum(line.values())}
+    first, last = (programs.render(scene, "x", ["--method", method, "--spp", str(n)]) for n in (FIRST, LAST))
+    return milliseconds_a_sample(first, last, LAST - FIRST, STAGES)
 
 
 def measure(programs, scene, method, runs):
     lines = [a_sample(programs, scene, method) for _ in range(runs + 1)][1:]
-    return {"scene": scene, "method": method, "milliseconds": {s: statistics.median(x[s] for x in lines) for s in lines[0]}}
+    return {"scene": scene, "method": method, "milliseconds": medians(lines)}
 
 
 def main(directory, out, runs="3", size="1920x1080"):

@@ -39,6 +39,17 @@ def seconds(stats):
     return stats["seconds"]["total"] - stats["seconds"].get("embree", 0.0) - stats["seconds"].get("bvh", 0.0)
 
 
+def milliseconds_a_sample(first, last, samples, stages):
+    """By stage and in all: of the samples that one rendering has more than another, from the statistics of both."""
+    line = {s: 1e3 * (last["seconds"].get(s, 0.0) - first["seconds"].get(s, 0.0)) / samples for s in stages}
+    return {**line, "total": sum(line.values())}
+
+
+def medians(lines):
+    """Of dictionaries with the same keys, by key."""
+    return {key: statistics.median(line[key] for line in lines) for key in lines[0]}
+
+
 def unguided_options(options):
     """Those of a scene's options that path tracing has, too."""
     return [] if "--light-groups" in options else options

@@ -10,7 +10,7 @@ import statistics
 import sys
 import tempfile
 
-from programs import Programs, write_results
+from programs import Programs, medians, milliseconds_a_sample, write_results
 
 SCENES = ("ajar",)
 METHODS = {"pt": ["--method", "pt"], "wfpg": []}
@@ -23,8 +23,7 @@ def warmed_up(programs, scene, arguments):
     """Milliseconds by stage and segments of one sample after warm-up."""
     first, last = (programs.render(scene, "x", ["--spp", str(n), *arguments]) for n in (FIRST, LAST))
     samples = LAST - FIRST
-    line = {s: 1e3 * (last["seconds"].get(s, 0.0) - first["seconds"].get(s, 0.0)) / samples for s in STAGES}
-    return {**line, "total": sum(line.values()), "segments": (last["segments"] - first["segments"]) / samples}
+    return {**milliseconds_a_sample(first, last, samples, STAGES), "segments": (last["segments"] - first["segments"]) / samples}
 
 
 def measure(programs, scene, runs):
@@ -35,9 +34,8 @@ def measure(programs, scene, runs):
     pairs = list(zip(methods["pt"], methods["wfpg"]))[1:]
     by_sample = [w["total"] / p["total"] for p, w in pairs]
     by_segment = [w["total"] / w["segments"] / (p["total"] / p["segments"]) for p, w in pairs]
-    medians = {name: {key: statistics.median(line[key] for line in lines[1:]) for key in lines[0]}
-               for name, lines in methods.items()}
-    return {"scene": scene, "milliseconds": medians, "ratio_a_sample": statistics.median(by_sample),
+    milliseconds = {name: medians(lines[1:]) for name, lines in methods.items()}
+    return {"scene": scene, "milliseconds": milliseconds, "ratio_a_sample": statistics.median(by_sample),
             "ratio_a_segment": statistics.median(by_segment), "ratios_a_segment": sorted(by_segment)}
 
 

@@ -64,12 +64,8 @@ class box_tree_view {
   /// finite, has none.
   template <class F>
   WFPG_HD void overlaps(const bounds3& box, const F& f) const {
-    if (!is_query(box)) return;
-    detail::box_query query{box};
-    traverse(query, [&](std::uint32_t place) {
-      f(order_[place]);
-      return false;
-    });
+    const auto all = [](std::uint32_t) { return true; };
+    for_each_place(box, all, [&](std::uint32_t place) { f(order_[place]); });
   }
   /// Calls f(index) for each box that a ray crosses between t_min and t_max. Rays may begin inside a box.
   /// Nearer boxes tend to come first. Nothing is found where origin or direction is not finite.
@@ -83,8 +79,8 @@ class box_tree_view {
 
   /// Calls f(place) for each box that has a point in common with `box`, and for which holds(place) is true.
   /// The order depends on the tree alone. Calls of f wait until up to 32 places were found, so that the lanes
-  /// of a warp make them together. A long f thus takes less time on a GPU than in overlaps(), where few lanes
-  /// call it at once.
+  /// of a warp make them together. A long f thus takes less time on a GPU than if each lane called it at
+  /// once.
   template <class Test, class F>
   WFPG_HD void for_each_place(const bounds3& box, const Test& holds, const F& f) const {
     if (is_query(box)) find_then_call(detail::box_query{box}, holds, f);
@@ -101,7 +97,12 @@ class box_tree_view {
   WFPG_HD void nearest_first(const ray& along, const F& f) const {
     if (!is_query(along)) return;
     detail::box_ray query(along, one_);
-    traverse(query, [&](std::uint32_t place) { return f(place, query.t_max); });
+    detail::box_walk<detail::box_ray> walk(nodes_, size_);
+    while (walk.next(query)) {
+      const std::uint32_t end = walk.leaf().first() + walk.leaf().count();
+      for (std::uint32_t place = walk.leaf().first(); place < end; ++place)
+        if (f(place, query.t_max)) return;
+    }
   }
 
  private:
@@ -117,16 +118,6 @@ class box_tree_view {
     return is_finite(along.origin) && is_finite(along.direction);
   }
 
-  /// Calls f(place) for each box in a leaf that the query reaches, until f returns true.
-  template <class Query, class F>
-  WFPG_HD void traverse(Query& query, const F& f) const {
-    detail::box_walk<Query> walk(nodes_, size_);
-    while (walk.next(query)) {
-      const std::uint32_t end = walk.leaf().first() + walk.leaf().count();
-      for (std::uint32_t place = walk.leaf().first(); place < end; ++place)
-        if (f(place)) return;
-    }
-  }
   /// Finds the places in leaves that the query reaches for which `holds` is true, and then calls f for them.
   template <class Query, class Test, class F>
   WFPG_HD void find_then_call(const Query& query, const Test& holds, const F& f) const {

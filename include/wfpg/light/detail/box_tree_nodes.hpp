@@ -286,7 +286,7 @@ struct box_query {
 
 // --- traversals ---
 
-/// A traversal that stops at each leaf. `Query`: box_ray or box_query.
+/// A traversal that stops at each leaf. `Query`: box_ray, box_line or box_query.
 template <class Query>
 class box_walk {
  public:
