@@ -46,6 +46,7 @@ class observed_bidirectional_tracer {
         paths_(exec, count_),
         vertices_(exec, count_),
         keeps_(exec, count_),
+        in_view_(exec, settings.techniques.has(technique::splat) ? count_ : 0),
         active_(exec, count_),
         joined_(exec, count_),
         radiance_(exec, count_),
@@ -148,25 +149,28 @@ class observed_bidirectional_tracer {
       active_.collect(exec_, count_);
     });
     for (std::uint32_t segments = 1; segments < settings_.max_depth; ++segments) {
-      clock_.measure("light paths", [&] { trace_light(segments); });
-      if (settings_.techniques.has(technique::splat)) splat_light(camera);
+      clock_.measure("light paths", [&] { trace_light(segments, camera); });
+      if (in_view_.capacity() > 0) splat_light(camera);
       clock_.measure("light paths", [&] { extend_light(segments); });
     }
     by_technique_.take_splats(radiance_);
   }
 
-  void trace_light(std::uint32_t segments) {
+  void trace_light(std::uint32_t segments, const pinhole& camera) {
     exec_.fill_bytes(keeps_.data(), 0, keeps_.bytes());
-    active_.for_each(exec_, trace_light_paths<world_type>{world_, segments, paths_.view(), vertices_.view(),
-                                                          active_.marks(), keeps_.view(),
-                                                          light_.light_recorder(), film_.segment_counts()});
+    exec_.fill_bytes(in_view_.marks().data(), 0, in_view_.marks().size() * sizeof(std::uint32_t));
+    active_.for_each(exec_,
+                     trace_light_paths<world_type>{world_, segments, paths_.view(), vertices_.view(),
+                                                   active_.marks(), keeps_.view(), camera, in_view_.marks(),
+                                                   light_.light_recorder(), film_.segment_counts()});
     light_.reserve(keeps_.view());
   }
 
   void splat_light(const pinhole& camera) {
     clock_.measure("splats", [&] {
-      active_.for_each(exec_, splat_light_paths<world_type>{world_, camera, vertices_.view(), keeps_.view(),
-                                                            splats_.view(), by_technique_.splats()});
+      in_view_.collect(exec_, count_);
+      in_view_.for_each(exec_, splat_light_paths<world_type>{world_, camera, vertices_.view(), splats_.view(),
+                                                             by_technique_.splats()});
       const float scale = 1.0f / static_cast<float>(count_);
       splats_.add_to(exec_, radiance_.view(), scale);
       by_technique_.add_splats(scale);
@@ -242,8 +246,9 @@ class observed_bidirectional_tracer {
   tiled_array<subpath, Exec> paths_;
   tiled_array<subpath_vertex, Exec> vertices_;
   wfpg::buffer<std::uint32_t, Exec> keeps_;
-  wfpg::index_list<Exec> active_;  // paths that go on
-  wfpg::index_list<Exec> joined_;  // camera paths whose last vertex can be joined with others
+  wfpg::index_list<Exec> in_view_;  // light paths whose last vertex the camera may see; empty without splats
+  wfpg::index_list<Exec> active_;   // paths that go on
+  wfpg::index_list<Exec> joined_;   // camera paths whose last vertex can be joined with others
   wfpg::buffer<vec3, Exec> radiance_;
   wfpg::splats<Exec> splats_;
   wfpg::bidirectional<Exec, subpath_vertex, photon, light_beam> light_;

@@ -189,7 +189,8 @@ struct connection_ends {
 struct path_connections {
   tiled_view<subpath_vertex> vertices;  ///< of camera paths
   wfpg::light_vertices_view<subpath_vertex> stored;
-  tiled_view<connection> found;  ///< by stored vertex
+  tiled_view<connection> found;             ///< by stored vertex
+  wfpg::array_view<way_densities> between;  ///< of the way between its ends, by stored vertex
 };
 
 /// Evaluates connections without what is between their ends. An index is a stored vertex.
@@ -214,23 +215,41 @@ struct evaluate_connections {
   }
 };
 
-/// Looks what is between the ends of connections, and weights them. An index is a stored vertex.
+/// Looks what is between the ends of connections. An index is a stored vertex.
 template <class World>
-struct join_connections {
+struct cast_connections {
   static constexpr bool waits_for_memory = true;
 
   World world;
+  path_connections connections;
+  wfpg::array_view<std::uint32_t> marks;  ///< receives 0 where nothing is left of the light
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const auto k = static_cast<std::uint32_t>(i);
+    const subpath_vertex& camera = connections.vertices[connections.stored.path(k)];
+    const subpath_vertex& light = connections.stored[k];
+    const vec3 way = light.at.position - camera.at.position;
+    const clear_way clear = world.way_between(camera, light.leave_along(-way), light.in_medium());
+    if (clear.transmittance == vec3(0.0f)) {
+      marks[i] = 0;
+      return connections.found.emplace(i);
+    }
+    connections.between[i] = clear.pdf;
+    connections.found.emplace(i, connections.found[i].value * clear.transmittance, 0.0f);
+  }
+};
+
+/// Weights connections. An index is a stored vertex.
+struct weight_connections {
+  wfpg::path_techniques techniques;
   path_connections connections;
 
   WFPG_HD void operator()(std::size_t i) const {
     const auto k = static_cast<std::uint32_t>(i);
     const subpath_vertex& camera = connections.vertices[connections.stored.path(k)];
     const subpath_vertex& light = connections.stored[k];
-    const connection_ends ends(camera, light);
-    const clear_way clear = world.way_between(camera, light.leave_along(-ends.way), light.in_medium());
-    if (clear.transmittance == vec3(0.0f)) return connections.found.emplace(i);
-    connections.found.emplace(i, connections.found[i].value * clear.transmittance,
-                              ends.weight(world.techniques, clear.pdf));
+    const float weight = connection_ends(camera, light).weight(techniques, connections.between[i]);
+    connections.found.emplace(i, connections.found[i].value, weight);
   }
 };
 

@@ -28,7 +28,11 @@ class connection_list {
  public:
   /// `capacity`: most stored vertices of light paths. `max_depth`: most segments of a whole path.
   connection_list(const Exec& exec, std::size_t capacity, std::uint32_t max_depth)
-      : exec_(exec), found_(exec, capacity), with_light_(exec, capacity), sizes_(exec, max_depth + 1) {}
+      : exec_(exec),
+        found_(exec, capacity),
+        between_(exec, capacity),
+        with_light_(exec, capacity),
+        sizes_(exec, max_depth + 1) {}
 
   /// Forgets how many vertices there are.
   void begin() {
@@ -50,21 +54,26 @@ class connection_list {
     if (segments + 1 >= world.max_depth) return;
     // Whole paths have at most max_depth segments, one of them the connection.
     const std::uint32_t size = known_[world.max_depth - segments - 1];
-    const path_connections connections{vertices, stored, found_.view()};
+    const path_connections connections{vertices, stored, found_.view(), between_.view()};
     exec_.for_each(size, evaluate_connections{connections, joined.marks(), with_light_.marks()});
     with_light_.collect(exec_, size);
-    with_light_.for_each(exec_, join_connections<World>{world, connections});
+    with_light_.for_each(exec_, cast_connections<World>{world, connections, with_light_.marks()});
+    with_light_.collect(exec_, size);
+    with_light_.for_each(exec_, weight_connections{world.techniques, connections});
     joined.for_each(exec_, add_connections{connections, size, found});
   }
 
-  std::size_t bytes() const { return found_.bytes() + with_light_.bytes() + sizes_.bytes(); }
+  std::size_t bytes() const {
+    return found_.bytes() + between_.bytes() + with_light_.bytes() + sizes_.bytes();
+  }
 
  private:
   Exec exec_;
-  tiled_array<connection, Exec> found_;      // by stored vertex
-  wfpg::index_list<Exec> with_light_;        // stored vertices that may bring light
-  wfpg::buffer<std::uint32_t, Exec> sizes_;  // number of stored vertices, by segments of light paths
-  std::vector<std::uint32_t> known_;         // the same, of the sample, once they are read
+  tiled_array<connection, Exec> found_;        // by stored vertex
+  wfpg::buffer<way_densities, Exec> between_;  // by stored vertex
+  wfpg::index_list<Exec> with_light_;          // stored vertices that may bring light
+  wfpg::buffer<std::uint32_t, Exec> sizes_;    // number of stored vertices, by segments of light paths
+  std::vector<std::uint32_t> known_;           // the same, of the sample, once they are read
 };
 
 }  // namespace render

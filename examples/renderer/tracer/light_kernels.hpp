@@ -42,6 +42,22 @@ struct start_light_paths {
   }
 };
 
+/// The way from a point to the camera.
+struct way_to_camera {
+  vec3 toward{0.0f};  ///< a unit vector
+  float distance = 0.0f;
+  std::uint32_t pixel = 0;
+  bool in_view = false;  ///< whether the picture has the point; otherwise there is no pixel
+
+  WFPG_HD way_to_camera(const pinhole& camera, vec3 position) {
+    const vec3 way = camera.position() - position;
+    distance = glm::length(way);
+    if (!(distance > 0.0f)) return;
+    toward = way / distance;
+    in_view = camera.find_pixel(-toward, pixel);
+  }
+};
+
 /// Stores a sample's light paths.
 using path_recorder = wfpg::light_recorder_view<subpath_vertex, light_beam>;
 
@@ -54,6 +70,9 @@ struct trace_light_paths {
   tiled_view<subpath_vertex> vertices;
   wfpg::array_view<std::uint32_t> active;  ///< receives 0 where the path ends
   wfpg::array_view<std::uint32_t> keeps;   ///< 1: the vertex can be connected; 0 before
+  pinhole camera;
+  /// 1: that, and the camera's picture has it; 0 before. Empty: nobody asks.
+  wfpg::array_view<std::uint32_t> in_view;
   path_recorder recorder;
   wfpg::array_view<std::uint32_t> segment_counts;
 
@@ -67,7 +86,9 @@ struct trace_light_paths {
     if (!world.arrive(path, segments, vertex, ahead)) return;
     active[i] = 1;
     vertices.emplace(i, vertex);
-    keeps[i] = vertex.is_delta() ? 0u : 1u;
+    if (vertex.is_delta()) return;
+    keeps[i] = 1;
+    if (!in_view.empty()) in_view[i] = way_to_camera(camera, vertex.at.position).in_view ? 1u : 0u;
   }
 
  private:
@@ -87,7 +108,7 @@ struct trace_light_paths {
   };
 };
 
-/// Connects the new vertex of an active light path to the camera.
+/// Connects the new vertex of a light path to the camera, which has it in view.
 template <class World>
 struct splat_light_paths {
   static constexpr bool waits_for_memory = true;
@@ -95,29 +116,24 @@ struct splat_light_paths {
   World world;
   pinhole camera;
   tiled_view<subpath_vertex> vertices;
-  wfpg::array_view<const std::uint32_t> keeps;
   wfpg::splat_view splats;
   wfpg::splat_view plain_splats;  ///< without weights; of no paths, where nobody asks for them
 
   WFPG_HD void operator()(std::size_t i) const {
-    if (keeps[i] == 0) return;
     const subpath_vertex& vertex = vertices[i];
-    const vec3 to_camera = camera.position() - vertex.at.position;
-    const float distance = glm::length(to_camera);
-    if (!(distance > 0.0f)) return;
-    const vec3 toward = to_camera / distance;
-    std::uint32_t pixel;
-    if (!camera.find_pixel(-toward, pixel)) return;
-    const float pdf = camera.pdf(-toward);
-    const vec3 value = vertex.throughput * vertex.scattered_flux(toward) * (pdf / (distance * distance));
+    const way_to_camera to(camera, vertex.at.position);
+    const float pdf = camera.pdf(-to.toward);
+    const vec3 value =
+        vertex.throughput * vertex.scattered_flux(to.toward) * (pdf / (to.distance * to.distance));
     if (!(wfpg::luminance(value) > 0.0f)) return;
     const clear_way way = world.way_between(vertex, camera.position(), false);
     if (way.transmittance == vec3(0.0f)) return;
     const scatterer f = vertex.seen_from(vertex.at.outgoing);
-    const wfpg::path_edge edge{distance, way.pdf.there, way.pdf.back};
+    const wfpg::path_edge edge{to.distance, way.pdf.there, way.pdf.back};
     const vec3 found = value * way.transmittance;
-    splats.add(i, pixel, found * vertex.weights.splat(world.techniques, vertex.leave(f, toward), pdf, edge));
-    if (plain_splats.size() > 0) plain_splats.add(i, pixel, found);
+    splats.add(i, to.pixel,
+               found * vertex.weights.splat(world.techniques, vertex.leave(f, to.toward), pdf, edge));
+    if (plain_splats.size() > 0) plain_splats.add(i, to.pixel, found);
   }
 };
 
