@@ -94,13 +94,15 @@ WFPG_TEST_CASE("radii too small for floats keep scales finite", "[bidirectional]
 
 WFPG_TEST_CASE("photons, beams and what had no memory are counted", "[bidirectional]") {
   const Exec exec;
-  std::uint32_t vertices = 0, inside = 0, beams = 0, beyond = 0;
+  std::uint32_t vertices = 0, inside = 0, along = 0, beams = 0, beyond = 0;
   const random_paths paths{3};
   const auto most = bidirectional_options().segment_beams;
   for (std::size_t path = 0; path < light_paths; ++path)
     for (std::uint32_t depth = 0; depth < depths; ++depth) {
       vertices += paths.keeps(path, depth) ? 1 : 0;
-      inside += paths.keeps(path, depth) && paths.at(path, depth).inside ? 1 : 0;
+      const bool is_inside = paths.keeps(path, depth) && paths.at(path, depth).inside;
+      inside += is_inside ? 1 : 0;
+      along += is_inside && path < beam_point_paths ? 1 : 0;
       if (path >= beam_paths) continue;
       const std::uint32_t left = paths.beams(path, depth);
       beams += left < most ? left : most;
@@ -120,7 +122,8 @@ WFPG_TEST_CASE("photons, beams and what had no memory are counted", "[bidirectio
   CHECK(s.surplus_beams == beyond);
   CHECK(s.surface_photons == vertices - inside);
   CHECK(s.volume_photons == inside);
-  CHECK(s.beam_point_photons == inside);
+  CHECK(s.beam_point_photons == along);
+  CHECK(along < inside);
   CHECK(s.beam_pieces >= beams);
 
   const std::size_t room = 100;
@@ -166,16 +169,22 @@ TEST_CASE("counts of techniques follow from radii and numbers of paths", "[bidir
     CHECK(double(t.splats) == n);
     CHECK(double(t.surface_points) == Approx(n * pi * std::pow(double(s.radii.surface), 2.0)));
     CHECK(double(t.volume_points) == Approx(n * pi * 4.0 / 3.0 * std::pow(double(s.radii.volume), 3.0)));
-    CHECK(double(t.beam_points) == Approx(n * pi * std::pow(double(s.radii.beam_points), 2.0)));
+    CHECK(double(t.beam_points) ==
+          Approx(beam_point_paths * pi * std::pow(double(s.radii.beam_points), 2.0)));
     CHECK(double(t.beams) == Approx(beam_paths * 2.0 * double(s.radii.beams)));
   }
   CHECK(bidirectional_options().count_beam_paths() == 0);
+  CHECK(bidirectional_options().count_beam_point_paths() == 0);
   options.beam_paths.reset();
+  options.beam_point_paths.reset();
   CHECK(options.count_beam_paths() == (light_paths + 63) / 64);
+  CHECK(options.count_beam_point_paths() == light_paths);
   options.paths = std::size_t(1) << 24;
-  CHECK(options.count_beam_paths() == 8192);
-  options.beam_paths = std::size_t(1) << 30;
+  CHECK(options.count_beam_paths() == 512);
+  CHECK(options.count_beam_point_paths() == 16384);
+  options.beam_paths = options.beam_point_paths = std::size_t(1) << 30;
   CHECK(options.count_beam_paths() == options.paths);
+  CHECK(options.count_beam_point_paths() == options.paths);
 }
 
 WFPG_TEST_CASE("techniques that are off find nothing, count nothing and take no memory", "[bidirectional]") {
@@ -225,6 +234,7 @@ TEST_CASE("options and iterations out of range are refused by their names", "[bi
   refuses("max_beams", [](bidirectional_options& o) { o.max_beams = 0; });
   refuses("segment_beams", [](bidirectional_options& o) { o.segment_beams = 0; });
   refuses("bidirectional_options.beam_paths", [](bidirectional_options& o) { o.beam_paths = 0; });
+  refuses("beam_point_paths", [](bidirectional_options& o) { o.beam_point_paths = 0; });
   refuses("bidirectional_options.budget_bytes", [](bidirectional_options& o) { o.budget_bytes = 7; });
   for (const float wrong : {0.0f, -1.0f, 1.1f, nan}) {
     refuses("surface_radius", [&](bidirectional_options& o) { o.surface_radius = wrong; });

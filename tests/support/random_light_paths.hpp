@@ -138,7 +138,7 @@ struct ask_for_places {
   WFPG_HD void operator()(std::size_t path) const { found[path] = record.has_place(path) ? 1 : 0; }
 };
 
-inline constexpr std::size_t light_paths = 600, beam_paths = 40, queries = 200;
+inline constexpr std::size_t light_paths = 600, beam_paths = 40, beam_point_paths = 450, queries = 200;
 inline constexpr std::uint32_t depths = 4;
 
 template <class Exec>
@@ -154,6 +154,7 @@ inline bidirectional_options all_techniques() {
   options.surface_radius = 0.15f;
   options.volume_radius = 0.1f;
   options.beam_paths = beam_paths;
+  options.beam_point_paths = beam_point_paths;
   return options;
 }
 
@@ -211,8 +212,10 @@ inline std::vector<sums> expected(const random_paths& paths, const bidirectional
           const vec3 p = where.points[i];
           if (v.inside) {
             add(all[i].in_medium, v.flux, wfpg::point_merge<3>(constant, p, v.at, s.radii.volume), count);
-            add(all[i].points_along, v.flux,
-                wfpg::beam_point_merge(smooth, where.cameras[i], v.at, s.radii.beam_points), count);
+            if (path < beam_point_paths)
+              add(all[i].points_along, v.flux,
+                  wfpg::beam_point_merge(smooth, where.cameras[i], v.at, s.radii.beam_points),
+                  static_cast<float>(beam_point_paths));
           } else {
             add(all[i].on_surface, v.flux, wfpg::point_merge<2>(constant, p, v.at, s.radii.surface), count);
           }

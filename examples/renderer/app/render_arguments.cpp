@@ -197,6 +197,9 @@ const std::vector<requirement>& requirements() {
       {{"--beam-paths"},
        "--method upbp, or bb1d among --techniques",
        [](options o) { return is_bidirectional(o.method) && techniques_of(o).has(technique::bb1d); }},
+      {{"--beam-point-paths"},
+       "--method upbp, or pb2d among --techniques",
+       [](options o) { return is_bidirectional(o.method) && techniques_of(o).has(technique::pb2d); }},
       {{"--guided-depths"},
        "--method wfpg, wfpg-product, sarsa or records",
        [](options o) { return is_guided(o.method) && !is_openpgl(o.method); }},
@@ -295,7 +298,10 @@ void add_bidirectional_options(CLI::App& app, render_options& options) {
                  with_default("the same, of merges in media", options.light.volume_radius))
       ->transform(positive_number(1.0));
   app.add_option("--beam-paths", options.light.beam_paths,
-                 "light paths of a sample that leave beams (default: one in 64, at most 8192)")
+                 "light paths of a sample that leave beams (default: one in 64, at most 512)")
+      ->transform(whole_number(1, 1 << 30));
+  app.add_option("--beam-point-paths", options.light.beam_point_paths,
+                 "light paths whose vertices merge with camera beams (default: all, at most 16384)")
       ->transform(whole_number(1, 1 << 30));
   app.add_option("--radius-alpha", options.light.radius_alpha,
                  with_default("radii shrink as the sample's number to the power (this - 1) / D, for merges "

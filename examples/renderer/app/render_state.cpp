@@ -79,6 +79,8 @@ named_values values_of(const render_options& o) {
       values.emplace_back("--volume-radius", std::to_string(o.light.volume_radius));
     if (techniques.has(technique::bb1d))
       values.emplace_back("--beam-paths", std::to_string(light_options_of(o).count_beam_paths()));
+    if (techniques.has(technique::pb2d))
+      values.emplace_back("--beam-point-paths", std::to_string(light_options_of(o).count_beam_point_paths()));
   }
   if (is_guided(o.method)) add_guider_values(o, values);
   return values;

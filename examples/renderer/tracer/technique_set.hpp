@@ -19,8 +19,8 @@ enum class technique : std::uint8_t {
   splat,    ///< vertices of light paths are connected to the camera
   surf,     ///< vertices of all light paths are merged with near ones of camera paths, on surfaces
   pp3d,     ///< the same in media
-  pb2d,     ///< vertices of all light paths in media are merged with near segments of camera paths
-  bb1d,     ///< segments of light paths in media are merged with near segments of camera paths
+  pb2d,     ///< vertices of some light paths in media are merged with near segments of camera paths
+  bb1d,     ///< segments of some light paths in media are merged with near segments of camera paths
 };
 inline constexpr int technique_count = 8;
 

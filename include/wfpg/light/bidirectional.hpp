@@ -165,11 +165,11 @@ class bidirectional {
     beams_.reserve(exec_, pending_counts_.view());
     exec_.for_each(beam_paths(), detail::store_beams<Beam>{pending(), beams_.view()});
   }
-  /// The positions of the stored vertices, as many, in media or on surfaces.
-  array_view<const vec3> positions(std::uint32_t vertices, bool in_media) {
+  /// The positions of the stored vertices, as many, in media or on surfaces, of the first paths.
+  array_view<const vec3> positions(std::uint32_t vertices, bool in_media, std::size_t paths) {
     if (positions_.size() < vertices) positions_ = buffer<vec3, Exec>(exec_, vertices_.capacity());
-    exec_.for_each(vertices,
-                   detail::copy_photon_positions<Vertex>{vertices_.view(), in_media, positions_.view()});
+    exec_.for_each(vertices, detail::copy_photon_positions<Vertex>{vertices_.view(), in_media, paths,
+                                                                   positions_.view()});
     return {positions_.data(), vertices};
   }
 

@@ -42,9 +42,13 @@ struct bidirectional_options {
   float surface_radius = 0.003f;                 ///< on surfaces
   float volume_radius = 0.002f;                  ///< in media
   float radius_alpha = radius_schedule().alpha;  ///< how radii shrink, in (0, 1], as in radius_schedule
+  // Merges along segments take the longer, the more photons there are, and soon remove no more noise than
+  // their time is worth. docs/bidirectional.md has what more of them would gain.
   /// Light paths that leave beams, at least 1. More than there are paths means all. Unset: one in 64, at most
-  /// 8192.
+  /// 512.
   std::optional<std::size_t> beam_paths;
+  /// Light paths whose vertices merge along camera beams, likewise. Unset: all, at most 16384.
+  std::optional<std::size_t> beam_point_paths;
 
   /// Whether camera paths read vertices of light paths.
   bool reads_vertices() const { return connections || surface_points || volume_points || beam_points; }
@@ -53,7 +57,12 @@ struct bidirectional_options {
   /// Number of light paths that leave beams. 0 where beams are off.
   std::size_t count_beam_paths() const {
     if (!beams) return {};
-    return std::min(beam_paths.value_or(std::min<std::size_t>((paths + 63) / 64, 8192)), paths);
+    return std::min(beam_paths.value_or(std::min<std::size_t>((paths + 63) / 64, 512)), paths);
+  }
+  /// Number of light paths whose vertices merge along camera beams. 0 where these merges are off.
+  std::size_t count_beam_point_paths() const {
+    if (!beam_points) return {};
+    return std::min<std::size_t>(beam_point_paths.value_or(16384), paths);
   }
 };
 
@@ -71,6 +80,7 @@ inline void require_in_range(const bidirectional_options& options) {
   require_some(options.max_beams, "bidirectional_options.max_beams");
   require_some(options.segment_beams, "bidirectional_options.segment_beams");
   require_some(options.beam_paths.value_or(1), "bidirectional_options.beam_paths");
+  require_some(options.beam_point_paths.value_or(1), "bidirectional_options.beam_point_paths");
   require_fraction(options.surface_radius, "bidirectional_options.surface_radius");
   require_fraction(options.volume_radius, "bidirectional_options.volume_radius");
   require_fraction(options.radius_alpha, "bidirectional_options.radius_alpha");

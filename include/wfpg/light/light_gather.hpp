@@ -76,7 +76,8 @@ class light_gather_view {
   WFPG_HD void merge_in_medium(vec3 p, const F& f) const {
     merge_at(in_media_, p, f);
   }
-  /// Calls f(const Photon&, const photon_merge&) for each vertex in a medium along a camera beam (P-B2D).
+  /// Calls f(const Photon&, const photon_merge&) for each vertex in a medium along a camera beam (P-B2D), of
+  /// those paths that bidirectional_options::beam_point_paths says.
   /// `camera`: a part of the camera path in one medium, begin at least 0.
   template <class F>
   WFPG_HD void merge_points_along(const path_beam& camera, const F& f) const {
@@ -87,7 +88,7 @@ class light_gather_view {
             photon_merge{at.kernel * near.scale, at.t_camera, 0.0f, 1.0f, near.map.index(place)});
         });
   }
-  /// Calls f(const Beam&, const photon_merge&) for each photon beam along a camera beam (B-B1D).
+  /// Calls f(const Beam&, const photon_merge&) for each stored beam along a camera beam (B-B1D).
   /// `camera`: a part of the camera path in one medium, begin at least 0.
   template <class F>
   WFPG_HD void merge_beams_along(const path_beam& camera, const F& f) const {

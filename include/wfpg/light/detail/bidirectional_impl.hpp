@@ -39,7 +39,7 @@ path_techniques bidirectional<Exec, Vertex, Photon, Beam>::counts_of(const merge
   counts.splats = on(options_.splats) * paths;
   counts.surface_points = paths * disc(radii.surface);
   counts.volume_points = paths * disc(radii.volume) * (4.0f / 3.0f) * radii.volume;
-  counts.beam_points = paths * disc(radii.beam_points);
+  counts.beam_points = static_cast<float>(options_.count_beam_point_paths()) * disc(radii.beam_points);
   counts.beams = static_cast<float>(beam_paths()) * 2.0f * radii.beams;
   return counts;
 }
@@ -64,12 +64,12 @@ void bidirectional<Exec, Vertex, Photon, Beam>::build() {
   store_beams();
   const light_vertices_view<Vertex> stored = vertices_.view();
   const std::uint32_t vertices = options_.reads_vertices() ? vertices_.size(exec_) : 0;
-  if (options_.surface_points) on_surfaces_.build(exec_, positions(vertices, false), radii_.surface, stored);
-  if (options_.volume_points || options_.beam_points) {
-    const array_view<const vec3> photons = positions(vertices, true);
-    if (options_.volume_points) in_media_.build(exec_, photons, radii_.volume, stored);
-    if (options_.beam_points) for_beams_.build(exec_, photons, radii_.beam_points, stored);
-  }
+  const auto build = [&](placed_map& map, bool in_media, std::size_t paths, float radius) {
+    map.build(exec_, positions(vertices, in_media, paths), radius, stored);
+  };
+  if (options_.surface_points) build(on_surfaces_, false, options_.paths, radii_.surface);
+  if (options_.volume_points) build(in_media_, true, options_.paths, radii_.volume);
+  if (options_.beam_points) build(for_beams_, true, options_.count_beam_point_paths(), radii_.beam_points);
   if (beam_paths() > 0) build_beams();
   is_built_ = true;
 }
@@ -92,7 +92,7 @@ auto bidirectional<Exec, Vertex, Photon, Beam>::gather() -> gather_type {
   if (!is_built_) return found;
   found.on_surfaces_ = on_surfaces_.view(1.0f / techniques_.surface_points);
   found.in_media_ = in_media_.view(1.0f / techniques_.volume_points);
-  found.for_beams_ = for_beams_.view(1.0f / static_cast<float>(options_.paths));
+  found.for_beams_ = for_beams_.view(1.0f / static_cast<float>(options_.count_beam_point_paths()));
   found.beams_ = beams_.view();
   found.beam_map_ = beam_map_.view();
   found.beam_scale_ = 1.0f / static_cast<float>(beam_paths());

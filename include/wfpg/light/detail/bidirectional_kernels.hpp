@@ -48,15 +48,20 @@ constexpr bool require_light_types() {
   return true;
 }
 
-/// Kernel: copies the positions of vertices on surfaces or in media, for a photon map. The map skips others.
+/// Kernel: copies the positions of vertices on surfaces or in media, for a photon map. The map skips others,
+/// and those of paths from `paths` on.
 template <class Vertex>
 struct copy_photon_positions {
   light_vertices_view<Vertex> vertices;
   bool in_media;
+  std::size_t paths;
   array_view<vec3> positions;
   WFPG_HD void operator()(std::size_t i) const {
-    const Vertex& vertex = vertices[static_cast<std::uint32_t>(i)];
-    positions[i] = vertex.in_medium() == in_media ? vertex.position() : vec3(2.0f * largest_coordinate);
+    const auto k = static_cast<std::uint32_t>(i);
+    positions[i] = vec3(2.0f * largest_coordinate);
+    if (vertices.path(k) >= paths) return;
+    const Vertex& vertex = vertices[k];
+    if (vertex.in_medium() == in_media) positions[i] = vertex.position();
   }
 };
 
