@@ -10,7 +10,7 @@ half the difference between the references, which is their own noise.
 import sys
 import tempfile
 
-from programs import Programs, write_results
+from programs import Programs, errors_without_noise, write_results
 
 SCENES = {"cornell-enclosed": "off", "ajar": "on"}  # and next-event estimation
 METHODS = {
@@ -26,9 +26,7 @@ ERRORS = ("mse", "relmse", "relmse_trimmed", "mse_reinhard")
 def summary(stats, errors, noise):
     """One method's line: errors without the references' noise, and what a sample took."""
     spp = stats["spp"]
-    line = {"spp": spp}
-    for e in ERRORS:
-        line[e] = sum(error[e] for error in errors) / len(errors) - noise[e] / 2
+    line = {"spp": spp, **errors_without_noise(errors, noise, ERRORS)}
     line["milliseconds_a_sample"] = {stage: 1e3 * s / spp for stage, s in stats["seconds"].items()}
     line["segments_a_sample"] = stats["segments"] / spp
     line["persistent_bytes"] = stats["memory"]["persistent"]

@@ -101,7 +101,6 @@ class traced_scene {
     settings_.height = sizes::iteration_height;
     settings_.max_depth = static_cast<std::uint32_t>(host_.max_depth);
     if (merges) settings_.techniques.add(render::technique::surf);
-    settings_.light.budget_bytes = std::size_t(4) << 30;  // for all vertices
   }
 
   render::bvh_caster caster() const { return hierarchy_.caster(); }

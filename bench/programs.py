@@ -34,6 +34,11 @@ class Programs:
         return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
 
 
+def errors_without_noise(errors, noise, kinds):
+    """Mean errors of one picture against two references, less half the references' difference, which is their noise."""
+    return {kind: statistics.mean(error[kind] for error in errors) - noise[kind] / 2 for kind in kinds}
+
+
 def seconds(stats):
     """A rendering's time, without what stands before all methods."""
     return stats["seconds"]["total"] - stats["seconds"].get("embree", 0.0) - stats["seconds"].get("bvh", 0.0)

@@ -93,13 +93,14 @@ std::vector<option_default> defaults() {
           {paths, "max_vertices", text_of(light.max_vertices)},
           {paths, "max_beams", text_of(light.max_beams)},
           {paths, "segment_beams", text_of(light.segment_beams)},
-          {paths, "budget_bytes", light.budget_bytes == std::size_t(1) << 30 ? "1 GiB" : ""},
+          {paths, "budget_bytes", light.budget_bytes == std::size_t(4) << 30 ? "4 GiB" : ""},
           {paths, "surface_points", text_of(light.surface_points)},
           {paths, "beams", text_of(light.beams)},
           {paths, "surface_radius", text_of(light.surface_radius)},
           {paths, "volume_radius", text_of(light.volume_radius)},
           {paths, "radius_alpha", text_of(light.radius_alpha)},
-          {paths, "beam_paths", light.beam_paths ? "" : "unset"}};
+          {paths, "beam_paths", light.beam_paths ? "" : "unset"},
+          {paths, "beam_point_paths", light.beam_point_paths ? "" : "unset"}};
 }
 
 /// The page's row of an option in a section. Empty if there is none.

@@ -25,9 +25,9 @@ struct bidirectional_options {
   /// Most beams that a path leaves between two calls of reserve(), at least 1: media on one segment. Each
   /// takes sizeof(Beam) bytes for each path that leaves beams, beside the budget.
   std::uint32_t segment_beams = 8;
-  /// Memory for vertices, and as much for beams, bytes: room for one at least. What paths take, and maps, is
-  /// not counted.
-  std::size_t budget_bytes = std::size_t(1) << 30;
+  /// Most memory for vertices, and as much for beams, bytes: room for one at least. No more is allocated than
+  /// max_vertices and max_beams need. What paths take, and maps, is not counted.
+  std::size_t budget_bytes = std::size_t(4) << 30;
 
   bool light_hits = true;      ///< camera paths hit lights
   bool next_event = true;      ///< a light sample at each vertex of a camera path
