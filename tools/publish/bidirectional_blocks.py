@@ -6,7 +6,7 @@ from typing import Dict, List, NamedTuple, Tuple
 from blocks import Results, Rows, block, span, three
 
 GPU, TECHNIQUES, VCM, UPBP = "bidirectional-gpu.txt", "techniques.txt", "smallvcm.txt", "smallupbp.txt"
-STAGES, TIMES = "cuda-stages.json", "cuda-light-times.json"
+STAGES, TIMES, ENDS = "cuda-stages.json", "cuda-light-times.json", "cuda-both-ends.json"
 
 
 def two(value: float) -> str:
@@ -30,42 +30,57 @@ def cell(lines: List[str], name: str, row: int) -> float:
     return float(found[0][0])
 
 
-def at_equal_time(results: Results, scene: str) -> Dict[str, float]:
-    """Relative MSE of path tracing over that of each method, at equal time."""
-    begin = results.found(GPU, rf"^{scene} +(?:references|one) .*$")
-    lines = results.text(GPU)[begin.end():].split("\n")[1:5]
-    return {line.split()[0]: float(line.split()[3]) for line in lines}
+def gains(results: Results, scene: str, kind: str = "mse_reinhard") -> Dict[str, float]:
+    """The error of path tracing over that of each method, at equal time."""
+    (found,) = [s["methods"] for s in results.json(ENDS, "scenes") if s["scene"] == scene]
+    first = next(iter(found.values()))
+    return {name: float(first[kind] / method[kind]) for name, method in found.items()}
+
+
+def gains_of(results: Results, scenes: Dict[str, str], named: Dict[str, str]) -> Rows:
+    """A table of gains with the best of a row to take, of methods by their names in the head."""
+    rows = [["scene", *named, "take"]]
+    for scene, what in scenes.items():
+        found = gains(results, scene)
+        best = max(named, key=lambda name: found[named[name]])
+        rows.append([f"`{scene}`, {what}", *(two(found[method]) for method in named.values()), best])
+    return rows
 
 
 @block
 def both_ends(results: Results) -> Rows:
-    """Gains in relative MSE at equal time."""
-    scenes = {"caustic-pool": ("water that focuses light", "vcm"), "mirror-balls": ("a lamp in glass, seen in mirrors", "vcm"),
-              "veach-bidir": ("lamps in shades, a glass egg", "bpt")}
-    rows = [["scene", "guided (wfpg)", "bpt", "vcm", "take"]]
-    for scene, (what, take) in scenes.items():
-        gains = at_equal_time(results, scene)
-        rows.append([f"`{scene}`, {what}", *(two(gains[m]) for m in ("wfpg", "bpt", "vcm")), take])
-    return rows
+    """Gains at equal time."""
+    scenes = {"caustic-pool": "water that focuses light", "mirror-balls": "a lamp in glass, seen in mirrors",
+              "veach-bidir": "lamps in shades, a glass egg"}
+    return gains_of(results, scenes, {"guided (wfpg)": "wfpg", "bpt": "bpt", "vcm": "vcm"})
 
 
 @block
 def both_ends_media(results: Results) -> Rows:
-    """Gains in media at equal time: relative MSE of path tracing through media over that of a method."""
-    scenes = {"fog-spot": ("a slit in thin fog", "bpt"), "glass-caustic-fog": ("a ball of glass in fog", "bpt+bb1d"),
-              "bottles": ("liquids before a mirror", "upbp"), "wax": ("dense candles", "upbp")}
-    rows = [["scene", "bpt", "vcm", "bpt+bb1d", "upbp", "take"]]
-    for scene, (what, take) in scenes.items():
-        found = results.found(GPU, rf"^{scene} +[\d.e-]+ +((?:[\d.e-]+ \(\d+\) *){{7}})$")
-        vpt, bpt, vcm, _, _, bb1d, upbp = (float(v) for v in re.findall(r"([\d.e-]+) \(", found[1]))
-        rows.append([f"`{scene}`, {what}", *(two(vpt / error) for error in (bpt, vcm, bb1d, upbp)), take])
-    return rows
+    """Gains in media at equal time."""
+    scenes = {"fog-spot": "a slit in thin fog", "glass-caustic-fog": "a ball of glass in fog", "bottles": "liquids before a mirror",
+              "wax": "dense candles"}
+    return gains_of(results, scenes, {m: m for m in ("bpt", "vcm", "bpt+pp3d", "bpt+pb2d", "bpt+bb1d", "upbp")})
+
+
+@block
+def both_ends_setup(results: Results) -> str:
+    """Seconds, size and GPU of these gains."""
+    gpu = results.json(ENDS, "gpu_and_driver").split(",")[0]
+    return f"{results.json(ENDS, 'seconds'):g} seconds of {results.json(ENDS, 'size')} on one {gpu}"
+
+
+@block
+def more_photons(results: Results) -> str:
+    """The error of upbp with more beams and all photons, over that with the default numbers, at equal time."""
+    found = [gains(results, scene["scene"]) for scene in results.json(ENDS, "scenes")]
+    return span([g["upbp"] / g["upbp-more"] for g in found if "upbp-more" in g], 2)
 
 
 @block
 def mirror_balls_mse(results: Results) -> str:
     """The gain of vcm in mirror-balls in MSE."""
-    return results.found(GPU, r"^  vcm +873 .* ([\d.]+) +[\d.]+$")[1].rstrip("0")
+    return two(gains(results, "mirror-balls", "mse")["vcm"])
 
 
 @block

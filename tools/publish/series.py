@@ -97,6 +97,7 @@ ALL: Tuple[Series, ...] = (
            ("gpu", "OptiX"), 1, "cuda-casting.json"),
     Series("cuda-equal-time.json", ("equal_time.py bin cuda-equal-time.json 10 60",), ("gpu",), 5, "cuda-equal-time.json"),
     Series("cuda-sample-times.json", ("sample_times.py bin cuda-sample-times.json 20",), ("gpu",), 5, "cuda-sample-times.json"),
+    Series("cuda-both-ends.json", ("both_ends.py bin cuda-both-ends.json",), ("gpu",), 8, "cuda-both-ends.json"),
     Series("cuda-light-times.json", ("light_times.py bin cuda-light-times.json",), ("gpu",), 2, "cuda-light-times.json"),
     Series("rest.json#gpu", ("rests.py bin rest.json gpu scenes",), ("gpu", "scenes"), 5, "rest.json"),
     quality("quality-lights.json", ("gpu", "scenes"), 5,
