@@ -5,8 +5,8 @@ usage: bench/both_ends.py DIRECTORY_OF_PROGRAMS OUT.json [SECONDS [REFERENCE_SEC
 
 Renders each scene with each method for SECONDS (3), with two seeds. Two references take REFERENCE_SECONDS (8) each and have
 other seeds. An error is the mean of both seeds against both references, less half the difference between the references, which
-is their own noise. upbp-more has more beams than upbp, and all photons along camera beams. Scenes that OUT has stay in it, but
-for those that are measured.
+is their own noise. upbp-more has beams of more light paths than upbp, and all photons along camera beams. Scenes that OUT has
+stay in it, but for those that are measured. They must have the same settings.
 """
 import statistics
 import sys
@@ -21,7 +21,7 @@ MEDIA = {"vpt": ("vpt",), "bpt": ("bpt",), "vcm": ("vcm",), "bpt+pp3d": ("bpt", 
          "upbp-more": ("upbp", "--beam-paths", "2048", "--beam-point-paths", "1000000")}
 SCENES = {"caustic-pool": SURFACES, "mirror-balls": SURFACES, "veach-bidir": SURFACES, "fog-spot": MEDIA, "glass-caustic-fog": MEDIA,
           "bottles": MEDIA, "wax": MEDIA}
-# Path tracing finds no light of wax's flames behind its boundaries. bpt finds little of the lamp in bottles, and other scenes' best.
+# Other scenes' are by bpt, which finds light of wax's flames that path tracing misses. In bottles it finds less than path tracing.
 REFERENCES = {"bottles": ("vpt",)}
 REFERENCE_SEEDS = {"a": 901, "b": 902}
 SEEDS = (1, 2)
@@ -46,14 +46,17 @@ def measure(programs, scene, methods, seconds, reference_seconds):
 
 
 def main(directory, out, seconds="3", reference_seconds="8", size="480x270", *names):
-    scenes = {scene["scene"]: scene for scene in begin_results(out).get("scenes", [])}
+    settings = {"seconds": float(seconds), "reference_seconds": float(reference_seconds), "size": size}
+    results = begin_results(out)
+    if results and any(results[name] != value for name, value in settings.items()):
+        sys.exit(f"{out} has scenes of other settings")
+    scenes = {scene["scene"]: scene for scene in results.get("scenes", [])}
     with tempfile.TemporaryDirectory() as folder:
         programs = Programs(directory, size, folder)
         for name in names or SCENES:
             print(name, file=sys.stderr)
             scenes[name] = measure(programs, name, SCENES[name], float(seconds), float(reference_seconds))
-    write_results(out, {"seconds": float(seconds), "reference_seconds": float(reference_seconds), "size": size,
-                        "scenes": [scenes[name] for name in SCENES if name in scenes]})
+    write_results(out, {**settings, "scenes": [scenes[name] for name in SCENES if name in scenes]})
 
 
 if __name__ == "__main__":

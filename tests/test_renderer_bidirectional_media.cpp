@@ -110,6 +110,7 @@ TEST_CASE("both ends: light that fog scatters once is an integral", "[renderer][
     render_options options = with(set.techniques, 16, 160, 2);
     options.light.volume_radius = set.volume_radius;
     options.light.beam_paths = 150;  // of 256
+    options.light.beam_point_paths = 224;
     const sample_mean found =
         mean_over_seeds(s, options, 1, set.seeds, [](const image& p) { return mean_of_channel(p, 1); });
     CHECK(has_mean(found, expected));

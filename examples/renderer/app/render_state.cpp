@@ -70,8 +70,9 @@ named_values values_of(const render_options& o) {
                          {"--combine", name_of(combination_names(), combination_of(o))}};
   if (is_bidirectional(o.method)) {
     const technique_set techniques = techniques_of(o);
-    values.insert(values.end(), {{"--techniques", names_of(techniques)},
-                                 {"--light-memory", std::to_string(o.light.budget_bytes)}});
+    values.emplace_back("--techniques", names_of(techniques));
+    if (chooses_techniques(o.method))
+      values.emplace_back("--light-memory", std::to_string(o.light.budget_bytes));
     if (techniques.has(technique::surf))
       values.emplace_back("--radius", std::to_string(o.light.surface_radius));
     if (techniques.merges()) values.emplace_back("--radius-alpha", std::to_string(o.light.radius_alpha));
@@ -79,8 +80,9 @@ named_values values_of(const render_options& o) {
       values.emplace_back("--volume-radius", std::to_string(o.light.volume_radius));
     if (techniques.has(technique::bb1d))
       values.emplace_back("--beam-paths", std::to_string(light_options_of(o).count_beam_paths()));
-    if (techniques.has(technique::pb2d))
-      values.emplace_back("--beam-point-paths", std::to_string(light_options_of(o).count_beam_point_paths()));
+    const wfpg::bidirectional_options light = light_options_of(o);
+    if (light.count_beam_point_paths() < light.paths && techniques.has(technique::pb2d))
+      values.emplace_back("--beam-point-paths", std::to_string(light.count_beam_point_paths()));
   }
   if (is_guided(o.method)) add_guider_values(o, values);
   return values;

@@ -122,6 +122,7 @@ struct splat_light_paths {
   WFPG_HD void operator()(std::size_t i) const {
     const subpath_vertex& vertex = vertices[i];
     const way_to_camera to(camera, vertex.at.position);
+    if (!to.in_view) return;  // compilers may round differently here
     const float pdf = camera.pdf(-to.toward);
     const vec3 value =
         vertex.throughput * vertex.scattered_flux(to.toward) * (pdf / (to.distance * to.distance));

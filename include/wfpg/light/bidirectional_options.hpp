@@ -43,7 +43,7 @@ struct bidirectional_options {
   float volume_radius = 0.002f;                  ///< in media
   float radius_alpha = radius_schedule().alpha;  ///< how radii shrink, in (0, 1], as in radius_schedule
   // Merges along segments take the longer, the more photons there are, and soon remove no more noise than
-  // their time is worth. docs/bidirectional.md has what more of them would gain.
+  // their time is worth. docs/bidirectional.md has the error with more of them.
   /// Light paths that leave beams, at least 1. More than there are paths means all. Unset: one in 64, at most
   /// 512.
   std::optional<std::size_t> beam_paths;

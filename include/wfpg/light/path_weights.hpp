@@ -58,7 +58,7 @@ struct basic_path_techniques {
   Real splats = 0;
   Real surface_points = 0;  ///< light paths times pi r²
   Real volume_points = 0;   ///< light paths times 4/3 pi r³
-  Real beam_points = 0;     ///< light paths times pi r²
+  Real beam_points = 0;     ///< light paths whose vertices merge along camera beams, times pi r²
   Real beams = 0;           ///< light paths that leave beams, times 2 r
   /// Photon beams end where their path scatters. False: they go on to the medium's end.
   bool short_beams = true;
