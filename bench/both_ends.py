@@ -12,7 +12,7 @@ import statistics
 import sys
 import tempfile
 
-from programs import Programs, begin_results, errors_without_noise, write_results
+from programs import ERRORS, Programs, begin_results, errors_without_noise, write_results
 
 # The first method of each is the one that others are compared with.
 SURFACES = {"pt": ("pt",), "wfpg": ("wfpg",), "bpt": ("bpt",), "vcm": ("vcm",)}
@@ -25,7 +25,6 @@ SCENES = {"caustic-pool": SURFACES, "mirror-balls": SURFACES, "veach-bidir": SUR
 REFERENCES = {"bottles": ("vpt",)}
 REFERENCE_SEEDS = {"a": 901, "b": 902}
 SEEDS = (1, 2)
-ERRORS = ("mse", "relmse", "relmse_trimmed", "mse_reinhard")
 
 
 def measure(programs, scene, methods, seconds, reference_seconds):
@@ -41,21 +40,21 @@ def measure(programs, scene, methods, seconds, reference_seconds):
         for seed in SEEDS:
             samples.append(render("x", method, seconds, seed)["spp"])
             errors += [programs.compare("x", reference) for reference in REFERENCE_SEEDS]
-        lines[name] = {"spp": statistics.mean(samples), **errors_without_noise(errors, noise, ERRORS)}
+        lines[name] = {"spp": statistics.mean(samples), **errors_without_noise(errors, noise)}
     return {"scene": scene, "reference_noise": {kind: noise[kind] for kind in ERRORS}, "methods": lines}
 
 
 def main(directory, out, seconds="3", reference_seconds="8", size="480x270", *names):
     settings = {"seconds": float(seconds), "reference_seconds": float(reference_seconds), "size": size}
     results = begin_results(out)
-    if results and any(results[name] != value for name, value in settings.items()):
+    if results and any(results.get(name) != value for name, value in settings.items()):
         sys.exit(f"{out} has scenes of other settings")
     scenes = {scene["scene"]: scene for scene in results.get("scenes", [])}
     with tempfile.TemporaryDirectory() as folder:
         programs = Programs(directory, size, folder)
         for name in names or SCENES:
             print(name, file=sys.stderr)
-            scenes[name] = measure(programs, name, SCENES[name], float(seconds), float(reference_seconds))
+            scenes[name] = measure(programs, name, SCENES[name], settings["seconds"], settings["reference_seconds"])
     write_results(out, {**settings, "scenes": [scenes[name] for name in SCENES if name in scenes]})
 
 

@@ -10,7 +10,7 @@ half the difference between the references, which is their own noise.
 import sys
 import tempfile
 
-from programs import Programs, errors_without_noise, write_results
+from programs import ERRORS, Programs, errors_without_noise, is_hidden, write_results
 
 SCENES = {"cornell-enclosed": "off", "ajar": "on"}  # and next-event estimation
 METHODS = {
@@ -20,13 +20,12 @@ METHODS = {
     "product": ["--method", "wfpg-product"],
 }
 REFERENCES = {"a": (["--method", "pt"], 901), "b": ([], 902)}
-ERRORS = ("mse", "relmse", "relmse_trimmed", "mse_reinhard")
 
 
 def summary(stats, errors, noise):
     """One method's line: errors without the references' noise, and what a sample took."""
     spp = stats["spp"]
-    line = {"spp": spp, **errors_without_noise(errors, noise, ERRORS)}
+    line = {"spp": spp, **errors_without_noise(errors, noise)}
     line["milliseconds_a_sample"] = {stage: 1e3 * s / spp for stage, s in stats["seconds"].items()}
     line["segments_a_sample"] = stats["segments"] / spp
     line["persistent_bytes"] = stats["memory"]["persistent"]
@@ -49,7 +48,7 @@ def measure(programs, scene, seconds, reference_seconds):
     for line in methods.values():
         # None if the references' noise hides the method's error.
         line["ratios"] = {
-            e: methods["pt"][e] / line[e] if line[e] > noise[e] / 20 else None for e in ERRORS
+            e: None if is_hidden(line[e], noise[e]) else methods["pt"][e] / line[e] for e in ERRORS
         }
     return {"scene": scene, "reference_noise": noise, "methods": methods}
 

@@ -7,6 +7,7 @@ import sys
 
 PAIRS = ((1, 2), (3, 4))  # of seeds, whose pictures are compared
 SEEDS = [seed for pair in PAIRS for seed in pair]
+ERRORS = ("mse", "relmse", "relmse_trimmed", "mse_reinhard")  # of those that wfpg-compare prints
 
 
 class Programs:
@@ -34,9 +35,14 @@ class Programs:
         return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
 
 
-def errors_without_noise(errors, noise, kinds):
+def errors_without_noise(errors, noise):
     """Mean errors of one picture against two references, less half the references' difference, which is their noise."""
-    return {kind: statistics.mean(error[kind] for error in errors) - noise[kind] / 2 for kind in kinds}
+    return {kind: statistics.mean(error[kind] for error in errors) - noise[kind] / 2 for kind in ERRORS}
+
+
+def is_hidden(error, noise):
+    """Whether an error without noise is too small for what the references differ by."""
+    return not error > noise / 20
 
 
 def seconds(stats):

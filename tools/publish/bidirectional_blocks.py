@@ -4,6 +4,7 @@ import re
 from typing import Dict, List, NamedTuple, Tuple
 
 from blocks import Results, Rows, block, span, three
+from programs import is_hidden  # bench/programs.py
 
 GPU, TECHNIQUES, VCM, UPBP = "bidirectional-gpu.txt", "techniques.txt", "smallvcm.txt", "smallupbp.txt"
 STAGES, TIMES, ENDS = "cuda-stages.json", "cuda-light-times.json", "cuda-both-ends.json"
@@ -34,7 +35,7 @@ def gains(results: Results, scene: str, kind: str = "mse_reinhard") -> Dict[str,
     """The error of path tracing over that of each method, at equal time. References must not hide an error by their noise."""
     (measured,) = [s for s in results.json(ENDS, "scenes") if s["scene"] == scene]
     found, noise = measured["methods"], measured["reference_noise"][kind]
-    if any(method[kind] <= noise / 20 for method in found.values()):
+    if any(is_hidden(method[kind], noise) for method in found.values()):
         raise ValueError(f"{ENDS}: references of {scene} are too noisy")
     first = next(iter(found.values()))
     return {name: float(first[kind] / method[kind]) for name, method in found.items()}

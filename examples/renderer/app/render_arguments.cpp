@@ -149,6 +149,12 @@ struct requirement {
   bool (*holds)(const render_options&);
 };
 
+/// Whether a technique is one of the method's.
+template <technique by>
+bool uses(const render_options& options) {
+  return is_bidirectional(options.method) && techniques_of(options).has(by);
+}
+
 const std::vector<requirement>& requirements() {
   using options = const render_options&;
   static const std::vector<requirement> all = {
@@ -185,21 +191,15 @@ const std::vector<requirement>& requirements() {
       {{"--technique-pictures"},
        "--method bpt, vcm, upbp or lt",
        [](options o) { return is_bidirectional(o.method); }},
-      {{"--radius"},
-       "--method vcm or upbp, or surf among --techniques",
-       [](options o) { return is_bidirectional(o.method) && techniques_of(o).has(technique::surf); }},
+      {{"--radius"}, "--method vcm or upbp, or surf among --techniques", uses<technique::surf>},
       {{"--radius-alpha"},
        "--method vcm or upbp, or merges among --techniques",
        [](options o) { return is_bidirectional(o.method) && techniques_of(o).merges(); }},
       {{"--volume-radius"},
        "--method upbp, or pp3d, pb2d or bb1d among --techniques",
        [](options o) { return is_bidirectional(o.method) && techniques_of(o).merges_in_media(); }},
-      {{"--beam-paths"},
-       "--method upbp, or bb1d among --techniques",
-       [](options o) { return is_bidirectional(o.method) && techniques_of(o).has(technique::bb1d); }},
-      {{"--beam-point-paths"},
-       "--method upbp, or pb2d among --techniques",
-       [](options o) { return is_bidirectional(o.method) && techniques_of(o).has(technique::pb2d); }},
+      {{"--beam-paths"}, "--method upbp, or bb1d among --techniques", uses<technique::bb1d>},
+      {{"--beam-point-paths"}, "--method upbp, or pb2d among --techniques", uses<technique::pb2d>},
       {{"--guided-depths"},
        "--method wfpg, wfpg-product, sarsa or records",
        [](options o) { return is_guided(o.method) && !is_openpgl(o.method); }},

@@ -78,10 +78,9 @@ named_values values_of(const render_options& o) {
     if (techniques.merges()) values.emplace_back("--radius-alpha", std::to_string(o.light.radius_alpha));
     if (techniques.merges_in_media())
       values.emplace_back("--volume-radius", std::to_string(o.light.volume_radius));
-    if (techniques.has(technique::bb1d))
-      values.emplace_back("--beam-paths", std::to_string(light_options_of(o).count_beam_paths()));
     const wfpg::bidirectional_options light = light_options_of(o);
-    if (light.count_beam_point_paths() < light.paths && techniques.has(technique::pb2d))
+    if (light.beams) values.emplace_back("--beam-paths", std::to_string(light.count_beam_paths()));
+    if (light.beam_points && light.count_beam_point_paths() < light.paths)
       values.emplace_back("--beam-point-paths", std::to_string(light.count_beam_point_paths()));
   }
   if (is_guided(o.method)) add_guider_values(o, values);
