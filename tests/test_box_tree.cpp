@@ -361,6 +361,35 @@ WFPG_TEST_CASE("a tree's queries agree with a test of each box", "[box_tree]") {
     }
 }
 
+WFPG_TEST_CASE("a tree of 300,000 boxes has each once, and points find those that hold them", "[box_tree]") {
+  const Exec exec;
+  // Its levels have more nodes than are made without asking how many there are.
+  box_list boxes = random_boxes(300000, 0.001f, 61);
+  for (std::size_t i = 0; i < boxes.size(); i += 3) boxes[i] = bounds3{};
+  const wfpg::buffer<bounds3, Exec> given(exec, boxes);
+  box_tree<Exec> tree;
+  tree.build(exec, given.view());
+  CHECK(tree.skipped() == 100000);
+  REQUIRE(tree.view().size() == 200000);
+  const wfpg::buffer<std::uint32_t, Exec> order(exec, tree.view().size());
+  exec.for_each(order.size(), read_order{tree.view(), order.data()});
+  std::vector<std::uint32_t> indices = order.to_host(exec);
+  std::sort(indices.begin(), indices.end());
+  std::size_t wrong = 0;
+  for (std::size_t k = 0; k < indices.size(); ++k) wrong += indices[k] != 3 * (k / 2) + 1 + k % 2;
+  CHECK(wrong == 0);
+
+  std::vector<vec3> centres;
+  for (std::size_t i = 0; i < 20; ++i) centres.push_back(boxes[15000 * i + 1 + i % 2].centre());
+  const counts found = count(exec, tree, boxes.size(), centres);
+  std::size_t missed = 0, all = 0;
+  for (std::size_t i = 0; i < centres.size(); ++i)
+    missed += found[i * boxes.size() + 15000 * i + 1 + i % 2] != 1;
+  for (const std::uint8_t times : found) all += times;
+  CHECK(missed == 0);
+  CHECK(all < 60);
+}
+
 WFPG_TEST_CASE("a tree finds few boxes that are only near", "[box_tree]") {
   const Exec exec;
   box_tree<Exec> tree;

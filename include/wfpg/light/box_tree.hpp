@@ -174,10 +174,10 @@ class box_tree {
   std::size_t bytes() const { return nodes_.bytes() + order_.bytes(); }
 
  private:
-  /// Sorts valid boxes into `ordered`, and returns their number.
-  template <class Boxes>
-  std::uint32_t sort(const Exec& exec, std::size_t n, const Boxes& boxes, std::uint64_t* keys,
-                     bounds3* ordered) const;
+  /// Sets the order to the indices of boxes that are not empty, and returns their number.
+  std::uint32_t take_valid(const Exec& exec, array_view<const bounds3> boxes);
+  /// Sorts the order, of `used` indices, by keys of their boxes.
+  void sort(const Exec& exec, array_view<const bounds3> boxes, std::uint32_t used, std::uint64_t* keys);
   /// Returns false if there are more levels than the stack allows.
   bool build_nodes(const Exec& exec, const detail::box_splitter& splitter, std::uint32_t leaf_boxes);
 

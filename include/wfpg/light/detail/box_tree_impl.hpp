@@ -6,12 +6,15 @@
 #include <wfpg/host/geometry.hpp>
 #include <wfpg/light/box_tree.hpp>
 
-#include <thrust/binary_search.h>
 #include <thrust/copy.h>
+#include <thrust/iterator/counting_iterator.h>
 #include <thrust/scan.h>
-#include <thrust/sequence.h>
 #include <thrust/sort.h>
 #include <thrust/transform_reduce.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
 
 namespace wfpg {
 namespace detail {
@@ -50,16 +53,20 @@ struct box_centre {
   }
 };
 
-/// Keys for sorting. Skipped boxes have the largest key.
-struct box_keys {
-  static constexpr std::uint64_t skipped = ~std::uint64_t(0);
+/// Whether the box of an index is taken.
+struct is_taken {
   const bounds3* boxes;
+  WFPG_HD bool operator()(std::uint32_t index) const { return !boxes[index].empty(); }
+};
+
+/// Keys for sorting indices.
+struct box_keys {
+  const bounds3* boxes;
+  const std::uint32_t* indices;
   bounds3 centres;
   std::uint64_t* keys;
 
-  WFPG_HD void operator()(std::size_t i) const {
-    keys[i] = boxes[i].empty() ? skipped : code(boxes[i].centre());
-  }
+  WFPG_HD void operator()(std::size_t i) const { keys[i] = code(boxes[indices[i]].centre()); }
 
  private:
   WFPG_HD morton_code code(vec3 p) const {
@@ -139,30 +146,62 @@ struct box_splitter {
   }
 };
 
+/// Where the nodes of each level are, which the level before it finds out. One that has none stays empty.
+struct box_levels {
+  struct level {
+    std::uint32_t first, count;
+  };
+  level levels[box_stack::most_levels + 1];
+
+  /// The root alone, whose children are not known.
+  static box_levels with_root() {
+    box_levels result{};
+    result.levels[0].count = 1;
+    return result;
+  }
+  /// The number of nodes of all levels.
+  std::uint32_t nodes() const {
+    std::uint32_t end = 0;
+    for (const level& each : levels) end = std::max(end, each.first + each.count);
+    return end;
+  }
+};
+
+// A GPU's host waits as long for the number of a level's nodes as kernels take for tens of thousands that are
+// not there. It asks for it where there may be more, and after every few levels, since it ends with an empty
+// one.
+constexpr std::size_t most_uncounted = std::size_t(1) << 16;
+constexpr std::uint32_t uncounted_levels = 7;
+static_assert(box_stack::most_levels % uncounted_levels == 0,
+              "whether there are too many levels must be known");
+
 /// Makes the nodes of one level from their ranges. Counts children that are nodes; they get their number
-/// later.
+/// later. Called for as many as there may be.
 struct make_box_nodes {
   box_splitter splitter;
   std::uint32_t leaf_boxes;
   const box_range* ranges;
-  box_node* nodes;
+  const box_levels::level* level;
+  box_node* nodes;          ///< of all levels
   box_range* child_ranges;  ///< four per node; empty for children that are not nodes
   std::uint32_t* child_nodes;
 
   WFPG_HD void operator()(std::size_t i) const {
+    child_nodes[i] = 0;
+    if (i >= level->count) return;
     parts made;
     made.add(ranges[i], splitter.boxes);
     while (made.count < box_node::width && expand(made)) {
     }
-    nodes[i] = quantised(made);
-    child_nodes[i] = 0;
+    box_node node = quantised(made);
     for (int child = 0; child < box_node::width; ++child) {
       const box_range range = child < made.count ? made.ranges[child] : box_range{};
       const bool is_leaf = range.size() <= leaf_boxes;
-      if (is_leaf && range.size() > 0) nodes[i].children[child] = box_child::leaf(range.first, range.size());
+      if (is_leaf && range.size() > 0) node.children[child] = box_child::leaf(range.first, range.size());
       child_ranges[i * box_node::width + static_cast<std::size_t>(child)] = is_leaf ? box_range{} : range;
       child_nodes[i] += is_leaf ? 0 : 1;
     }
+    nodes[level->first + i] = node;
   }
 
  private:
@@ -233,20 +272,25 @@ struct make_box_nodes {
   }
 };
 
-/// Numbers the children of a level's nodes, and sets the next level's ranges.
+/// Numbers the children of a level's nodes, and sets the next level and its ranges.
 struct number_children {
   const box_range* child_ranges;
   const std::uint32_t* prefix;  ///< child nodes of the nodes up to this one
-  std::uint32_t next_level;     ///< number of its first node
-  box_node* nodes;
+  const box_levels::level* level;
+  box_levels::level* next_level;
+  box_node* nodes;  ///< of all levels
   box_range* next_ranges;
 
   WFPG_HD void operator()(std::size_t i) const {
+    const box_levels::level here = *level;
+    const std::uint32_t after = here.first + here.count;
     std::uint32_t next = i > 0 ? prefix[i - 1] : 0;
+    if (i + 1 == here.count) *next_level = {after, prefix[i]};
+    box_node& node = nodes[here.first + i];
     for (int child = 0; child < box_node::width; ++child) {
       const box_range range = child_ranges[i * box_node::width + static_cast<std::size_t>(child)];
       if (range.size() == 0) continue;
-      nodes[i].children[child] = box_child::node(next_level + next);
+      node.children[child] = box_child::node(after + next);
       next_ranges[next++] = range;
     }
   }
@@ -289,12 +333,16 @@ void box_tree<Exec>::build(const Exec& exec, std::size_t n, const Boxes& boxes, 
   // Empty until all memory is there.
   node_count_ = size_ = skipped_ = 0;
   if (n == 0) return;
-  const buffer<std::uint64_t, Exec> keys(exec, n);
-  if (order_.size() < n) order_ = buffer<std::uint32_t, Exec>(exec, n);
-  const buffer<bounds3, Exec> ordered(exec, 2 * n + detail::range_boxes::most_levels);
-  const std::uint32_t used = sort(exec, n, boxes, keys.data(), ordered.data());
+  buffer<bounds3, Exec> given(exec, n);
+  exec.for_each(n, detail::write_box<Boxes>{boxes, given.data()});
+  const std::uint32_t used = take_valid(exec, given.view());
   if (used > 0) {
-    detail::box_splitter splitter{{keys.data(), used}, detail::pair_up(exec, ordered.data(), used), false};
+    const buffer<std::uint64_t, Exec> keys(exec, used);
+    sort(exec, given.view(), used, keys.data());
+    const buffer<bounds3, Exec> ordered(exec, 2 * std::size_t(used) + detail::range_boxes::most_levels);
+    exec.for_each(used, detail::order_boxes{given.data(), order_.data(), ordered.data()});
+    given = buffer<bounds3, Exec>();
+    detail::box_splitter splitter{keys.view(), detail::pair_up(exec, ordered.data(), used), false};
     if (!build_nodes(exec, splitter, leaf_boxes)) {
       splitter.balanced = true;
       build_nodes(exec, splitter, leaf_boxes);
@@ -305,47 +353,60 @@ void box_tree<Exec>::build(const Exec& exec, std::size_t n, const Boxes& boxes, 
 }
 
 template <class Exec>
-template <class Boxes>
-std::uint32_t box_tree<Exec>::sort(const Exec& exec, std::size_t n, const Boxes& boxes, std::uint64_t* keys,
-                                   bounds3* ordered) const {
-  const buffer<bounds3, Exec> given(exec, n);
-  exec.for_each(n, detail::write_box<Boxes>{boxes, given.data()});
-  const bounds3 centres = ::thrust::transform_reduce(exec.thrust(), given.data(), given.data() + n,
+std::uint32_t box_tree<Exec>::take_valid(const Exec& exec, array_view<const bounds3> boxes) {
+  if (order_.size() < boxes.size()) order_ = buffer<std::uint32_t, Exec>(exec, boxes.size());
+  const ::thrust::counting_iterator<std::uint32_t> all(0);
+  const auto end = ::thrust::copy_if(exec.thrust(), all, all + static_cast<std::uint32_t>(boxes.size()),
+                                     order_.data(), detail::is_taken{boxes.data()});
+  return static_cast<std::uint32_t>(end - order_.data());
+}
+
+template <class Exec>
+void box_tree<Exec>::sort(const Exec& exec, array_view<const bounds3> boxes, std::uint32_t used,
+                          std::uint64_t* keys) {
+  const bounds3 centres = ::thrust::transform_reduce(exec.thrust(), boxes.begin(), boxes.end(),
                                                      detail::box_centre(), bounds3{}, bounds_union());
-  exec.for_each(n, detail::box_keys{given.data(), centres, keys});
-  ::thrust::sequence(exec.thrust(), order_.data(), order_.data() + n);
+  exec.for_each(used, detail::box_keys{boxes.data(), order_.data(), centres, keys});
   // Stable, so that boxes with one key keep their order on any policy.
-  ::thrust::stable_sort_by_key(exec.thrust(), keys, keys + n, order_.data());
-  const auto used = static_cast<std::uint32_t>(
-      ::thrust::lower_bound(exec.thrust(), keys, keys + n, detail::box_keys::skipped) - keys);
-  exec.for_each(used, detail::order_boxes{given.data(), order_.data(), ordered});
-  return used;
+  ::thrust::stable_sort_by_key(exec.thrust(), keys, keys + used, order_.data());
 }
 
 template <class Exec>
 bool box_tree<Exec>::build_nodes(const Exec& exec, const detail::box_splitter& splitter,
                                  std::uint32_t leaf_boxes) {
+  using detail::box_levels;
   const auto n = static_cast<std::uint32_t>(splitter.keys.size());
   const buffer<detail::box_node, Exec> nodes(exec, detail::most_box_nodes(n));
+  box_levels known = box_levels::with_root();
+  const buffer<box_levels, Exec> levels(exec, {known});
   buffer<detail::box_range, Exec> ranges(exec, {detail::box_range{0, n}});
-  std::uint32_t begin = 0, count = 1, levels = 0;
-  for (; count > 0; ++levels) {
-    if (levels == detail::box_stack::most_levels) return false;
-    const buffer<detail::box_range, Exec> child_ranges(exec, std::size_t(count) * detail::box_node::width);
-    const buffer<std::uint32_t, Exec> prefix(exec, count);
-    exec.for_each(count, detail::make_box_nodes{splitter, leaf_boxes, ranges.data(), nodes.data() + begin,
-                                                child_ranges.data(), prefix.data()});
-    ::thrust::inclusive_scan(exec.thrust(), prefix.data(), prefix.data() + count, prefix.data());
-    const std::uint32_t next = read_element(exec, prefix.data() + count - 1);
-    ranges = buffer<detail::box_range, Exec>(exec, next);
-    exec.for_each(count, detail::number_children{child_ranges.data(), prefix.data(), begin + count,
-                                                 nodes.data() + begin, ranges.data()});
-    begin += count;
-    count = next;
+  // Below the first, a node has more boxes than a leaf.
+  const std::size_t most_in_level = n / (leaf_boxes + 1);
+  std::size_t most = 1;  // nodes of the level
+  for (std::uint32_t level = 0;; ++level) {
+    if (most > detail::most_uncounted || (level > 0 && level % detail::uncounted_levels == 0)) {
+      known = read_element(exec, levels.data());
+      most = known.levels[level].count;
+    }
+    if (most == 0) break;
+    if (level == detail::box_stack::most_levels) return false;
+    const box_levels::level* here = levels.data()->levels + level;
+    const buffer<detail::box_range, Exec> child_ranges(exec, most * detail::box_node::width);
+    const buffer<std::uint32_t, Exec> prefix(exec, most);
+    exec.for_each(most, detail::make_box_nodes{splitter, leaf_boxes, ranges.data(), here, nodes.data(),
+                                               child_ranges.data(), prefix.data()});
+    ::thrust::inclusive_scan(exec.thrust(), prefix.data(), prefix.data() + most, prefix.data());
+    const exec::device_count count{&here->count, most};
+    most = std::min(most * detail::box_node::width, most_in_level);
+    ranges = buffer<detail::box_range, Exec>(exec, most);
+    exec.for_each(count,
+                  detail::number_children{child_ranges.data(), prefix.data(), here,
+                                          levels.data()->levels + level + 1, nodes.data(), ranges.data()});
   }
-  if (nodes_.size() < begin) nodes_ = buffer<detail::box_node, Exec>(exec, begin);
-  ::thrust::copy_n(exec.thrust(), nodes.data(), begin, nodes_.data());
-  node_count_ = begin;
+  const std::uint32_t made = known.nodes();
+  if (nodes_.size() < made) nodes_ = buffer<detail::box_node, Exec>(exec, made);
+  ::thrust::copy_n(exec.thrust(), nodes.data(), made, nodes_.data());
+  node_count_ = made;
   return true;
 }
 
