@@ -5,8 +5,8 @@ usage: bench/both_ends.py DIRECTORY_OF_PROGRAMS OUT.json [SECONDS [REFERENCE_SEC
 
 Renders each scene with each method for SECONDS (3), with two seeds. Two references take REFERENCE_SECONDS (8) each and have
 other seeds. An error is the mean of both seeds against both references, less half the difference between the references, which
-is their own noise. upbp-more has beams of more light paths than upbp, and all photons along camera beams. Scenes that OUT has
-stay in it, but for those that are measured. They must have the same settings.
+is their own noise. vcm-all merges all photons where they are dense. upbp-more has beams of more light paths than upbp, and all
+photons along camera beams. Scenes that OUT has stay in it, but for those that are measured. They must have the same settings.
 """
 import statistics
 import sys
@@ -15,7 +15,8 @@ import tempfile
 from programs import ERRORS, Programs, begin_results, errors_without_noise, write_results
 
 # The first method of each is the one that others are compared with.
-SURFACES = {"pt": ("pt",), "wfpg": ("wfpg",), "bpt": ("bpt",), "vcm": ("vcm",)}
+SURFACES = {"pt": ("pt",), "wfpg": ("wfpg",), "bpt": ("bpt",), "vcm": ("vcm",),
+            "vcm-all": ("vcm", "--dense-photons", "1000000000")}
 MEDIA = {"vpt": ("vpt",), "bpt": ("bpt",), "vcm": ("vcm",), "bpt+pp3d": ("bpt", "--techniques", "bpt+pp3d"),
          "bpt+pb2d": ("bpt", "--techniques", "bpt+pb2d"), "bpt+bb1d": ("bpt", "--techniques", "bpt+bb1d"), "upbp": ("upbp",),
          "upbp-more": ("upbp", "--beam-paths", "2048", "--beam-point-paths", "1000000")}

@@ -39,7 +39,8 @@ struct order_photons {
   render::photon* photons;
 
   WFPG_HD void operator()(std::size_t place) const {
-    photons[place] = render::photon(vertices[map.index(static_cast<std::uint32_t>(place))]);
+    const auto k = static_cast<std::uint32_t>(place);
+    photons[place] = render::photon(vertices[map.index(k)], map.weight(k));
   }
 };
 

@@ -3,6 +3,7 @@
 #include "support/failing_resource.hpp"
 #include "support/policies.hpp"
 #include "support/random_light_paths.hpp"
+#include "support/sample_means.hpp"
 
 #include <wfpg/light/bidirectional.hpp>
 
@@ -29,6 +30,41 @@ WFPG_TEST_CASE("an iteration finds what its light paths have left", "[bidirectio
     light.build();
     check(found_by(exec, light), expected(paths, light.statistics(), light.options().segment_beams));
   }
+}
+
+TEST_CASE("merges with some of the dense photons have the mean of merges with all", "[bidirectional]") {
+  const one_policy exec;
+  bidirectional_options options = all_techniques();
+  options.radius_alpha = 1.0f;
+  light_of<one_policy> all(exec, options);
+  options.dense_photons = 7;
+  light_of<one_policy> some(exec, options);
+  const random_paths paths{3};
+  const auto find = [&](light_of<one_policy>& light, std::uint32_t iteration) {
+    light.begin_iteration(iteration, 1.0f);
+    follow(exec, light, paths);
+    light.build();
+    sums whole;
+    for (const sums& s : found_by(exec, light)) {
+      whole.on_surface += s.on_surface;
+      whole.in_medium += s.in_medium;
+      whole.points_along += s.points_along;
+    }
+    return whole;
+  };
+  const sums exact = find(all, 1);
+  wfpg::testing::sample_mean on_surface, in_medium;
+  for (std::uint32_t iteration = 1; iteration <= 500; ++iteration) {
+    const sums found = find(some, iteration);
+    on_surface.add(double(found.on_surface) / double(exact.on_surface));
+    in_medium.add(double(found.in_medium) / double(exact.in_medium));
+    CHECK(found.points_along == exact.points_along);
+  }
+  CHECK(has_mean(on_surface, 1.0));
+  CHECK(has_mean(in_medium, 1.0));
+  const bidirectional_statistics kept = some.statistics(), before = all.statistics();
+  CHECK(kept.surface_photons < before.surface_photons);
+  CHECK(kept.beam_point_photons == before.beam_point_photons);
 }
 
 WFPG_TEST_CASE("nothing is merged before maps are built", "[bidirectional]") {
@@ -235,6 +271,7 @@ TEST_CASE("options and iterations out of range are refused by their names", "[bi
   refuses("segment_beams", [](bidirectional_options& o) { o.segment_beams = 0; });
   refuses("bidirectional_options.beam_paths", [](bidirectional_options& o) { o.beam_paths = 0; });
   refuses("beam_point_paths", [](bidirectional_options& o) { o.beam_point_paths = 0; });
+  refuses("dense_photons", [](bidirectional_options& o) { o.dense_photons = 0; });
   refuses("bidirectional_options.budget_bytes", [](bidirectional_options& o) { o.budget_bytes = 7; });
   for (const float wrong : {0.0f, -1.0f, 1.1f, nan}) {
     refuses("surface_radius", [&](bidirectional_options& o) { o.surface_radius = wrong; });

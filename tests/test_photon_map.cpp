@@ -2,6 +2,7 @@
 // every policy, and memory that runs out.
 #include "support/failing_resource.hpp"
 #include "support/policies.hpp"
+#include "support/sample_means.hpp"
 
 #include <wfpg/light/photon_map.hpp>
 
@@ -51,6 +52,26 @@ struct order_sums {
   }
 };
 
+/// The photons that a point finds: their number, and how many they count for.
+struct weighed {
+  std::uint32_t found = 0;
+  float weight = 0.0f;
+};
+
+struct weigh {
+  photon_map_view map;
+  wfpg::array_view<const vec3> points;
+  wfpg::array_view<weighed> result;
+  WFPG_HD void operator()(std::size_t i) const {
+    weighed sum;
+    map.for_each_place(points[i], [&](std::uint32_t place) {
+      ++sum.found;
+      sum.weight += map.weight(place);
+    });
+    result[i] = sum;
+  }
+};
+
 }  // namespace photon_map_test
 
 namespace {
@@ -90,9 +111,10 @@ counts count(const Exec& exec, const photon_map<Exec>& map, std::size_t photons,
 }
 
 template <class Exec>
-void build(const Exec& exec, photon_map<Exec>& map, const points& photons, float radius) {
+void build(const Exec& exec, photon_map<Exec>& map, const points& photons, float radius,
+           const wfpg::photon_thinning& thinning = {}) {
   const wfpg::buffer<vec3, Exec> given(exec, photons);
-  map.build(exec, given.view(), radius);
+  map.build(exec, given.view(), radius, thinning);
 }
 
 /// Builds a map, and checks what it finds at photons and beside them. Returns the number of pairs.
@@ -215,10 +237,11 @@ template <class Exec>
 using reference = std::conditional_t<same_operations_same_bits, host_policy, Exec>;
 
 template <class Exec>
-std::vector<std::uint64_t> sums(const points& photons, const points& asked) {
+std::vector<std::uint64_t> sums(const points& photons, const points& asked,
+                                const wfpg::photon_thinning& thinning = {}) {
   const Exec exec;
   photon_map<Exec> map;
-  build(exec, map, photons, 0.05f);
+  build(exec, map, photons, 0.05f, thinning);
   const wfpg::buffer<vec3, Exec> at(exec, asked);
   const wfpg::buffer<std::uint64_t, Exec> result(exec, 2 * asked.size());
   exec.for_each(asked.size(), order_sums{map.view(), at.view(), result.view()});
@@ -231,9 +254,60 @@ WFPG_TEST_CASE("photons are found in one order on all policies", "[photon_map]")
   const std::vector<std::uint64_t> found = sums<Exec>(photons, asked);
   CHECK((found == sums<reference<Exec>>(photons, asked)));
   for (std::size_t i = 0; i < found.size(); i += 2) CHECK(found[i] == found[i + 1]);
+  const wfpg::photon_thinning thinning{3, 8};
+  const std::vector<std::uint64_t> fewer = sums<Exec>(photons, asked, thinning);
+  CHECK((fewer == sums<reference<Exec>>(photons, asked, thinning)));
+  CHECK(fewer != found);
 }
 
-static_assert(std::is_trivially_copyable_v<photon_map_view> && sizeof(photon_map_view) == 40);
+WFPG_TEST_CASE("where photons are dense some are left out, and others count for them", "[photon_map]") {
+  const Exec exec;
+  photon_map<Exec> map;
+  const std::size_t clusters = 100, size = 150, builds = 150;
+  const float radius = 0.1f;
+  random_numbers random(21);
+  points photons, centres;
+  for (std::size_t k = 0; k < clusters; ++k) {
+    centres.push_back(static_cast<float>(k) * vec3(0.77f, 1.31f, -0.59f));
+    for (std::size_t i = 0; i < size; ++i)
+      photons.push_back(centres.back() + 0.3f * radius * random.point(-1.0f, 1.0f));
+  }
+  const wfpg::buffer<vec3, Exec> at(exec, centres);
+  const wfpg::buffer<weighed, Exec> result(exec, clusters);
+  wfpg::testing::sample_mean weight;
+  std::size_t found = 0;
+  for (std::uint64_t seed = 1; seed <= builds; ++seed) {
+    build(exec, map, photons, radius, {16, seed});
+    CHECK(map.view().size() + map.skipped() == photons.size());
+    exec.for_each(clusters, weigh{map.view(), at.view(), result.view()});
+    for (const weighed& one : result.to_host(exec)) {
+      weight.add(double(one.weight) / double(size));
+      found += one.found;
+    }
+  }
+  CHECK(has_mean(weight, 1.0));
+  // A cluster is in up to eight cells.
+  CHECK(found > 16 * clusters * builds * 3 / 4);
+  CHECK(found < 16 * clusters * builds * 4);
+}
+
+WFPG_TEST_CASE("photons that are not dense are all kept, and count once", "[photon_map]") {
+  const Exec exec;
+  photon_map<Exec> map;
+  const points photons = on_faces(3000, vec3(0.0f), 1.0f, 31);
+  build(exec, map, photons, 0.01f, {32, 1});
+  CHECK(map.view().size() == photons.size());
+  const wfpg::buffer<vec3, Exec> at(exec, photons);
+  const wfpg::buffer<weighed, Exec> result(exec, photons.size());
+  exec.for_each(photons.size(), weigh{map.view(), at.view(), result.view()});
+  std::size_t wrong = 0;
+  for (const weighed& one : result.to_host(exec))
+    wrong += one.found == 0 || one.weight != static_cast<float>(one.found);
+  CHECK(wrong == 0);
+  CHECK_THROWS_WITH(build(exec, map, photons, 0.01f, {0, 1}), WFPG_TEST_CONTAINS("cell_photons"));
+}
+
+static_assert(std::is_trivially_copyable_v<photon_map_view> && sizeof(photon_map_view) == 48);
 
 WFPG_TEST_CASE("a photon map takes at most 40 bytes a photon, and uses its memory again", "[photon_map]") {
   const Exec exec;

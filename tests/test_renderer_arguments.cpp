@@ -188,6 +188,8 @@ TEST_CASE("options without effect are refused by a line that says what they need
       {"--method lt --techniques nee", "--techniques", "--method bpt, vcm or upbp"},
       {"--method pt --light-memory 1M", "--light-memory", "--method bpt, vcm or upbp"},
       {"--method bpt --radius 0.1", "--radius", "--method vcm or upbp, or surf among --techniques"},
+      {"--method bpt --dense-photons 8", "--dense-photons",
+       "--method vcm or upbp, or surf or pp3d among --techniques"},
       {"--method bpt --beam-paths 8", "--beam-paths", "--method upbp, or bb1d among --techniques"},
       {"--method bpt --techniques bpt+bb1d --beam-point-paths 8", "--beam-point-paths",
        "--method upbp, or pb2d among --techniques"},

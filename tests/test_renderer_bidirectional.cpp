@@ -151,6 +151,7 @@ TEST_CASE("merging blurs by its disc, with a bias that falls as the square of it
       options.techniques = render::techniques_of("surf");
       options.light.surface_radius = static_cast<float>(radius / scene_radius);
       options.light.radius_alpha = 1.0f;
+      options.light.dense_photons = 12;  // of 16 paths
       // Noise falls with the number of photons. Each merges at most of the pixels, so few of these cost
       // least.
       options.width = options.height = 4;

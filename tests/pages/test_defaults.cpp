@@ -99,6 +99,7 @@ std::vector<option_default> defaults() {
           {paths, "surface_radius", text_of(light.surface_radius)},
           {paths, "volume_radius", text_of(light.volume_radius)},
           {paths, "radius_alpha", text_of(light.radius_alpha)},
+          {paths, "dense_photons", text_of(light.dense_photons)},
           {paths, "beam_paths", light.beam_paths ? "" : "unset"},
           {paths, "beam_point_paths", light.beam_point_paths ? "" : "unset"}};
 }

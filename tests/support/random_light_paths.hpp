@@ -153,6 +153,7 @@ inline bidirectional_options all_techniques() {
   options.volume_points = options.beam_points = options.beams = true;
   options.surface_radius = 0.15f;
   options.volume_radius = 0.1f;
+  options.dense_photons = 0xffffffffu;  // all are kept, so that sums are exact
   options.beam_paths = beam_paths;
   options.beam_point_paths = beam_point_paths;
   return options;

@@ -8,6 +8,7 @@ from programs import is_hidden  # bench/programs.py
 
 GPU, TECHNIQUES, VCM, UPBP = "bidirectional-gpu.txt", "techniques.txt", "smallvcm.txt", "smallupbp.txt"
 STAGES, TIMES, ENDS = "cuda-stages.json", "cuda-light-times.json", "cuda-both-ends.json"
+LARGE = "cuda-both-ends-large.json"
 
 
 def two(value: float) -> str:
@@ -31,12 +32,12 @@ def cell(lines: List[str], name: str, row: int) -> float:
     return float(found[0][0])
 
 
-def gains(results: Results, scene: str, kind: str = "mse_reinhard") -> Dict[str, float]:
+def gains(results: Results, scene: str, kind: str = "mse_reinhard", file: str = ENDS) -> Dict[str, float]:
     """The error of path tracing over that of each method, at equal time. References must not hide an error by their noise."""
-    (measured,) = [s for s in results.json(ENDS, "scenes") if s["scene"] == scene]
+    (measured,) = [s for s in results.json(file, "scenes") if s["scene"] == scene]
     found, noise = measured["methods"], measured["reference_noise"][kind]
     if any(is_hidden(method[kind], noise) for method in found.values()):
-        raise ValueError(f"{ENDS}: references of {scene} are too noisy")
+        raise ValueError(f"{file}: references of {scene} are too noisy")
     first = next(iter(found.values()))
     return {name: float(first[kind] / method[kind]) for name, method in found.items()}
 
@@ -79,6 +80,19 @@ def more_photons(results: Results) -> str:
     """The error of upbp with more beams and all photons, over that with the default numbers, at equal time."""
     found = [gains(results, scene["scene"]) for scene in results.json(ENDS, "scenes")]
     return span([g["upbp"] / g["upbp-more"] for g in found if "upbp-more" in g], 2)
+
+
+@block
+def dense_photons(results: Results) -> str:
+    """The error of vcm with all photons over that with those kept where they are dense, in large pictures, at equal time."""
+    found = [gains(results, scene["scene"], file=LARGE) for scene in results.json(LARGE, "scenes")]
+    return span([g["vcm"] / g["vcm-all"] for g in found], 2)
+
+
+@block
+def large_setup(results: Results) -> str:
+    """Seconds and size of these pictures."""
+    return f"{results.json(LARGE, 'seconds'):g} seconds of {results.json(LARGE, 'size')}"
 
 
 @block

@@ -198,6 +198,12 @@ const std::vector<requirement>& requirements() {
       {{"--volume-radius"},
        "--method upbp, or pp3d, pb2d or bb1d among --techniques",
        [](options o) { return is_bidirectional(o.method) && techniques_of(o).merges_in_media(); }},
+      {{"--dense-photons"},
+       "--method vcm or upbp, or surf or pp3d among --techniques",
+       [](options o) {
+         const technique_set found = techniques_of(o);
+         return is_bidirectional(o.method) && (found.has(technique::surf) || found.has(technique::pp3d));
+       }},
       {{"--beam-paths"}, "--method upbp, or bb1d among --techniques", uses<technique::bb1d>},
       {{"--beam-point-paths"}, "--method upbp, or pb2d among --techniques", uses<technique::pb2d>},
       {{"--guided-depths"},
@@ -297,6 +303,12 @@ void add_bidirectional_options(CLI::App& app, render_options& options) {
   app.add_option("--volume-radius", options.light.volume_radius,
                  with_default("the same, of merges in media", options.light.volume_radius))
       ->transform(positive_number(1.0));
+  app.add_option(
+         "--dense-photons", options.light.dense_photons,
+         with_default("photons that a merge at a point finds at most, about; of denser ones, some count "
+                      "for all",
+                      options.light.dense_photons))
+      ->transform(whole_number(1, 1 << 30));
   app.add_option("--beam-paths", options.light.beam_paths,
                  "light paths of a sample that leave beams (default: one in 64, at most 512)")
       ->transform(whole_number(1, 1 << 30));

@@ -17,14 +17,14 @@ struct alignas(16) photon {
   static constexpr std::uint32_t most_solids = solid_stack::none >> segment_bits;
 
   vec3 incident;  ///< where it came from, unit length
-  vec3 flux;      ///< in a medium with scattering
+  vec3 flux;      ///< of all photons that it counts for; in a medium with scattering
   wfpg::vertex_weights weights;
   std::uint32_t packed;  ///< segments(), and above these bits solid()
 
   photon() = default;
-  WFPG_HD explicit photon(const subpath_vertex& vertex)
+  WFPG_HD photon(const subpath_vertex& vertex, float count)
       : incident(vertex.at.outgoing),
-        flux(vertex.throughput),
+        flux(vertex.throughput * count),
         weights(vertex.weights),
         packed(vertex.segments | vertex.material << segment_bits) {}
 

@@ -22,7 +22,7 @@
 // Cost: a scan of paths a depth, and a tree for each photon technique.
 //
 // Memory: sizeof(Vertex) + 8 bytes a vertex, 12 more where photons are merged, and for each technique of
-// points sizeof(Photon) + 23 a photon. A beam takes sizeof(Beam) + 40 bytes, and 46 for each of its 16
+// points sizeof(Photon) + 27 a photon. A beam takes sizeof(Beam) + 40 bytes, and 46 for each of its 16
 // pieces. While a tree is built, it takes 133 bytes a photon or piece. A path takes 8 bytes.
 #pragma once
 
@@ -56,7 +56,9 @@ struct no_beam {
 /// Vertex: what connections and Photon read of a light path's vertex. It has two members:
 ///   WFPG_HD vec3 position() const;    world space, scene units
 ///   WFPG_HD bool in_medium() const;   the path has scattered in a medium there
-/// Photon: what merges read of a vertex. It has a WFPG_HD constructor from a Vertex.
+/// Photon: what merges read of a vertex. It has a WFPG_HD constructor from a Vertex, or one from a Vertex and
+///   a float, by which it multiplies the flux that it carries: how many photons it counts for where they are
+///   dense. With the first, merges look that number up, and take up to a fifth more time on a GPU.
 /// Beam: what merges read of a photon beam. It has a member `path_beam beam`.
 /// All are trivially copyable, have a default constructor and can be assigned. Where a part is missing, the
 /// compiler's message says which.
@@ -140,8 +142,8 @@ class bidirectional {
     buffer<Photon, Exec> photons;
 
     void build(const Exec& exec, array_view<const vec3> positions, float radius,
-               const light_vertices_view<Vertex>& vertices) {
-      map.build(exec, positions, radius);
+               const photon_thinning& thinning, const light_vertices_view<Vertex>& vertices) {
+      map.build(exec, positions, radius, thinning);
       const std::uint32_t size = map.view().size();
       if (photons.size() < size) photons = buffer<Photon, Exec>(exec, size);
       exec.for_each(size, detail::place_photons<Vertex, Photon>{vertices, map.view(), photons.view()});
@@ -198,6 +200,7 @@ class bidirectional {
   buffer<path_beam, Exec> copied_beams_;
   placed_map on_surfaces_, in_media_, for_beams_;
   beam_map<Exec> beam_map_;
+  std::uint32_t iteration_ = 0;
   merge_radii radii_;
   path_techniques techniques_;
   bool is_built_ = false;

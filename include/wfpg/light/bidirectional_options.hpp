@@ -42,6 +42,9 @@ struct bidirectional_options {
   float surface_radius = 0.003f;                 ///< on surfaces
   float volume_radius = 0.002f;                  ///< in media
   float radius_alpha = radius_schedule().alpha;  ///< how radii shrink, in (0, 1], as in radius_schedule
+  /// About how many photons a merge at a point finds at most, at least 1. Where they are denser, some are
+  /// left out and others count for them. Fewer take less time, and add noise to caustics.
+  std::uint32_t dense_photons = 64;
   // Merges along segments take the longer, the more photons there are, and soon remove no more noise than
   // their time is worth. docs/bidirectional.md has the error with more of them.
   /// Light paths that leave beams, at least 1. More than there are paths means all. Unset: one in 64, at most
@@ -79,6 +82,7 @@ inline void require_in_range(const bidirectional_options& options) {
   require_some(options.max_vertices, "bidirectional_options.max_vertices");
   require_some(options.max_beams, "bidirectional_options.max_beams");
   require_some(options.segment_beams, "bidirectional_options.segment_beams");
+  require_some(options.dense_photons, "bidirectional_options.dense_photons");
   require_some(options.beam_paths.value_or(1), "bidirectional_options.beam_paths");
   require_some(options.beam_point_paths.value_or(1), "bidirectional_options.beam_point_paths");
   require_fraction(options.surface_radius, "bidirectional_options.surface_radius");
@@ -119,8 +123,8 @@ struct bidirectional_statistics {
   std::uint32_t beams = 0;               ///< stored
   std::uint32_t dropped_beams = 0;       ///< without memory: their light is missing
   std::uint32_t surplus_beams = 0;       ///< beyond segment_beams: their light is missing
-  std::uint32_t surface_photons = 0;     ///< of merges on surfaces
-  std::uint32_t volume_photons = 0;      ///< of merges at points in media
+  std::uint32_t surface_photons = 0;     ///< of merges on surfaces, without those left out as dense
+  std::uint32_t volume_photons = 0;      ///< of merges at points in media, likewise
   std::uint32_t beam_point_photons = 0;  ///< of merges along camera beams
   std::uint32_t beam_pieces = 0;         ///< of all beams
   merge_radii radii;                     ///< of the iteration

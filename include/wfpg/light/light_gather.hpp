@@ -21,14 +21,15 @@
 #include <wfpg/light/photon_map.hpp>
 
 #include <cstdint>
+#include <type_traits>
 
 namespace wfpg {
 
 /// How a photon counts where it merges with a camera path.
 struct photon_merge {
-  /// Factor of the photon's flux: the kernel over the number of light paths, and over the sine
-  /// where beams merge. Unit: scene units to the power of -2 on surfaces and along camera beams, -3 at points
-  /// in media, and -1 where beams merge.
+  /// Factor of the photon's flux: the kernel over the number of light paths, and over the sine where beams
+  /// merge. Of photons that do not carry it, also the number that they count for. Unit: scene units to the
+  /// power of -2 on surfaces and along camera beams, -3 at points in media, and -1 where beams merge.
   float scale = 0.0f;
   float t_camera = 0.0f;    ///< where it is on the camera beam, scene units from its origin; 0 at points
   float t_light = 0.0f;     ///< where it is on the photon beam; 0 for points
@@ -37,6 +38,10 @@ struct photon_merge {
 };
 
 namespace detail {
+
+/// Whether a photon takes the number that it counts for when it is made. If not, merges look it up.
+template <class Vertex, class Photon>
+inline constexpr bool carries_count = std::is_constructible_v<Photon, const Vertex&, float>;
 
 /// A photon map, and its photons in the order of its places.
 template <class Photon>
@@ -103,12 +108,13 @@ class light_gather_view {
   template <class E, class V, class P, class B>
   friend class bidirectional;
 
-  /// Merges at a point: calls f for each photon within the radius.
-  /// All count alike.
+  /// Merges at a point: calls f for each photon within the radius. The kernel is constant.
+  /// Most photons carry what they count for.
   template <class F>
   WFPG_HD static void merge_at(const detail::placed_photons<Photon>& near, vec3 p, const F& f) {
     near.map.for_each_place(p, [&](std::uint32_t place) {
-      f(near.photons[place], photon_merge{near.scale, 0.0f, 0.0f, 1.0f, near.map.index(place)});
+      const float count = detail::carries_count<Vertex, Photon> ? 1.0f : near.map.weight(place);
+      f(near.photons[place], photon_merge{near.scale * count, 0.0f, 0.0f, 1.0f, near.map.index(place)});
     });
   }
 

@@ -11,13 +11,18 @@
 // the tree's order, so that a leaf's photons are next to each other. What a photon carries stays the host's,
 // by index. A host that merges much copies it into the order of places, which neighbours share a leaf in.
 //
+// Where photons are dense, a map can leave most of them out. Each that stays then counts for several: means
+// are the same, and queries save more time than they add noise.
+//
 // Sources: Moonen & Jalba 2023, "Efficient Hardware Acceleration of Robust Volumetric Light Transport
 // Simulation", section 5, which queries boxes of spheres too. The tree is that of Karras 2012, "Maximizing
-// Parallelism in the Construction of BVHs, Octrees, and k-d Trees".
+// Parallelism in the Construction of BVHs, Octrees, and k-d Trees". Suykens & Willems 2000, "Density Control
+// for Photon Maps", leave photons out too; here, roulette decides.
 // Cost: a build is that of the tree. A query tests about twice as many photons as it finds. Clusters cost no
 // more than photons that are spread evenly. Queries first find up to 32 photons and then call f for them, so
 // that a warp's lanes call it together.
-// Memory: 12 bytes a photon for positions, and about 11 of the tree.
+// Memory: 12 bytes a photon for positions, about 11 of the tree, and 4 for weights where photons are left
+// out.
 #pragma once
 
 #include <wfpg/base/error.hpp>
@@ -25,6 +30,7 @@
 #include <wfpg/exec/buffer.hpp>
 #include <wfpg/host/geometry.hpp>
 #include <wfpg/light/box_tree.hpp>
+#include <wfpg/light/detail/photon_map_kernels.hpp>
 #include <wfpg/light/photon_estimators.hpp>
 
 #include <cstddef>
@@ -32,38 +38,27 @@
 
 namespace wfpg {
 
-namespace detail {
-
-/// Returns the box around each photon's sphere.
-struct photon_boxes {
-  array_view<const vec3> positions;
-  float radius;
-  WFPG_HD bounds3 operator()(std::size_t i) const { return {positions[i] - radius, positions[i] + radius}; }
+/// Which photons a map keeps where they are dense. Each photon is kept with a probability, and counts for one
+/// over it: photon_map_view::weight(), of its place. Hosts find photons of such maps by place.
+struct photon_thinning {
+  /// About how many photons are kept of those in a cell, at least 1. A cell is a cube whose faces have the
+  /// area of a merge's disc. As many as there are photons, or more, keep all.
+  std::uint32_t cell_photons = ~0u;
+  std::uint64_t seed = 0;  ///< of what is kept: another one for each iteration
 };
 
-/// Copies positions into the tree's order.
-struct order_photons {
-  box_tree_view tree;
-  array_view<const vec3> positions;
-  vec3* ordered;
-  WFPG_HD void operator()(std::size_t place) const {
-    ordered[place] = positions[tree.index(static_cast<std::uint32_t>(place))];
-  }
-};
-
-}  // namespace detail
-
-/// A photon map as kernels see it. Trivially copyable, 40 bytes. Valid until its owner is built again or
+/// A photon map as kernels see it. Trivially copyable, 48 bytes. Valid until its owner is built again or
 /// destroyed.
 class photon_map_view {
  public:
   /// A map without photons.
   photon_map_view() = default;
-  /// For photon_map. Not for hosts. `positions`: in the tree's order, as many as it has places.
-  photon_map_view(const box_tree_view& tree, const vec3* positions, float radius)
-      : tree_(tree), positions_(positions), radius_(radius) {}
+  /// For photon_map. Not for hosts. `positions`, `weights`: in the tree's order, as many as it has places.
+  /// Null weights are 1.
+  photon_map_view(const box_tree_view& tree, const vec3* positions, const float* weights, float radius)
+      : tree_(tree), positions_(positions), weights_(weights), radius_(radius) {}
 
-  /// Returns the number of photons, without skipped ones.
+  /// Returns the number of photons, without those that were left out.
   WFPG_HD std::uint32_t size() const { return tree_.size(); }
   /// Returns the radius of the last build, scene units. 0 where there was none.
   WFPG_HD float radius() const { return radius_; }
@@ -71,6 +66,9 @@ class photon_map_view {
   /// Returns the index of the photon at a place in [0, size()). Each photon that is not skipped has one
   /// place, until the next build.
   WFPG_HD std::uint32_t index(std::uint32_t place) const { return tree_.index(place); }
+  /// Returns how many photons the one at a place counts for, at least 1: a factor of what it carries. More
+  /// than 1 where photons are dense, and the map has left some out by photon_thinning.
+  WFPG_HD float weight(std::uint32_t place) const { return weights_ ? weights_[place] : 1.0f; }
 
   /// Calls f(index) for each photon whose distance from `p` is at most the radius, once each. The order
   /// depends on the photons alone. Distances are rounded as floats. A point that is not finite has no photon.
@@ -114,6 +112,7 @@ class photon_map_view {
  private:
   box_tree_view tree_;
   const vec3* positions_ = nullptr;  // by place
+  const float* weights_ = nullptr;   // likewise
   float radius_ = 0.0f;
 };
 
@@ -127,38 +126,66 @@ class photon_map {
   /// Builds the map of the photons at `positions`, in the policy's memory, which are not read later. Photons
   /// are skipped whose positions are not finite, or whose spheres reach beyond largest_coordinate.
   ///
-  /// Memory of the map before is used again if it suffices. Other memory is as box_tree::build() says.
+  /// Memory of the map before is used again if it suffices. Other memory is as box_tree::build() says, and 4
+  /// to 8 bytes a photon for `thinning`.
   ///
   /// Throws out_of_memory, after which the map has no photons. Throws std::invalid_argument for a radius that
-  /// is not in [least_merge_radius, largest_coordinate], and for 2^28 photons or more.
-  void build(const Exec& exec, array_view<const vec3> positions, float radius) {
+  /// is not in [least_merge_radius, largest_coordinate], for no photons a cell, and for 2^28 photons or more.
+  void build(const Exec& exec, array_view<const vec3> positions, float radius,
+             const photon_thinning& thinning = {}) {
     require(is_finite(radius) && radius >= least_merge_radius && radius <= largest_coordinate, "radius",
             radius, "in [1e-15, 1e15]");
+    require(thinning.cell_photons > 0, "photon_thinning.cell_photons", thinning.cell_photons, "at least 1");
     radius_ = 0.0f;
+    thins_ = false;
+    const bool thins = positions.size() > thinning.cell_photons;
+    const buffer<std::uint32_t, Exec> counts(exec, thins ? counters_for(positions.size()) : 0);
+    detail::photon_cells cells;
+    if (thins) {
+      constexpr float root_of_pi = 1.77245385f;
+      cells = {counts.data(), static_cast<std::uint32_t>(counts.size() - 1), 1.0f / (root_of_pi * radius),
+               thinning.cell_photons, thinning.seed};
+      exec.fill_bytes(counts.data(), 0, counts.bytes());
+      exec.for_each(positions.size(), detail::count_cell_photons{positions, cells, counts.data()});
+    }
     // The tree's margins, 1/1000 of the radius here, are larger than what rounding adds to a distance.
-    tree_.build(exec, positions.size(), detail::photon_boxes{positions, radius}, leaf_photons);
+    tree_.build(exec, positions.size(), detail::photon_boxes{positions, radius, cells}, leaf_photons);
     const box_tree_view tree = tree_.view();
     if (positions_.size() < tree.size()) positions_ = buffer<vec3, Exec>(exec, tree.size());
-    exec.for_each(tree.size(), detail::order_photons{tree, positions, positions_.data()});
+    if (thins && weights_.size() < tree.size()) weights_ = buffer<float, Exec>(exec, tree.size());
+    exec.for_each(tree.size(),
+                  detail::order_photons{tree, positions, cells, positions_.data(), weights_.data()});
     radius_ = radius;
+    thins_ = thins;
   }
 
   /// Returns the map for kernels. O(1).
   photon_map_view view() const {
-    return radius_ > 0.0f ? photon_map_view(tree_.view(), positions_.data(), radius_) : photon_map_view();
+    if (!(radius_ > 0.0f)) return {};
+    return {tree_.view(), positions_.data(), thins_ ? weights_.data() : nullptr, radius_};
   }
-  /// Returns how many photons the last build left out. Their indices are not found, and others keep theirs.
+  /// Returns how many photons the last build left out, by photon_thinning too. Their indices are not found,
+  /// and others keep theirs.
   std::uint32_t skipped() const { return tree_.skipped(); }
   /// Returns the bytes held: those of the largest map so far.
-  std::size_t bytes() const { return tree_.bytes() + positions_.bytes(); }
+  std::size_t bytes() const { return tree_.bytes() + positions_.bytes() + weights_.bytes(); }
 
  private:
   // Fewer take more memory, and are not faster: nodes cost as much as the photons that they spare.
   static constexpr std::uint32_t leaf_photons = 7;
 
+  /// The number of counters for n photons. More cells than that have few photons each, and may share them.
+  static std::size_t counters_for(std::size_t n) {
+    std::size_t counters = 1;
+    while (counters < n) counters *= 2;
+    return counters;
+  }
+
   box_tree<Exec> tree_;
   buffer<vec3, Exec> positions_;  // by place
+  buffer<float, Exec> weights_;   // likewise, where the map thins_
   float radius_ = 0.0f;           // 0: not built
+  bool thins_ = false;
 };
 
 }  // namespace wfpg

@@ -49,6 +49,7 @@ void bidirectional<Exec, Vertex, Photon, Beam>::begin_iteration(std::uint32_t it
   require(iteration > 0, "iteration", iteration, "at least 1");
   require(!options_.merges() || (scene_radius > 0.0f && scene_radius <= 1.0e9f), "scene_radius", scene_radius,
           "above 0, at most 1e9");
+  iteration_ = iteration;
   radii_ = radii_of(options_, iteration, scene_radius);
   techniques_ = counts_of(radii_);
   is_built_ = false;
@@ -64,12 +65,16 @@ void bidirectional<Exec, Vertex, Photon, Beam>::build() {
   store_beams();
   const light_vertices_view<Vertex> stored = vertices_.view();
   const std::uint32_t vertices = options_.reads_vertices() ? vertices_.size(exec_) : 0;
-  const auto build = [&](placed_map& map, bool in_media, std::size_t paths, float radius) {
-    map.build(exec_, positions(vertices, in_media, paths), radius, stored);
+  const auto build = [&](placed_map& map, bool in_media, std::size_t paths, float radius,
+                         const photon_thinning& thinning) {
+    map.build(exec_, positions(vertices, in_media, paths), radius, thinning, stored);
   };
-  if (options_.surface_points) build(on_surfaces_, false, options_.paths, radii_.surface);
-  if (options_.volume_points) build(in_media_, true, options_.paths, radii_.volume);
-  if (options_.beam_points) build(for_beams_, true, options_.count_beam_point_paths(), radii_.beam_points);
+  const photon_thinning dense{options_.dense_photons, iteration_};
+  if (options_.surface_points) build(on_surfaces_, false, options_.paths, radii_.surface, dense);
+  if (options_.volume_points) build(in_media_, true, options_.paths, radii_.volume, dense);
+  // These are few already.
+  if (options_.beam_points)
+    build(for_beams_, true, options_.count_beam_point_paths(), radii_.beam_points, {});
   if (beam_paths() > 0) build_beams();
   is_built_ = true;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <wfpg/base/types.hpp>
+#include <wfpg/light/light_gather.hpp>
 #include <wfpg/light/light_recorder.hpp>
 #include <wfpg/light/light_vertices.hpp>
 #include <wfpg/light/photon_estimators.hpp>
@@ -41,7 +42,8 @@ constexpr bool require_light_types() {
                 "Vertex, Photon and Beam: need a default constructor");
   static_assert(std::is_copy_assignable_v<Photon> && std::is_copy_assignable_v<Beam>,
                 "Photon and Beam: need to be assignable");
-  static_assert(std::is_constructible_v<Photon, const Vertex&> && std::is_trivially_copyable_v<Photon>,
+  static_assert((std::is_constructible_v<Photon, const Vertex&> ||
+                 carries_count<Vertex, Photon>)&&std::is_trivially_copyable_v<Photon>,
                 "Photon: needs a constructor from a Vertex, and to be trivially copyable");
   static_assert(is_photon_beam<Beam>::value,
                 "Beam: needs a member path_beam beam, and to be trivially copyable");
@@ -72,7 +74,12 @@ struct place_photons {
   photon_map_view map;
   array_view<Photon> photons;
   WFPG_HD void operator()(std::size_t place) const {
-    photons[place] = Photon(vertices[map.index(static_cast<std::uint32_t>(place))]);
+    const auto k = static_cast<std::uint32_t>(place);
+    const Vertex& vertex = vertices[map.index(k)];
+    if constexpr (carries_count<Vertex, Photon>)
+      photons[place] = Photon(vertex, map.weight(k));
+    else
+      photons[place] = Photon(vertex);
   }
 };
 
