@@ -379,12 +379,12 @@ WFPG_TEST_CASE("a tree of 300,000 boxes has each once, and points find those tha
   for (std::size_t k = 0; k < indices.size(); ++k) wrong += indices[k] != 3 * (k / 2) + 1 + k % 2;
   CHECK(wrong == 0);
 
+  const auto chosen = [](std::size_t i) { return 15000 * i + 1 + i % 2; };
   std::vector<vec3> centres;
-  for (std::size_t i = 0; i < 20; ++i) centres.push_back(boxes[15000 * i + 1 + i % 2].centre());
+  for (std::size_t i = 0; i < 20; ++i) centres.push_back(boxes[chosen(i)].centre());
   const counts found = count(exec, tree, boxes.size(), centres);
   std::size_t missed = 0, all = 0;
-  for (std::size_t i = 0; i < centres.size(); ++i)
-    missed += found[i * boxes.size() + 15000 * i + 1 + i % 2] != 1;
+  for (std::size_t i = 0; i < centres.size(); ++i) missed += found[i * boxes.size() + chosen(i)] != 1;
   for (const std::uint8_t times : found) all += times;
   CHECK(missed == 0);
   CHECK(all < 60);

@@ -200,10 +200,7 @@ const std::vector<requirement>& requirements() {
        [](options o) { return is_bidirectional(o.method) && techniques_of(o).merges_in_media(); }},
       {{"--dense-photons"},
        "--method vcm or upbp, or surf or pp3d among --techniques",
-       [](options o) {
-         const technique_set found = techniques_of(o);
-         return is_bidirectional(o.method) && (found.has(technique::surf) || found.has(technique::pp3d));
-       }},
+       [](options o) { return is_bidirectional(o.method) && techniques_of(o).merges_at_points(); }},
       {{"--beam-paths"}, "--method upbp, or bb1d among --techniques", uses<technique::bb1d>},
       {{"--beam-point-paths"}, "--method upbp, or pb2d among --techniques", uses<technique::pb2d>},
       {{"--guided-depths"},
@@ -305,8 +302,8 @@ void add_bidirectional_options(CLI::App& app, render_options& options) {
       ->transform(positive_number(1.0));
   app.add_option(
          "--dense-photons", options.light.dense_photons,
-         with_default("photons that a merge at a point finds at most, about; of denser ones, some count "
-                      "for all",
+         with_default("about how many photons a merge at a point finds at most; of more, some count for "
+                      "all",
                       options.light.dense_photons))
       ->transform(whole_number(1, 1 << 30));
   app.add_option("--beam-paths", options.light.beam_paths,

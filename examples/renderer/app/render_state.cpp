@@ -76,7 +76,7 @@ named_values values_of(const render_options& o) {
     if (techniques.has(technique::surf))
       values.emplace_back("--radius", std::to_string(o.light.surface_radius));
     if (techniques.merges()) values.emplace_back("--radius-alpha", std::to_string(o.light.radius_alpha));
-    if (techniques.has(technique::surf) || techniques.has(technique::pp3d))
+    if (techniques.merges_at_points())
       values.emplace_back("--dense-photons", std::to_string(o.light.dense_photons));
     if (techniques.merges_in_media())
       values.emplace_back("--volume-radius", std::to_string(o.light.volume_radius));

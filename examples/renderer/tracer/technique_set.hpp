@@ -43,6 +43,7 @@ class technique_set {
   constexpr bool merges_in_media() const {
     return has(technique::pp3d) || has(technique::pb2d) || has(technique::bb1d);
   }
+  constexpr bool merges_at_points() const { return has(technique::surf) || has(technique::pp3d); }
   constexpr bool needs_light_paths() const {
     return has(technique::connect) || has(technique::splat) || merges();
   }

@@ -137,7 +137,6 @@ class photon_map {
             radius, "in [1e-15, 1e15]");
     require(thinning.cell_photons > 0, "photon_thinning.cell_photons", thinning.cell_photons, "at least 1");
     radius_ = 0.0f;
-    thins_ = false;
     const bool thins = positions.size() > thinning.cell_photons;
     const buffer<std::uint32_t, Exec> counts(exec, thins ? counters_for(positions.size()) : 0);
     detail::photon_cells cells;
@@ -152,17 +151,17 @@ class photon_map {
     tree_.build(exec, positions.size(), detail::photon_boxes{positions, radius, cells}, leaf_photons);
     const box_tree_view tree = tree_.view();
     if (positions_.size() < tree.size()) positions_ = buffer<vec3, Exec>(exec, tree.size());
-    if (thins && weights_.size() < tree.size()) weights_ = buffer<float, Exec>(exec, tree.size());
+    if (!thins || weights_.size() < tree.size())
+      weights_ = buffer<float, Exec>(exec, thins ? tree.size() : 0);
     exec.for_each(tree.size(),
                   detail::order_photons{tree, positions, cells, positions_.data(), weights_.data()});
     radius_ = radius;
-    thins_ = thins;
   }
 
   /// Returns the map for kernels. O(1).
   photon_map_view view() const {
     if (!(radius_ > 0.0f)) return {};
-    return {tree_.view(), positions_.data(), thins_ ? weights_.data() : nullptr, radius_};
+    return {tree_.view(), positions_.data(), weights_.data(), radius_};
   }
   /// Returns how many photons the last build left out, by photon_thinning too. Their indices are not found,
   /// and others keep theirs.
@@ -183,9 +182,8 @@ class photon_map {
 
   box_tree<Exec> tree_;
   buffer<vec3, Exec> positions_;  // by place
-  buffer<float, Exec> weights_;   // likewise, where the map thins_
+  buffer<float, Exec> weights_;   // likewise; none where all are kept
   float radius_ = 0.0f;           // 0: not built
-  bool thins_ = false;
 };
 
 }  // namespace wfpg

@@ -42,8 +42,8 @@ constexpr bool require_light_types() {
                 "Vertex, Photon and Beam: need a default constructor");
   static_assert(std::is_copy_assignable_v<Photon> && std::is_copy_assignable_v<Beam>,
                 "Photon and Beam: need to be assignable");
-  static_assert((std::is_constructible_v<Photon, const Vertex&> ||
-                 carries_count<Vertex, Photon>)&&std::is_trivially_copyable_v<Photon>,
+  constexpr bool is_made = std::is_constructible_v<Photon, const Vertex&> || carries_count<Vertex, Photon>;
+  static_assert(is_made && std::is_trivially_copyable_v<Photon>,
                 "Photon: needs a constructor from a Vertex, and to be trivially copyable");
   static_assert(is_photon_beam<Beam>::value,
                 "Beam: needs a member path_beam beam, and to be trivially copyable");

@@ -26,9 +26,8 @@ struct photon_cells {
     // Adding 0 makes one cell of those at 0 and -0.
     return static_cast<std::uint32_t>(hash_of(0, glm::floor(p * cells_a_unit) + 0.0f)) & last;
   }
-  /// 1 over the probability that a photon is kept.
+  /// 1 over the probability that a photon is kept. Precondition: not all are.
   WFPG_HD float weight(vec3 p) const {
-    if (counts == nullptr) return 1.0f;
     return max(1.0f, static_cast<float>(counts[counter(p)]) / static_cast<float>(cell_photons));
   }
   WFPG_HD bool keeps(std::size_t index, vec3 p) const {
