@@ -50,7 +50,8 @@ double distance_in_errors(const sample_mean& a, const sample_mean& b, double fac
   return std::fabs(a.mean() - factor * b.mean()) / std::hypot(a.error(), factor * b.error());
 }
 
-WFPG_TEST_CASE("kernel host: fog and coats leave no bias, and no call is dropped", "[kernel_host]") {
+WFPG_TEST_CASE("kernel host: fog and coats leave no bias, and no call is dropped",
+               "[kernel_host][thorough]") {
   const room in{0.2f, true};
   const sample_mean plain = render<Exec>(in, 400, false), guided = render<Exec>(in, 200, true),
                     faulty = render<Exec>(in, 200, true, host_fault::forgets_guide);

@@ -98,7 +98,7 @@ TEST_CASE("paths from both ends have the mean of path tracing", "[renderer][bidi
 }
 
 TEST_CASE("each technique that can find all light has the mean of path tracing",
-          "[renderer][bidirectional][unbiased]") {
+          "[renderer][bidirectional][unbiased][thorough]") {
   check_precisely(with("", "hits"));
   check_precisely(with("", "splat+hits"));
   check_precisely(with("", "hits+nee+connect"));

@@ -79,7 +79,8 @@ sample_mean radiance_of_furnace(const measured_set& set, bool solids, int seeds)
 
 }  // namespace
 
-TEST_CASE("both ends: light that fog scatters once is an integral", "[renderer][bidirectional][media]") {
+TEST_CASE("both ends: light that fog scatters once is an integral",
+          "[renderer][bidirectional][media][thorough]") {
   // Light paths alone have no variance where fog is near the camera, so there is none.
   const scene fog = make_builtin_scene("fog-lamp");
   const vec3 eye(0.0f, 0.4f, 3.0f);
@@ -118,7 +119,7 @@ TEST_CASE("both ends: light that fog scatters once is an integral", "[renderer][
 }
 
 TEST_CASE("both ends: merges in media blur by their radius, with a bias that falls as its square",
-          "[renderer][bidirectional][media]") {
+          "[renderer][bidirectional][media][thorough]") {
   scene s = make_builtin_scene("fog-lamp");
   look_along(s, {1.0f, 0.0f, 1.5f}, {0.0f, 0.0f, -1.0f});
   s.fog = {vec3(0.2f), vec3(0.8f), -0.4f};
@@ -246,7 +247,7 @@ TEST_CASE("both ends: a half-space reflects what Chandrasekhar's H functions say
 }
 
 TEST_CASE("both ends: an emitting box of matter that absorbs nothing has one radiance",
-          "[renderer][bidirectional][media]") {
+          "[renderer][bidirectional][media][thorough]") {
   for (const measured_set& set : all_sets) {
     // Sets that are dear among solids have another case there.
     const std::string name = set.techniques;

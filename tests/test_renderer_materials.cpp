@@ -132,7 +132,7 @@ TEST_CASE("materials pass the library's checks of BSDFs", "[renderer][bsdf]") {
   check("smooth coat over black", make(material_kind::smooth_plastic, vec3(0.0f)));
 }
 
-TEST_CASE("all lobes together pass the library's checks of BSDFs", "[renderer][bsdf]") {
+TEST_CASE("all lobes together pass the library's checks of BSDFs", "[renderer][bsdf][thorough]") {
   for (auto [name, f] : layered_bsdfs()) {
     check(name, f);
     f.normal = glm::normalize(vec3(0.4f, 0.1f, 1.0f));

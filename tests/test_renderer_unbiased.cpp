@@ -23,7 +23,7 @@ constexpr const char* map_scene = "cornell-box with a map";
 
 }  // namespace
 
-TEST_CASE("pictures guided by kept fields have the mean of unguided ones", "[renderer][unbiased]") {
+TEST_CASE("pictures guided by kept fields have the mean of unguided ones", "[renderer][unbiased][thorough]") {
   for (const char* scene : {"cornell-box", "cornell-enclosed", "ajar", "thin-wall", "furnace"})
     for (const bool nee : {false, true}) check_rendering({scene, nee});
   check_rendering({"cornell-wall", true});
@@ -39,7 +39,8 @@ TEST_CASE("pictures guided by kept fields have the mean of unguided ones", "[ren
   check_rendering({"thin-wall", true, wfpg_method, fields::kept, guiding::plain});
 }
 
-TEST_CASE("guided pictures have the mean of unguided ones after warm-up too", "[renderer][unbiased]") {
+TEST_CASE("guided pictures have the mean of unguided ones after warm-up too",
+          "[renderer][unbiased][thorough]") {
   for (const sampling_method method : {wfpg_method, product_method, sampling_method::sarsa})
     for (const bool nee : {false, true}) {
       rendering what{"cornell-enclosed", nee, method};
@@ -49,7 +50,8 @@ TEST_CASE("guided pictures have the mean of unguided ones after warm-up too", "[
     }
 }
 
-TEST_CASE("pictures guided by transient fields have the mean of unguided ones", "[renderer][unbiased]") {
+TEST_CASE("pictures guided by transient fields have the mean of unguided ones",
+          "[renderer][unbiased][thorough]") {
   for (const bool nee : {false, true}) {
     check_rendering({"cornell-enclosed", nee, wfpg_method, fields::transient, guiding::oriented});
     check_rendering({"thin-wall", nee, wfpg_method, fields::transient, guiding::plain});
@@ -61,7 +63,7 @@ TEST_CASE("pictures guided by transient fields have the mean of unguided ones", 
 }
 
 TEST_CASE("pictures guided by fields of octree cones have the mean of unguided ones",
-          "[renderer][unbiased]") {
+          "[renderer][unbiased][thorough]") {
   for (const render::cones through : {render::cones::march, render::cones::trace})
     for (const fields lifetime : {fields::kept, fields::transient}) {
       rendering what{"thin-wall", true, wfpg_method, lifetime};
