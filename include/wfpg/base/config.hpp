@@ -73,6 +73,15 @@ WFPG_HD inline std::uint32_t popcount(std::uint64_t bits) {
 #endif
 }
 
+/// Returns the number of bits above the highest one that is set, in [0, 64]. 64 where none is.
+WFPG_HD inline int leading_zeros(std::uint64_t bits) {
+#if defined(__CUDA_ARCH__)
+  return __clzll(static_cast<long long>(bits));
+#else
+  return bits == 0 ? 64 : __builtin_clzll(bits);
+#endif
+}
+
 /// Asks the CPU for the cache line of `address`, which the thread writes soon.
 /// Any address is allowed, since a prefetch never faults.
 /// Does nothing on a device, where other threads hide the latency.

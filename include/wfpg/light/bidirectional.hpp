@@ -23,7 +23,7 @@
 //
 // Memory: sizeof(Vertex) + 8 bytes a vertex, 12 more where photons are merged, and for each technique of
 // points sizeof(Photon) + 27 a photon. A beam takes sizeof(Beam) + 40 bytes, and 46 for each of its 16
-// pieces. While a tree is built, it takes 133 bytes a photon or piece. A path takes 8 bytes.
+// pieces. While a tree is built, it takes 164 bytes a photon or piece. A path takes 8 bytes.
 #pragma once
 
 #include <wfpg/base/types.hpp>

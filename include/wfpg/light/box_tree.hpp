@@ -27,7 +27,7 @@
 namespace wfpg {
 
 namespace detail {
-struct box_splitter;
+struct binary_node;
 }  // namespace detail
 
 /// A tree as kernels see it. Trivially copyable, 24 bytes. Valid until its owner is built again or destroyed.
@@ -154,7 +154,7 @@ class box_tree {
   /// `leaf_boxes`: most boxes of a leaf, in [1, 7], which queries find together. More take less memory: 34
   /// bytes a box with 1, 15 with 4, 11 with 7.
   ///
-  /// Memory of the tree before is used again if it suffices. While it builds, a tree takes 133 bytes a box of
+  /// Memory of the tree before is used again if it suffices. While it builds, a tree takes 164 bytes a box of
   /// the policy's memory, which a retaining_resource keeps for the next build. Waits for the policy's work.
   ///
   /// Throws out_of_memory, after which the tree has no boxes. Throws std::invalid_argument for 2^28 boxes or
@@ -178,8 +178,10 @@ class box_tree {
   std::uint32_t take_valid(const Exec& exec, array_view<const bounds3> boxes);
   /// Sorts the order, of `used` indices, by keys of their boxes.
   void sort(const Exec& exec, array_view<const bounds3> boxes, std::uint32_t used, std::uint64_t* keys);
-  /// Returns false if there are more levels than the stack allows.
-  bool build_nodes(const Exec& exec, const detail::box_splitter& splitter, std::uint32_t leaf_boxes);
+  /// Makes nodes from sorted boxes and their binary tree. `balances`: by the numbers of boxes, not by
+  /// surfaces. Returns false if there are more levels than the stack allows.
+  bool build_nodes(const Exec& exec, const buffer<bounds3, Exec>& boxes, const detail::binary_node* binary,
+                   bool balances, std::uint32_t leaf_boxes);
 
   buffer<detail::box_node, Exec> nodes_;
   buffer<std::uint32_t, Exec> order_;  // of places

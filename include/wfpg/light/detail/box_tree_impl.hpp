@@ -2,6 +2,7 @@
 #pragma once
 
 #include <wfpg/base/morton.hpp>
+#include <wfpg/exec/support/atomic.hpp>
 #include <wfpg/exec/support/thrust.hpp>
 #include <wfpg/host/geometry.hpp>
 #include <wfpg/light/box_tree.hpp>
@@ -90,10 +91,7 @@ struct range_boxes {
   static constexpr std::uint32_t most_levels = 29;
   bounds3* levels[most_levels];
   std::uint32_t sizes[most_levels];
-  std::uint32_t level_count = 0;
 
-  /// The box around all of them.
-  WFPG_HD const bounds3& whole() const { return levels[level_count - 1][0]; }
   /// The box around boxes [first, end).
   WFPG_HD bounds3 box(std::uint32_t first, std::uint32_t end) const {
     const bounds_union join;
@@ -119,30 +117,79 @@ struct pair_boxes {
   }
 };
 
-/// Sorted boxes [first, end).
+/// A node of the binary tree: two boxes or more, or the root.
+struct alignas(16) binary_node {
+  bounds3 box;           ///< around its boxes
+  std::uint32_t other;   ///< its first or last box; the other one has the node's number
+  std::uint32_t second;  ///< the first box of its second part
+};
+
+/// Makes the nodes of the binary tree, each on its own [Karras 2012, section 4]. Boxes are split at the
+/// highest bit that differs between keys, or between places where keys are equal. Node 0 is the root.
+struct make_binary_nodes {
+  const std::uint64_t* keys;  ///< null: as if all were equal
+  range_boxes boxes;
+  binary_node* nodes;
+
+  WFPG_HD void operator()(std::size_t node) const {
+    // The node begins or ends at its own box, and goes on as long as boxes share more bits than those
+    // outside.
+    const auto here = static_cast<std::int32_t>(node);
+    const std::int32_t way = shared_bits(here, here + 1) > shared_bits(here, here - 1) ? 1 : -1;
+    const int outside = shared_bits(here, here - way);
+    std::int32_t beyond = 2;
+    while (shared_bits(here, here + beyond * way) > outside) beyond *= 2;
+    const std::int32_t other = last_sharing(here, way, beyond / 2, outside);
+    const std::int32_t first = min(here, other), last = max(here, other);
+    const std::int32_t before = last_sharing(first, 1, beyond / 2, shared_bits(first, last));
+    const auto begin = static_cast<std::uint32_t>(first), end = static_cast<std::uint32_t>(last) + 1;
+    nodes[node] = {boxes.box(begin, end), static_cast<std::uint32_t>(other),
+                   static_cast<std::uint32_t>(before) + 1};
+  }
+
+ private:
+  /// How many leading bits two boxes share. -1 where there is no second one.
+  WFPG_HD int shared_bits(std::int32_t i, std::int32_t j) const {
+    if (j < 0 || static_cast<std::uint32_t>(j) >= boxes.sizes[0]) return -1;
+    const std::uint64_t differ = keys ? keys[i] ^ keys[j] : 0;
+    return differ != 0 ? leading_zeros(differ) : 64 + leading_zeros(static_cast<std::uint64_t>(i ^ j));
+  }
+  /// The farthest box on the way that shares more than `bits` with box i. `step`: a power of two, and at
+  /// least half as far.
+  WFPG_HD std::int32_t last_sharing(std::int32_t i, std::int32_t way, std::int32_t step, int bits) const {
+    std::int32_t last = i;
+    for (; step > 0; step /= 2)
+      if (shared_bits(i, last + step * way) > bits) last += step * way;
+    return last;
+  }
+};
+
+/// Sorted boxes [first, end), and the node of them if they are more than one.
 struct box_range {
   std::uint32_t first = 0, end = 0;
+  std::uint32_t node = 0;
   WFPG_HD std::uint32_t size() const { return end - first; }
 };
 
-/// Splits ranges at the highest bit that differs between keys, or in the middle.
-struct box_splitter {
-  array_view<const std::uint64_t> keys;
-  range_boxes boxes;
-  bool balanced;  ///< always in the middle
-
-  /// The first box of the second part. Precondition: two or more boxes.
-  WFPG_HD std::uint32_t split(box_range range) const {
-    const std::uint64_t low = keys[range.first], high = keys[range.end - 1];
-    if (balanced || low == high) return range.first + range.size() / 2;
-    std::uint64_t changed = low ^ high;
-    while (changed & (changed - 1)) changed &= changed - 1;
-    std::uint32_t before = range.first, after = range.end - 1;
-    while (after - before > 1) {
-      const std::uint32_t middle = before + (after - before) / 2;
-      (keys[middle] & changed ? after : before) = middle;
-    }
-    return after;
+/// The sorted boxes and their binary tree.
+struct binary_tree {
+  const bounds3* boxes;
+  const binary_node* nodes;
+  WFPG_HD const bounds3& box(box_range range) const {
+    return range.size() == 1 ? boxes[range.first] : nodes[range.node].box;
+  }
+  WFPG_HD box_range range(std::uint32_t node) const {
+    const std::uint32_t other = nodes[node].other;
+    return {min(node, other), max(node, other) + 1, node};
+  }
+  /// The parts of a range. Each has the number of its box at the split.
+  WFPG_HD box_range first_part(box_range range) const {
+    const std::uint32_t second = nodes[range.node].second;
+    return {range.first, second, second - 1};
+  }
+  WFPG_HD box_range second_part(box_range range) const {
+    const std::uint32_t second = nodes[range.node].second;
+    return {second, range.end, second};
   }
 };
 
@@ -175,33 +222,42 @@ constexpr std::uint32_t uncounted_levels = 7;
 static_assert(box_stack::most_levels % uncounted_levels == 0,
               "whether there are too many levels must be known");
 
-/// Makes the nodes of one level from their ranges. Counts children that are nodes; they get their number
-/// later. Called for as many as there may be.
+/// Makes the nodes of one level from binary ones, and lists its children that are nodes for the next level.
+/// Called for as many as there may be. The list's order may differ each time. A node's number does not depend
+/// on it: in the order of binary nodes, once all are known.
 struct make_box_nodes {
-  box_splitter splitter;
+  binary_tree tree;
+  bool balances;  ///< splits the part of most boxes first, not the largest one
   std::uint32_t leaf_boxes;
-  const box_range* ranges;
-  const box_levels::level* level;
-  box_node* nodes;          ///< of all levels
-  box_range* child_ranges;  ///< four per node; empty for children that are not nodes
-  std::uint32_t* child_nodes;
+  box_levels::level* level;  ///< this one and the next
+  std::uint32_t* listed;     ///< binary nodes, level by level
+  box_node* nodes;           ///< as they are listed; children that are nodes have the binary node's number
+  std::uint32_t* is_node;    ///< by binary node
 
   WFPG_HD void operator()(std::size_t i) const {
-    child_nodes[i] = 0;
+    const std::uint32_t after = level->first + level->count;
+    if (i == 0) level[1].first = after;
     if (i >= level->count) return;
+    const std::size_t place = level->first + i;
+    is_node[listed[place]] = 1;
     parts made;
-    made.add(ranges[i], splitter.boxes);
+    made.add(tree.range(listed[place]), tree);
     while (made.count < box_node::width && expand(made)) {
     }
     box_node node = quantised(made);
-    for (int child = 0; child < box_node::width; ++child) {
-      const box_range range = child < made.count ? made.ranges[child] : box_range{};
+    std::uint32_t children = 0;
+    for (int child = 0; child < made.count; ++child) {
+      const box_range range = made.ranges[child];
       const bool is_leaf = range.size() <= leaf_boxes;
-      if (is_leaf && range.size() > 0) node.children[child] = box_child::leaf(range.first, range.size());
-      child_ranges[i * box_node::width + static_cast<std::size_t>(child)] = is_leaf ? box_range{} : range;
-      child_nodes[i] += is_leaf ? 0 : 1;
+      node.children[child] =
+          is_leaf ? box_child::leaf(range.first, range.size()) : box_child::node(range.node);
+      children += is_leaf ? 0 : 1;
     }
-    nodes[level->first + i] = node;
+    nodes[place] = node;
+    if (children == 0) return;
+    std::uint32_t next = after + atomic_add(&level[1].count, children);
+    for (int child = 0; child < made.count; ++child)
+      if (made.ranges[child].size() > leaf_boxes) listed[next++] = made.ranges[child].node;
   }
 
  private:
@@ -211,10 +267,11 @@ struct make_box_nodes {
     bounds3 boxes[box_node::width];
     int count = 0;
 
-    WFPG_HD void add(box_range range, const range_boxes& all) {
-      ranges[count] = range;
-      boxes[count++] = all.box(range.first, range.end);
+    WFPG_HD void set(int part, box_range range, const binary_tree& tree) {
+      ranges[part] = range;
+      boxes[part] = tree.box(range);
     }
+    WFPG_HD void add(box_range range, const binary_tree& tree) { set(count++, range, tree); }
   };
 
   /// Splits the largest part. False if none can be split.
@@ -223,29 +280,27 @@ struct make_box_nodes {
     float largest = -1.0f;
     for (int i = 0; i < made.count; ++i) {
       const std::uint32_t size = made.ranges[i].size();
-      const float importance = splitter.balanced ? static_cast<float>(size) : half_area(made.boxes[i]);
+      const float importance = balances ? static_cast<float>(size) : half_area(made.boxes[i]);
       if (size < 2 || importance <= largest) continue;
       chosen = i;
       largest = importance;
     }
     if (chosen < 0) return false;
     const box_range range = made.ranges[chosen];
-    const std::uint32_t at = splitter.split(range);
-    made.ranges[chosen] = {range.first, at};
-    made.boxes[chosen] = splitter.boxes.box(range.first, at);
-    made.add({at, range.end}, splitter.boxes);
+    made.set(chosen, tree.first_part(range), tree);
+    made.add(tree.second_part(range), tree);
     return true;
   }
 
   /// Adds a margin of an eighth of a step on every side.
   WFPG_HD box_node quantised(const parts& made) const {
     // Rays along an axis drift by 1e-18 of their length. Flat boxes are thick enough for it.
-    const float least_step = max(largest_of(splitter.boxes.whole()) * 0x1p-40f, 1e-30f);
-    bounds3 whole;
-    for (int i = 0; i < made.count; ++i) whole = bounds_union()(whole, made.boxes[i]);
+    const float least_step = max(largest_of(tree.nodes[0].box) * 0x1p-40f, 1e-30f);
+    bounds3 around;
+    for (int i = 0; i < made.count; ++i) around = bounds_union()(around, made.boxes[i]);
     box_node node;
     for (int axis = 0; axis < 3; ++axis) {
-      const float low = whole.lower[axis], high = whole.upper[axis];
+      const float low = around.lower[axis], high = around.upper[axis];
       const float magnitude = max(fabsf(low), fabsf(high));
       const float step = max((high - low) / 253.0f, max(magnitude * 0x1p-18f, least_step));
       node.step[axis] = step;
@@ -272,27 +327,18 @@ struct make_box_nodes {
   }
 };
 
-/// Numbers the children of a level's nodes, and sets the next level and its ranges.
-struct number_children {
-  const box_range* child_ranges;
-  const std::uint32_t* prefix;  ///< child nodes of the nodes up to this one
-  const box_levels::level* level;
-  box_levels::level* next_level;
-  box_node* nodes;  ///< of all levels
-  box_range* next_ranges;
+/// Copies listed nodes to where their numbers say.
+struct order_box_nodes {
+  const std::uint32_t* listed;
+  const box_node* nodes;
+  const std::uint32_t* numbers;  ///< by binary node, from 1 on
+  box_node* ordered;
 
   WFPG_HD void operator()(std::size_t i) const {
-    const box_levels::level here = *level;
-    const std::uint32_t after = here.first + here.count;
-    std::uint32_t next = i > 0 ? prefix[i - 1] : 0;
-    if (i + 1 == here.count) *next_level = {after, prefix[i]};
-    box_node& node = nodes[here.first + i];
-    for (int child = 0; child < box_node::width; ++child) {
-      const box_range range = child_ranges[i * box_node::width + static_cast<std::size_t>(child)];
-      if (range.size() == 0) continue;
-      node.children[child] = box_child::node(after + next);
-      next_ranges[next++] = range;
-    }
+    box_node node = nodes[i];
+    for (box_child& child : node.children)
+      if (!child.is_leaf()) child = box_child::node(numbers[child.index()] - 1);
+    ordered[numbers[listed[i]] - 1] = node;
   }
 };
 
@@ -301,20 +347,30 @@ constexpr std::size_t most_box_nodes(std::size_t n) {
   return n > 1 ? (2 * n - 1) / 3 : n;
 }
 
-/// Makes the levels of range_boxes above the first, which `boxes` begins with.
+/// Makes the levels of range_boxes: the first is given, and the others are written to `above`.
 template <class Exec>
-range_boxes pair_up(const Exec& exec, bounds3* boxes, std::uint32_t n) {
+range_boxes pair_up(const Exec& exec, const buffer<bounds3, Exec>& boxes, bounds3* above) {
   range_boxes ranges;
-  bounds3* level = boxes;
-  for (std::uint32_t size = n;; size = (size + 1) / 2) {
-    if (ranges.level_count > 0)
-      exec.for_each(size, pair_boxes{ranges.levels[ranges.level_count - 1],
-                                     ranges.sizes[ranges.level_count - 1], level});
-    ranges.levels[ranges.level_count] = level;
-    ranges.sizes[ranges.level_count++] = size;
-    level += size;
-    if (size == 1) return ranges;
+  ranges.levels[0] = boxes.data();
+  ranges.sizes[0] = static_cast<std::uint32_t>(boxes.size());
+  std::uint32_t top = 0;
+  for (; ranges.sizes[top] > 1; ++top) {
+    const std::uint32_t size = (ranges.sizes[top] + 1) / 2;
+    exec.for_each(size, pair_boxes{ranges.levels[top], ranges.sizes[top], above});
+    ranges.levels[top + 1] = above;
+    ranges.sizes[top + 1] = size;
+    above += size;
   }
+  return ranges;
+}
+
+/// Makes the binary tree's nodes. `keys`: sorted as the boxes are, or null to split at places alone.
+/// `scratch`: of the boxes' size and range_boxes::most_levels more.
+template <class Exec>
+void make_binary(const Exec& exec, const buffer<bounds3, Exec>& boxes, const std::uint64_t* keys,
+                 bounds3* scratch, binary_node* nodes) {
+  const range_boxes ranges = pair_up(exec, boxes, scratch);
+  exec.for_each(std::max<std::size_t>(boxes.size() - 1, 1), make_binary_nodes{keys, ranges, nodes});
 }
 
 }  // namespace detail
@@ -333,19 +389,21 @@ void box_tree<Exec>::build(const Exec& exec, std::size_t n, const Boxes& boxes, 
   // Empty until all memory is there.
   node_count_ = size_ = skipped_ = 0;
   if (n == 0) return;
-  buffer<bounds3, Exec> given(exec, n);
+  const buffer<bounds3, Exec> given(exec, n + detail::range_boxes::most_levels);
   exec.for_each(n, detail::write_box<Boxes>{boxes, given.data()});
-  const std::uint32_t used = take_valid(exec, given.view());
+  const array_view<const bounds3> written(given.data(), n);
+  const std::uint32_t used = take_valid(exec, written);
   if (used > 0) {
-    const buffer<std::uint64_t, Exec> keys(exec, used);
-    sort(exec, given.view(), used, keys.data());
-    const buffer<bounds3, Exec> ordered(exec, 2 * std::size_t(used) + detail::range_boxes::most_levels);
+    buffer<std::uint64_t, Exec> keys(exec, used);
+    sort(exec, written, used, keys.data());
+    const buffer<bounds3, Exec> ordered(exec, used);
     exec.for_each(used, detail::order_boxes{given.data(), order_.data(), ordered.data()});
-    given = buffer<bounds3, Exec>();
-    detail::box_splitter splitter{keys.view(), detail::pair_up(exec, ordered.data(), used), false};
-    if (!build_nodes(exec, splitter, leaf_boxes)) {
-      splitter.balanced = true;
-      build_nodes(exec, splitter, leaf_boxes);
+    const buffer<detail::binary_node, Exec> binary(exec, std::max(used - 1, 1u));
+    detail::make_binary(exec, ordered, keys.data(), given.data(), binary.data());
+    keys = buffer<std::uint64_t, Exec>();
+    if (!build_nodes(exec, ordered, binary.data(), false, leaf_boxes)) {
+      detail::make_binary(exec, ordered, nullptr, given.data(), binary.data());
+      build_nodes(exec, ordered, binary.data(), true, leaf_boxes);
     }
   }
   size_ = used;
@@ -372,14 +430,17 @@ void box_tree<Exec>::sort(const Exec& exec, array_view<const bounds3> boxes, std
 }
 
 template <class Exec>
-bool box_tree<Exec>::build_nodes(const Exec& exec, const detail::box_splitter& splitter,
-                                 std::uint32_t leaf_boxes) {
+bool box_tree<Exec>::build_nodes(const Exec& exec, const buffer<bounds3, Exec>& boxes,
+                                 const detail::binary_node* binary, bool balances, std::uint32_t leaf_boxes) {
   using detail::box_levels;
-  const auto n = static_cast<std::uint32_t>(splitter.keys.size());
+  const auto n = static_cast<std::uint32_t>(boxes.size());
+  const detail::binary_tree tree{boxes.data(), binary};
   const buffer<detail::box_node, Exec> nodes(exec, detail::most_box_nodes(n));
+  const buffer<std::uint32_t, Exec> listed(exec, nodes.size()), numbers(exec, n);
+  exec.fill_bytes(listed.data(), 0, sizeof(std::uint32_t));  // the root
+  exec.fill_bytes(numbers.data(), 0, numbers.bytes());
   box_levels known = box_levels::with_root();
   const buffer<box_levels, Exec> levels(exec, {known});
-  buffer<detail::box_range, Exec> ranges(exec, {detail::box_range{0, n}});
   // Below the first, a node has more boxes than a leaf.
   const std::size_t most_in_level = n / (leaf_boxes + 1);
   std::size_t most = 1;  // nodes of the level
@@ -390,22 +451,14 @@ bool box_tree<Exec>::build_nodes(const Exec& exec, const detail::box_splitter& s
     }
     if (most == 0) break;
     if (level == detail::box_stack::most_levels) return false;
-    const box_levels::level* here = levels.data()->levels + level;
-    const buffer<detail::box_range, Exec> child_ranges(exec, most * detail::box_node::width);
-    const buffer<std::uint32_t, Exec> prefix(exec, most);
-    exec.for_each(most, detail::make_box_nodes{splitter, leaf_boxes, ranges.data(), here, nodes.data(),
-                                               child_ranges.data(), prefix.data()});
-    ::thrust::inclusive_scan(exec.thrust(), prefix.data(), prefix.data() + most, prefix.data());
-    const exec::device_count count{&here->count, most};
+    exec.for_each(most, detail::make_box_nodes{tree, balances, leaf_boxes, levels.data()->levels + level,
+                                               listed.data(), nodes.data(), numbers.data()});
     most = std::min(most * detail::box_node::width, most_in_level);
-    ranges = buffer<detail::box_range, Exec>(exec, most);
-    exec.for_each(count,
-                  detail::number_children{child_ranges.data(), prefix.data(), here,
-                                          levels.data()->levels + level + 1, nodes.data(), ranges.data()});
   }
+  ::thrust::inclusive_scan(exec.thrust(), numbers.data(), numbers.data() + n, numbers.data());
   const std::uint32_t made = known.nodes();
   if (nodes_.size() < made) nodes_ = buffer<detail::box_node, Exec>(exec, made);
-  ::thrust::copy_n(exec.thrust(), nodes.data(), made, nodes_.data());
+  exec.for_each(made, detail::order_box_nodes{listed.data(), nodes.data(), numbers.data(), nodes_.data()});
   node_count_ = made;
   return true;
 }
