@@ -13,7 +13,8 @@
 // Simulation", section 5, which has cylinders in place of pieces. The tree is that of Karras 2012,
 // "Maximizing Parallelism in the Construction of BVHs, Octrees, and k-d Trees".
 // Cost: a build is that of the tree over pieces. A query is O(log pieces + found), where boxes overlap
-// little. Memory: 12 bytes a piece and about 34 of the tree; 40 bytes a beam.
+// little. Most pieces that it tests are too far away, which is found first.
+// Memory: 36 bytes a piece and about 34 of the tree.
 #pragma once
 
 #include <wfpg/base/error.hpp>
@@ -39,16 +40,17 @@ struct beam_map_options {
   std::size_t max_pieces = std::size_t(1) << 20;
 };
 
-/// A beam map as kernels see it. Trivially copyable. Valid until its owner is built again or destroyed, and
-/// as long as the beams that it was built of.
+/// A beam map as kernels see it. Trivially copyable, 48 bytes. Valid until its owner is built again or
+/// destroyed. A query reads 32 bytes of each piece that it tests, and the beam's index where it merges.
 class beam_map_view {
  public:
   /// A map without beams.
   beam_map_view() = default;
-  /// For beam_map. Not for hosts.
-  beam_map_view(const box_tree_view& tree, const detail::beam_piece* pieces, const detail::cut_beams& cut,
+  /// For beam_map. Not for hosts. `pieces`, `beams`: in the tree's order, as many as it has places. `beams`
+  /// are indices of the host's.
+  beam_map_view(const box_tree_view& tree, const detail::placed_piece* pieces, const std::uint32_t* beams,
                 float radius)
-      : tree_(tree), pieces_(pieces), cut_(cut), radius_(radius) {}
+      : tree_(tree), pieces_(pieces), beams_(beams), radius_(radius) {}
 
   /// Returns the number of pieces, of all beams together.
   WFPG_HD std::uint32_t pieces() const { return tree_.size(); }
@@ -62,17 +64,17 @@ class beam_map_view {
   template <class F>
   WFPG_HD void for_each_beam_along(const path_beam& camera, merge_kernel shape, const F& f) const {
     const auto merge = [&](std::uint32_t place) {
-      return beam_beam_merge(shape, camera, cut_.cut(pieces_[place]), radius_);
+      return beam_beam_merge(shape, camera, detail::placed_piece(pieces_[place]).beam, radius_);
     };
     tree_.for_each_place_along(
         camera.as_ray(), [&](std::uint32_t place) { return merge(place).kernel > 0.0f; },
-        [&](std::uint32_t place) { f(pieces_[place].beam, merge(place)); });
+        [&](std::uint32_t place) { f(beams_[place], merge(place)); });
   }
 
  private:
-  box_tree_view tree_;                          // over pieces
-  const detail::beam_piece* pieces_ = nullptr;  // by place in the tree
-  detail::cut_beams cut_;                       // the host's beams, and how they are cut
+  box_tree_view tree_;                            // over pieces
+  const detail::placed_piece* pieces_ = nullptr;  // by place in the tree
+  const std::uint32_t* beams_ = nullptr;          // their indices, likewise
   float radius_ = 0.0f;
 };
 
@@ -86,7 +88,7 @@ class beam_map {
   /// Builds the map of beams, and waits for the policy's work. Beams that are empty or not finite are
   /// skipped. Memory of the map before is used again if it suffices.
   ///
-  /// `beams`: in the policy's memory. They must outlive the map's views, unchanged.
+  /// `beams`: in the policy's memory. They are not read later.
   ///
   /// Throws out_of_memory, after which the map has no beams. Throws std::invalid_argument that names the
   /// option out of range.
@@ -99,32 +101,36 @@ class beam_map {
             "at least the number of beams, and less than 2^28");
     // Where memory runs out, the map stays without beams.
     radius_ = 0.0f;
-    cut_ = {beams, detail::longest_piece(exec, beams, options.radius, options.max_pieces)};
+    const detail::cut_beams cut{beams,
+                                detail::longest_piece(exec, beams, options.radius, options.max_pieces)};
     buffer<std::uint64_t, Exec> counts(exec, beams.size());
-    exec.for_each(beams.size(), detail::count_beam_pieces{cut_, counts.view()});
+    exec.for_each(beams.size(), detail::count_beam_pieces{cut, counts.view()});
     const std::size_t n = sum_prefix(exec, counts);
     const buffer<detail::beam_piece, Exec> pieces(exec, n);
     exec.for_each(n, detail::list_beam_pieces{counts.view(), pieces.data()});
-    tree_.build(exec, n, detail::beam_piece_boxes{cut_, pieces.data(), options.radius});
+    tree_.build(exec, n, detail::beam_piece_boxes{cut, pieces.data(), options.radius});
     const box_tree_view tree = tree_.view();
-    if (pieces_.size() < tree.size()) pieces_ = buffer<detail::beam_piece, Exec>(exec, tree.size());
-    exec.for_each(tree.size(), detail::order_beam_pieces{tree, pieces.data(), pieces_.data()});
+    if (pieces_.size() < tree.size()) pieces_ = buffer<detail::placed_piece, Exec>(exec, tree.size());
+    if (beams_.size() < tree.size()) beams_ = buffer<std::uint32_t, Exec>(exec, tree.size());
+    exec.for_each(tree.size(),
+                  detail::place_beam_pieces{tree, cut, pieces.data(), pieces_.data(), beams_.data()});
     radius_ = options.radius;
   }
 
   /// Returns the map for kernels. O(1).
   beam_map_view view() const {
-    return radius_ > 0.0f ? beam_map_view(tree_.view(), pieces_.data(), cut_, radius_) : beam_map_view();
+    return radius_ > 0.0f ? beam_map_view(tree_.view(), pieces_.data(), beams_.data(), radius_)
+                          : beam_map_view();
   }
   /// Returns the bytes held, without the host's beams: those of the largest map so far.
-  /// 46 a piece.
-  std::size_t bytes() const { return tree_.bytes() + pieces_.bytes(); }
+  /// 70 a piece.
+  std::size_t bytes() const { return tree_.bytes() + pieces_.bytes() + beams_.bytes(); }
 
  private:
-  // As in the view. The host owns the beams that it was built of.
+  // As in the view. They are as large as the largest map so far took.
   box_tree<Exec> tree_;
-  buffer<detail::beam_piece, Exec> pieces_;
-  detail::cut_beams cut_;
+  buffer<detail::placed_piece, Exec> pieces_;
+  buffer<std::uint32_t, Exec> beams_;
   float radius_ = 0.0f;  // 0: not built
 };
 

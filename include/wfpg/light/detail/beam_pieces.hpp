@@ -104,13 +104,22 @@ struct beam_piece_boxes {
   }
 };
 
-/// Copies pieces into the tree's order.
-struct order_beam_pieces {
+/// A piece as queries read it, at once.
+struct alignas(16) placed_piece {
+  path_beam beam;
+};
+
+/// Cuts pieces in the tree's order.
+struct place_beam_pieces {
   box_tree_view tree;
+  cut_beams cut;
   const beam_piece* pieces;
-  beam_piece* ordered;
+  placed_piece* placed;
+  std::uint32_t* beams;
   WFPG_HD void operator()(std::size_t place) const {
-    ordered[place] = pieces[tree.index(static_cast<std::uint32_t>(place))];
+    const beam_piece piece = pieces[tree.index(static_cast<std::uint32_t>(place))];
+    placed[place] = {cut.cut(piece)};
+    beams[place] = piece.beam;
   }
 };
 
