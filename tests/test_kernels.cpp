@@ -81,7 +81,7 @@ TEST_CASE("kernels: the check of a host finds nothing wrong, with 20 seeds", "[.
   CHECK(said_of_host(20) == "");
 }
 
-TEST_CASE("kernels: guided pictures have the mean of unguided ones", "[kernels][unbiased]") {
+TEST_CASE("kernels: guided pictures have the mean of unguided ones", "[kernels][unbiased][thorough]") {
   for (const char* scene : {"cornell-box", "cornell-enclosed", "materials", "outdoor"})
     check_kernels({scene});
   check_kernels({"ajar", 0.0f, 4, 64, 64});
