@@ -88,7 +88,7 @@ TEST_CASE("kernels: guided pictures have the mean of unguided ones", "[kernels][
   check_kernels({"cornell-enclosed", 0.2f});
 }
 
-TEST_CASE("kernels: a bias of 1% shows, with fog and without", "[kernels][unbiased]") {
+TEST_CASE("kernels: a bias of 1% shows, with fog and without", "[kernels][unbiased][thorough]") {
   check_kernels({"bright-room", 0.0f, 12, 12, 48}, true);
   check_kernels({"bright-room", 0.2f, 12, 12, 48}, true);
 }

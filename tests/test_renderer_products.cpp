@@ -81,7 +81,8 @@ WFPG_TEST_CASE("products of 50 fields and BSDFs are right at every resolution", 
 
 }  // namespace
 
-TEST_CASE("mixtures of products and BSDFs report their densities over the sphere", "[renderer][products]") {
+TEST_CASE("mixtures of products and BSDFs report their densities over the sphere",
+          "[renderer][products][thorough]") {
   const wfpg::exec::seq exec;
   for (std::uint64_t seed = 0; seed < 4 * kinds; ++seed) {
     const random_pair pair(seed);
