@@ -267,11 +267,11 @@ struct make_box_nodes {
     bounds3 boxes[box_node::width];
     int count = 0;
 
-    WFPG_HD void set(int part, box_range range, const binary_tree& tree) {
+    WFPG_HD void set(int part, box_range range, const binary_tree& of) {
       ranges[part] = range;
-      boxes[part] = tree.box(range);
+      boxes[part] = of.box(range);
     }
-    WFPG_HD void add(box_range range, const binary_tree& tree) { set(count++, range, tree); }
+    WFPG_HD void add(box_range range, const binary_tree& of) { set(count++, range, of); }
   };
 
   /// Splits the largest part. False if none can be split.
