@@ -115,7 +115,7 @@ TEST_CASE("pictures guided by irradiance records have the mean of unguided ones"
   check_precisely({"", true, sampling_method::records});
 }
 
-TEST_CASE("pictures guided by grids and records have that mean by chance alone, too",
+TEST_CASE("pictures guided by grids and records have that mean without light samples, too",
           "[renderer][unbiased][thorough]") {
   for (const sampling_method method : {sampling_method::sarsa, sampling_method::records})
     check_precisely({"", false, method});

@@ -135,8 +135,9 @@ struct make_binary_nodes {
     // The node begins or ends at its own box, and goes on as long as boxes share more bits than those
     // outside.
     const auto here = static_cast<std::int32_t>(node);
-    const std::int32_t way = shared_bits(here, here + 1) > shared_bits(here, here - 1) ? 1 : -1;
-    const int outside = shared_bits(here, here - way);
+    const int behind = shared_bits(here, here - 1), ahead = shared_bits(here, here + 1);
+    const std::int32_t way = ahead > behind ? 1 : -1;
+    const int outside = min(behind, ahead);
     std::int32_t beyond = 2;
     while (shared_bits(here, here + beyond * way) > outside) beyond *= 2;
     const std::int32_t other = last_sharing(here, way, beyond / 2, outside);
@@ -244,7 +245,7 @@ struct make_box_nodes {
     made.add(tree.range(listed[place]), tree);
     while (made.count < box_node::width && expand(made)) {
     }
-    box_node node = quantised(made);
+    box_node node = quantised(made, tree.nodes[listed[place]].box);
     std::uint32_t children = 0;
     for (int child = 0; child < made.count; ++child) {
       const box_range range = made.ranges[child];
@@ -256,8 +257,8 @@ struct make_box_nodes {
     nodes[place] = node;
     if (children == 0) return;
     std::uint32_t next = after + atomic_add(&level[1].count, children);
-    for (int child = 0; child < made.count; ++child)
-      if (made.ranges[child].size() > leaf_boxes) listed[next++] = made.ranges[child].node;
+    for (const box_child& child : node.children)
+      if (!child.is_leaf()) listed[next++] = child.index();
   }
 
  private:
@@ -292,12 +293,10 @@ struct make_box_nodes {
     return true;
   }
 
-  /// Adds a margin of an eighth of a step on every side.
-  WFPG_HD box_node quantised(const parts& made) const {
+  /// Children's boxes, with a margin of an eighth of a step on every side. `around`: the box around them.
+  WFPG_HD box_node quantised(const parts& made, const bounds3& around) const {
     // Rays along an axis drift by 1e-18 of their length. Flat boxes are thick enough for it.
     const float least_step = max(largest_of(tree.nodes[0].box) * 0x1p-40f, 1e-30f);
-    bounds3 around;
-    for (int i = 0; i < made.count; ++i) around = bounds_union()(around, made.boxes[i]);
     box_node node;
     for (int axis = 0; axis < 3; ++axis) {
       const float low = around.lower[axis], high = around.upper[axis];
