@@ -183,6 +183,12 @@ void launch(const Functor& f) {
   run<<<1, 32>>>(f);
 }
 
+// Those that scan_places() calls.
+template <class Functor>
+__global__ void place(Functor f) {
+  f(threadIdx.x, 0u);
+}
+
 }  // namespace cuda_compile
 
 void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance_cache_view& cache,
@@ -222,7 +228,9 @@ void launch_all(const wfpg::sparse_voxel_octree_view& tree, const wfpg::exitance
   launch(d::compose_opacity{});
   launch(wfpg::deposit_path{recorder, cache, {}});
   launch(d::starts_key_group{});
-  launch(d::write_group_offsets{});
+  place<<<1, 32>>>(d::number_groups{});
+  place<<<1, 32>>>(d::collect_indices{});
+  place<<<1, 32>>>(d::place_light_vertices{});
   launch(d::count_at_leaves<wfpg::wave_rays<surfaces>>{});
   launch(d::sum_wave_counts{});
   launch(d::ascend_to_marked{});

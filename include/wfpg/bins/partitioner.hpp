@@ -8,12 +8,12 @@
 #include <wfpg/base/error.hpp>
 #include <wfpg/base/types.hpp>
 #include <wfpg/exec/buffer.hpp>
+#include <wfpg/exec/support/scan_places.hpp>
 #include <wfpg/exec/support/thrust.hpp>
 
-#include <thrust/functional.h>
 #include <thrust/iterator/counting_iterator.h>
+#include <thrust/iterator/transform_iterator.h>
 #include <thrust/sequence.h>
-#include <thrust/transform_scan.h>
 
 namespace wfpg {
 
@@ -50,23 +50,25 @@ struct starts_key_group {
   }
 };
 
-/// Writes the offsets of each group, and the number of groups. The thread of a group's first element writes
-/// where it begins. The thread of the very last one writes its end and the number of groups.
-struct write_group_offsets {
-  array_view<const std::uint32_t> keys;
-  array_view<const std::uint32_t> group_prefix;
-  std::uint32_t excluded;  ///< key of the elements in no group, which come last
+/// Numbers groups, and writes where each begins. The very last element of one writes its end and the number
+/// of groups.
+struct number_groups {
+  starts_key_group starts;
+  array_view<std::uint32_t> group_prefix;  ///< receives the groups' numbers, from 1
   std::uint32_t* offsets;
   std::uint32_t* count;
-  WFPG_HD void operator()(std::size_t i) const {
-    if (keys[i] == excluded) return;
+  WFPG_HD void operator()(std::size_t i, std::uint32_t before) const {
+    const array_view<const std::uint32_t>& keys = starts.keys;
+    const bool is_first = starts(i) != 0;
+    const std::uint32_t group = is_first ? before + 1 : before;
+    group_prefix[i] = group;
+    if (keys[i] == starts.excluded) return;
     const auto at = static_cast<std::uint32_t>(i);
-    // Groups are numbered from 1 in `group_prefix`, and from 0 in `offsets`.
-    if (i == 0 || keys[i] != keys[i - 1]) offsets[group_prefix[i] - 1] = at;
+    if (is_first) offsets[before] = at;
     // Only the last element that is not excluded goes on.
-    if (i + 1 < keys.size() && keys[i + 1] != excluded) return;
-    offsets[group_prefix[i]] = at + 1;
-    *count = group_prefix[i];
+    if (i + 1 < keys.size() && keys[i + 1] != starts.excluded) return;
+    offsets[group] = at + 1;
+    *count = group;
   }
 };
 
@@ -103,15 +105,13 @@ class partitioner {
     // Stable, so that indices ascend inside a group.
     exec.sort_pairs(n, key_bits, keys.data(), prefix.data(), keys_.data(), permutation_.data());
     const array_view<const std::uint32_t> sorted(keys_.data(), n);
-    const ::thrust::counting_iterator<std::size_t> first(0);
-    // Running sums of the groups' beginnings number the groups from 1.
-    ::thrust::transform_inclusive_scan(exec.thrust(), first, first + static_cast<std::ptrdiff_t>(n),
-                                       prefix.begin(), detail::starts_key_group{sorted, excluded},
-                                       ::thrust::plus<std::uint32_t>());
-    // Without keys, or with excluded ones alone, no thread writes these.
+    // Without keys, or with excluded ones alone, nobody writes these.
     exec.fill_bytes(count_.data(), 0, count_.bytes());
     exec.fill_bytes(offsets_.data(), 0, sizeof(std::uint32_t));
-    exec.for_each(n, detail::write_group_offsets{sorted, prefix, excluded, offsets_.data(), count_.data()});
+    const detail::starts_key_group starts{sorted, excluded};
+    const auto begins =
+        ::thrust::make_transform_iterator(::thrust::counting_iterator<std::size_t>(0), starts);
+    scan_places(exec, n, begins, detail::number_groups{starts, prefix, offsets_.data(), count_.data()});
     return {{permutation_.data(), n}, {offsets_.data(), n + 1}, sorted, prefix, count_.data()};
   }
 

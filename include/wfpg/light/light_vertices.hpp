@@ -1,5 +1,5 @@
-// Vertices of an iteration's light paths, stored for camera paths to connect with. A vertex has its path, the
-// vertex before it, its weights, and whatever the host needs to scatter light there.
+// Vertices of an iteration's light paths, stored for camera paths to connect with, and for splats. A vertex
+// has its path, the vertex before it, its weights, and whatever the host needs to scatter light there.
 //
 // All paths go from vertex to vertex together, as a wave:
 //
@@ -23,10 +23,8 @@
 #include <wfpg/base/error.hpp>
 #include <wfpg/base/types.hpp>
 #include <wfpg/exec/buffer.hpp>
-#include <wfpg/exec/support/thrust.hpp>
+#include <wfpg/exec/support/scan_places.hpp>
 #include <wfpg/exec/tiled_array.hpp>
-
-#include <thrust/scan.h>
 
 #include <cstdint>
 
@@ -91,18 +89,18 @@ class light_vertices_view {
 
 namespace detail {
 
-/// Kernel: turns ranks of new vertices into places, or `none`. The last path's thread writes the number of
-/// all new vertices.
+/// Turns ranks of new vertices into places, or `none`. With the last path it writes the number of all new
+/// vertices.
 struct place_light_vertices {
   array_view<const std::uint32_t> keeps;  ///< by path: the number of new vertices
-  array_view<std::uint32_t> places;       ///< by path: ranks, then places
+  array_view<std::uint32_t> places;       ///< by path: receives the first one's place
   const std::uint32_t* stored;            ///< number of vertices before
   std::uint32_t* news;                    ///< receives the number of new ones
   std::uint32_t capacity;                 ///< most vertices
   std::uint32_t none;                     ///< place of what is not stored
-  WFPG_HD void operator()(std::size_t path) const {
-    if (path + 1 == places.size()) *news = places[path] + keeps[path];
-    const std::uint64_t place = std::uint64_t(*stored) + places[path];
+  WFPG_HD void operator()(std::size_t path, std::uint32_t rank) const {
+    if (path + 1 == places.size()) *news = rank + keeps[path];
+    const std::uint64_t place = std::uint64_t(*stored) + rank;
     places[path] = keeps[path] != 0 && place < capacity ? static_cast<std::uint32_t>(place) : none;
   }
 };
@@ -165,12 +163,11 @@ class light_vertices {
   void reserve(const Exec& exec, array_view<const std::uint32_t> keeps) {
     require(keeps.size() == places_.size(), "keeps.size()", keeps.size(), "the number of paths");
     if (keeps.size() == 0) return;
-    ::thrust::exclusive_scan(exec.thrust(), keeps.begin(), keeps.end(), places_.view().begin(), 0u);
     std::uint32_t* const stored = counts_.data() + counter_stored;
     std::uint32_t* const news = counts_.data() + counter_new;
     const auto capacity = static_cast<std::uint32_t>(vertices_.size());
-    exec.for_each(keeps.size(),
-                  detail::place_light_vertices{keeps, places_.view(), stored, news, capacity, none});
+    scan_places(exec, keeps.size(), keeps.data(),
+                detail::place_light_vertices{keeps, places_.view(), stored, news, capacity, none});
     exec.for_each(1, detail::count_light_vertices{news, stored, counts_.data() + counter_dropped, capacity});
   }
 
