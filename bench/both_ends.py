@@ -3,8 +3,8 @@
 
 usage: bench/both_ends.py DIRECTORY_OF_PROGRAMS OUT.json [SECONDS [REFERENCE_SECONDS [SIZE [SCENE...]]]]
 
-Renders each scene with each method for SECONDS (3), with two seeds. Two references take REFERENCE_SECONDS (8) each and have
-other seeds. An error is the mean of both seeds against both references, less half the difference between the references, which
+Renders each scene with each method for SECONDS (3), with two seeds. Two references take REFERENCE_SECONDS (8) each, or four
+times as long in bottles, and have other seeds. An error is the mean of both seeds against both references, less half the difference between the references, which
 is their own noise. vcm-all merges all photons where they are dense. upbp-more has beams of more light paths than upbp, and all
 photons along camera beams. Scenes that OUT has stay in it, but for those that are measured. They must have the same settings.
 """
@@ -24,8 +24,13 @@ SCENES = {"caustic-pool": SURFACES, "mirror-balls": SURFACES, "veach-bidir": SUR
           "bottles": MEDIA, "wax": MEDIA}
 # Other scenes' are by bpt, which finds light of wax's flames that path tracing misses. In bottles it finds less than path tracing.
 REFERENCES = {"bottles": ("vpt",)}
+REFERENCE_TIMES = {"bottles": 4.0}
 REFERENCE_SEEDS = {"a": 901, "b": 902}
 SEEDS = (1, 2)
+
+
+def reference_time(scene, reference_seconds):
+    return REFERENCE_TIMES.get(scene, 1.0) * reference_seconds
 
 
 def measure(programs, scene, methods, seconds, reference_seconds):
@@ -42,7 +47,7 @@ def measure(programs, scene, methods, seconds, reference_seconds):
             samples.append(render("x", method, seconds, seed)["spp"])
             errors += [programs.compare("x", reference) for reference in REFERENCE_SEEDS]
         lines[name] = {"spp": statistics.mean(samples), **errors_without_noise(errors, noise)}
-    return {"scene": scene, "reference_noise": {kind: noise[kind] for kind in ERRORS}, "methods": lines}
+    return {"scene": scene, "reference_seconds": reference_seconds, "reference_noise": {kind: noise[kind] for kind in ERRORS}, "methods": lines}
 
 
 def main(directory, out, seconds="3", reference_seconds="8", size="480x270", *names):
@@ -50,12 +55,14 @@ def main(directory, out, seconds="3", reference_seconds="8", size="480x270", *na
     results = begin_results(out)
     if results and any(results.get(name) != value for name, value in settings.items()):
         sys.exit(f"{out} has scenes of other settings")
-    scenes = {scene["scene"]: scene for scene in results.get("scenes", [])}
+    scenes = {scene["scene"]: scene for scene in results.get("scenes", [])
+              if scene.get("reference_seconds") == reference_time(scene["scene"], settings["reference_seconds"])}
     with tempfile.TemporaryDirectory() as folder:
         programs = Programs(directory, size, folder)
         for name in names or SCENES:
             print(name, file=sys.stderr)
-            scenes[name] = measure(programs, name, SCENES[name], settings["seconds"], settings["reference_seconds"])
+            scenes[name] = measure(programs, name, SCENES[name], settings["seconds"],
+                                   reference_time(name, settings["reference_seconds"]))
     write_results(out, {**settings, "scenes": [scenes[name] for name in SCENES if name in scenes]})
 
 

@@ -14,7 +14,7 @@ from programs import Programs, medians, milliseconds_a_sample, write_results
 SAMPLES = {"caustic-pool": ("bpt", "vcm"), "mirror-balls": ("bpt", "vcm"), "veach-bidir": ("bpt", "vcm"), "fog-spot": ("upbp",),
            "glass-caustic-fog": ("upbp",), "bottles": ("upbp",), "wax": ("upbp",)}
 FIRST, LAST = 2, 8
-STAGES = ("light paths", "splats", "photon map", "camera", "trace", "lights", "connections", "merges", "shade", "film")
+STAGES = ("light paths", "splats", "photon map", "camera", "trace", "connections", "merges", "shade", "film")
 
 
 def a_sample(programs, scene, method):

@@ -254,6 +254,22 @@ WFPG_TEST_CASE("techniques that are off find nothing, count nothing and take no 
   CHECK(others == 0.0f);
 }
 
+WFPG_TEST_CASE("vertices are stored for splats alone where splats are made of them", "[bidirectional]") {
+  const Exec exec;
+  bidirectional_options options = all_techniques();
+  options.connections = options.surface_points = options.volume_points = options.beam_points = false;
+  for (const bool splats : {false, true})
+    for (const bool stored : {false, true}) {
+      options.splats = splats;
+      options.stored_splats = stored;
+      light_of<Exec> light(exec, options);
+      follow(exec, light, {1});
+      const bool are_stored = splats && stored;
+      CHECK(light.light_recorder().stores_vertices() == are_stored);
+      CHECK((light.statistics().vertices > 0) == are_stored);
+    }
+}
+
 TEST_CASE("options and iterations out of range are refused by their names", "[bidirectional]") {
   using light = light_of<one_policy>;
   const one_policy exec;

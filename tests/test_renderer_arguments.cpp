@@ -186,7 +186,7 @@ TEST_CASE("options without effect are refused by a line that says what they need
       {"--method vpt --device optix", "--method vpt", "a --device other than optix"},
       {"--method bpt --device optix", "--method bpt", "a --device other than optix"},
       {"--method lt --techniques nee", "--techniques", "--method bpt, vcm or upbp"},
-      {"--method pt --light-memory 1M", "--light-memory", "--method bpt, vcm or upbp"},
+      {"--method pt --light-memory 1M", "--light-memory", "--method bpt, vcm, upbp or lt"},
       {"--method bpt --radius 0.1", "--radius", "--method vcm or upbp, or surf among --techniques"},
       {"--method bpt --dense-photons 8", "--dense-photons",
        "--method vcm or upbp, or surf or pp3d among --techniques"},

@@ -231,15 +231,77 @@ TEST_CASE("the pictures of all techniques add up to the picture", "[renderer][bi
 TEST_CASE("vertices of light paths beyond their memory are counted", "[renderer][bidirectional]") {
   const render::scene scene = render::make_builtin_scene("cornell-box");
   render::render_options options;
-  options.method = sampling_method::bpt;
   options.width = options.height = 16;
   options.spp = 2;
-  const render::render_report enough = render::render(scene, options, {}).report;
-  CHECK(enough.dropped_light_vertices == 0);
-  options.light.budget_bytes = 100 * (sizeof(subpath_vertex) + sizeof(std::uint32_t));
-  const render::render_report little = render::render(scene, options, {}).report;
-  CHECK(little.dropped_light_vertices > 100);
-  CHECK(little.light_vertex_bytes < enough.light_vertex_bytes);
+  for (const sampling_method method : {sampling_method::bpt, sampling_method::lt}) {
+    options.method = method;
+    options.light.budget_bytes = wfpg::bidirectional_options().budget_bytes;
+    const render::render_report enough = render::render(scene, options, {}).report;
+    CHECK(enough.dropped_light_vertices == 0);
+    options.light.budget_bytes = 100 * (sizeof(subpath_vertex) + sizeof(std::uint32_t));
+    const render::render_report little = render::render(scene, options, {}).report;
+    CHECK(little.dropped_light_vertices > 100);
+    CHECK(little.light_vertex_bytes < enough.light_vertex_bytes);
+  }
+}
+
+/// The picture of two samples of fog-spot, and those of techniques, with so many splats at a time at least.
+template <class Exec>
+std::pair<std::vector<vec3>, std::vector<render::technique_picture>> with_splats_at_a_time(
+    std::size_t splats, render::technique_set techniques, std::uint32_t max_depth) {
+  const Exec exec;
+  const render::scene host = render::make_builtin_scene("fog-spot");
+  const render::device_scene<Exec> geometry(exec, host);
+  const render::light_distribution<Exec> lights(exec, host);
+  const render::embree_scene accelerated(exec, host, geometry.view());
+  render::tracer_settings settings;
+  settings.width = 24;
+  settings.height = 16;
+  settings.max_depth = max_depth;
+  settings.techniques = techniques;
+  settings.technique_pictures = true;
+  settings.least_splats = splats;
+  const render::pinhole camera(host.view, settings.width, settings.height);
+  render::bidirectional_tracer<Exec, decltype(accelerated.caster())> tracer(
+      exec, settings, {geometry.view(), lights.view(), true}, accelerated.caster());
+  for (std::uint32_t sample = 0; sample < 2; ++sample)
+    tracer.render_sample(render::no_guide(), camera, sample, 1.0f);
+  CHECK(tracer.dropped() == 0);
+  return {tracer.film().picture(), tracer.technique_pictures()};
+}
+
+TEST_CASE("pictures do not depend on how many splats are added at a time", "[renderer][bidirectional]") {
+  for (const render::technique_set& techniques : {render::technique_set(), render::light_tracing()}) {
+    const auto many = with_splats_at_a_time<wfpg::exec::seq>(100000, techniques, 12),
+               few = with_splats_at_a_time<wfpg::exec::seq>(1, techniques, 12);
+    CHECK(few.first == with_splats_at_a_time<wfpg::exec::omp>(1, techniques, 12).first);
+    CHECK(few.first == with_splats_at_a_time<wfpg::exec::tbb>(1, techniques, 12).first);
+    double light = 0.0;
+    for (std::size_t i = 0; i < few.first.size(); ++i) {
+      CHECK(glm::length(few.first[i] - many.first[i]) <= 1e-5f * glm::length(many.first[i]));
+      light += wfpg::luminance(few.first[i]);
+    }
+    CHECK(light > 0.0);
+    REQUIRE(few.second.size() == many.second.size());
+    for (std::size_t k = 0; k < few.second.size(); ++k)
+      for (std::size_t i = 0; i < few.first.size(); ++i)
+        CHECK(glm::length(few.second[k].plain[i] - many.second[k].plain[i]) <=
+              1e-5f * glm::length(many.second[k].plain[i]));
+  }
+}
+
+TEST_CASE("paths of one segment see lights alone", "[renderer][bidirectional]") {
+  const render::scene scene = render::make_builtin_scene("cornell-box");
+  render::render_options options;
+  options.width = options.height = 16;
+  options.spp = 1;
+  options.max_depth = 1;
+  options.method = sampling_method::pt;
+  const std::vector<vec3> expected = render::render(scene, options, {}).picture.pixels;
+  for (const sampling_method method : {sampling_method::bpt, sampling_method::vcm, sampling_method::lt}) {
+    options.method = method;
+    CHECK(render::render(scene, options, {}).picture.pixels == expected);
+  }
 }
 
 TEST_CASE("each allocation of points, beams and paths may fail", "[renderer][bidirectional]") {

@@ -92,6 +92,18 @@ WFPG_TEST_CASE("places are empty at first and after their splats were added", "[
   CHECK(picture.to_host(exec) == std::vector<vec3>(what.pixels, vec3(1.0f)));
 }
 
+WFPG_TEST_CASE("splats of the first places are added alone", "[splats]") {
+  const Exec exec;
+  const random_splats what{16, 4};
+  wfpg::splats<Exec> splats(exec, 100, what.pixels);
+  for (const std::size_t n : {std::size_t(100), std::size_t(37), std::size_t(0)}) {
+    exec.for_each(n, leave_splats{splats.view(), what});
+    wfpg::buffer<vec3, Exec> picture(exec, std::vector<vec3>(what.pixels, vec3(0.0f)));
+    splats.add_to(exec, picture.view(), 0.5f, n);
+    CHECK(picture.to_host(exec) == expected_sums(what, n, 0.5f));
+  }
+}
+
 TEST_CASE("splats need a picture", "[splats]") {
   const wfpg::exec::seq exec;
   using splats = wfpg::splats<wfpg::exec::seq>;

@@ -147,11 +147,11 @@ def iteration_ratio(results: Results) -> str:
 def light_times(results: Results) -> Rows:
     """Milliseconds of a sample, by stage."""
     stages = {"light paths": ("light paths", "splats"), "maps": ("photon map",), "camera paths": ("camera", "trace", "shade"),
-              "light samples": ("lights",), "connections": ("connections",), "merges": ("merges",), "all": ("total",)}
+              "connections": ("lights", "connections"), "merges": ("merges",), "all": ("total",)}
     rows = [["scene", "method", *stages]]
     for sample in results.json(TIMES, "samples"):
         found = sample["milliseconds"]
-        sums = [sum(found[part] for part in parts) for parts in stages.values()]
+        sums = [sum(found.get(part, 0.0) for part in parts) for parts in stages.values()]
         rows.append([f"`{sample['scene']}`", sample["method"], *(three(x) if x > 0 else "" for x in sums)])
     return rows
 

@@ -166,7 +166,7 @@ struct render_report {
   records_report records;
   rest_report rest;
   std::size_t regions = 0;             ///< of Open PGL's field
-  std::size_t light_vertex_bytes = 0;  ///< memory of light paths, of maps over them, and of connections
+  std::size_t light_vertex_bytes = 0;  ///< memory of light paths, of maps over them, of joins and splats
   /// Vertices of light paths that had no memory. The picture lacks their light.
   std::uint64_t dropped_light_vertices = 0;
   std::uint64_t surplus_beams = 0;  ///< photon beams beyond the most media on a segment

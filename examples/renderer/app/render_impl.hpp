@@ -80,18 +80,20 @@ inline std::uint32_t guided_depths(const render_options& options) {
 
 /// What every tracer is told.
 inline tracer_settings tracer_settings_of(const render_options& options) {
-  return {options.width,
-          options.height,
-          static_cast<std::uint32_t>(options.max_depth),
-          options.seed,
-          static_cast<std::uint32_t>(options.roulette_depth),
-          techniques_of(options),
-          options.light,
-          options.technique_pictures,
-          combination_of(options) == wfpg::sample_combination::inverse_variance,
-          share_of(options),
-          end_of_samples(options),
-          options.policy_ranks};
+  tracer_settings settings;
+  settings.width = options.width;
+  settings.height = options.height;
+  settings.max_depth = static_cast<std::uint32_t>(options.max_depth);
+  settings.seed = options.seed;
+  settings.roulette_depth = static_cast<std::uint32_t>(options.roulette_depth);
+  settings.techniques = techniques_of(options);
+  settings.light = options.light;
+  settings.technique_pictures = options.technique_pictures;
+  settings.weighs_by_gain = combination_of(options) == wfpg::sample_combination::inverse_variance;
+  settings.share = share_of(options);
+  settings.end = end_of_samples(options);
+  settings.ranks = options.policy_ranks;
+  return settings;
 }
 
 /// What every guide is told.

@@ -71,8 +71,7 @@ named_values values_of(const render_options& o) {
   if (is_bidirectional(o.method)) {
     const technique_set techniques = techniques_of(o);
     values.emplace_back("--techniques", names_of(techniques));
-    if (chooses_techniques(o.method))
-      values.emplace_back("--light-memory", std::to_string(o.light.budget_bytes));
+    values.emplace_back("--light-memory", std::to_string(o.light.budget_bytes));
     if (techniques.has(technique::surf))
       values.emplace_back("--radius", std::to_string(o.light.surface_radius));
     if (techniques.merges()) values.emplace_back("--radius-alpha", std::to_string(o.light.radius_alpha));

@@ -150,6 +150,8 @@ struct subpath_vertex {
   WFPG_HD vec3 leave_along(vec3 direction) const {
     return in_medium() ? at.position : leave_surface(at.position, at.geometric_normal, direction, at.offset);
   }
+  /// The ray to a point that is off its own surface.
+  WFPG_HD wfpg::ray ray_to(vec3 end) const { return ray_between(leave_along(end - at.position), end); }
   /// The solids around a ray that leaves in a direction.
   WFPG_HD solid_stack solids_along(const scene_view& scene, vec3 direction) const {
     if (in_medium() || !scene.has_solids) return solids;
@@ -253,8 +255,7 @@ struct bidirectional_world {
   /// The way from a vertex to a point that is `end` off its own surface. `ends_inside`: whether paths scatter
   /// in a medium there.
   WFPG_HD clear_way way_between(const subpath_vertex& from, vec3 end, bool ends_inside) const {
-    const vec3 way = end - from.at.position;
-    return way_along(from, ray_between(from.leave_along(way), end), ends_inside);
+    return way_along(from, from.ray_to(end), ends_inside);
   }
   /// The way along a ray that leaves a vertex. Its t_max may be 0. Ways on which less is left than floats can
   /// weight are hidden.

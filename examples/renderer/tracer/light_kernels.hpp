@@ -42,22 +42,6 @@ struct start_light_paths {
   }
 };
 
-/// The way from a point to the camera.
-struct way_to_camera {
-  vec3 toward{0.0f};  ///< a unit vector
-  float distance = 0.0f;
-  std::uint32_t pixel = 0;
-  bool in_view = false;  ///< whether the picture has the point; otherwise there is no pixel
-
-  WFPG_HD way_to_camera(const pinhole& camera, vec3 position) {
-    const vec3 way = camera.position() - position;
-    distance = glm::length(way);
-    if (!(distance > 0.0f)) return;
-    toward = way / distance;
-    in_view = camera.find_pixel(-toward, pixel);
-  }
-};
-
 /// Stores a sample's light paths.
 using path_recorder = wfpg::light_recorder_view<subpath_vertex, light_beam>;
 
@@ -70,9 +54,6 @@ struct trace_light_paths {
   tiled_view<subpath_vertex> vertices;
   wfpg::array_view<std::uint32_t> active;  ///< receives 0 where the path ends
   wfpg::array_view<std::uint32_t> keeps;   ///< 1: the vertex can be connected; 0 before
-  pinhole camera;
-  /// 1: that, and the camera's picture has it; 0 before. Empty: nobody asks.
-  wfpg::array_view<std::uint32_t> in_view;
   path_recorder recorder;
   wfpg::array_view<std::uint32_t> segment_counts;
 
@@ -86,9 +67,7 @@ struct trace_light_paths {
     if (!world.arrive(path, segments, vertex, ahead)) return;
     active[i] = 1;
     vertices.emplace(i, vertex);
-    if (vertex.is_delta()) return;
-    keeps[i] = 1;
-    if (!in_view.empty()) in_view[i] = way_to_camera(camera, vertex.at.position).in_view ? 1u : 0u;
+    if (!vertex.is_delta()) keeps[i] = 1;
   }
 
  private:
@@ -106,36 +85,6 @@ struct trace_light_paths {
           i, light_beam(path, before, piece, kernel.segments, before.solids.top(kernel.world.scene)));
     }
   };
-};
-
-/// Connects the new vertex of a light path to the camera, which has it in view.
-template <class World>
-struct splat_light_paths {
-  static constexpr bool waits_for_memory = true;
-
-  World world;
-  pinhole camera;
-  tiled_view<subpath_vertex> vertices;
-  wfpg::splat_view splats;
-  wfpg::splat_view plain_splats;  ///< without weights; of no paths, where nobody asks for them
-
-  WFPG_HD void operator()(std::size_t i) const {
-    const subpath_vertex& vertex = vertices[i];
-    const way_to_camera to(camera, vertex.at.position);
-    if (!to.in_view) return;  // compilers may round differently here
-    const float pdf = camera.pdf(-to.toward);
-    const vec3 value =
-        vertex.throughput * vertex.scattered_flux(to.toward) * (pdf / (to.distance * to.distance));
-    if (!(wfpg::luminance(value) > 0.0f)) return;
-    const clear_way way = world.way_between(vertex, camera.position(), false);
-    if (way.transmittance == vec3(0.0f)) return;
-    const scatterer f = vertex.seen_from(vertex.at.outgoing);
-    const wfpg::path_edge edge{to.distance, way.pdf.there, way.pdf.back};
-    const vec3 found = value * way.transmittance;
-    splats.add(i, to.pixel,
-               found * vertex.weights.splat(world.techniques, vertex.leave(f, to.toward), pdf, edge));
-    if (plain_splats.size() > 0) plain_splats.add(i, to.pixel, found);
-  }
 };
 
 /// Stores the new vertex of an active light path where it has a place, and continues the path.
@@ -158,6 +107,67 @@ struct extend_light_paths {
     if (!world.extend(vertex, static_cast<std::uint32_t>(i), true, light_path_dimensions, next)) return;
     paths.emplace(i, next);
     active[i] = 1;
+  }
+};
+
+/// The way from a point to the camera.
+struct way_to_camera {
+  vec3 toward{0.0f};  ///< a unit vector
+  float distance = 0.0f;
+  std::uint32_t pixel = 0;
+  bool in_view = false;  ///< whether the picture has the point; otherwise there is no pixel
+
+  WFPG_HD way_to_camera(const pinhole& camera, vec3 position) {
+    const vec3 way = camera.position() - position;
+    distance = glm::length(way);
+    if (!(distance > 0.0f)) return;
+    toward = way / distance;
+    in_view = camera.find_pixel(-toward, pixel);
+  }
+};
+
+/// Marks the stored vertices of light paths that the camera has in view. An index counts from `first`.
+struct find_in_view {
+  wfpg::light_vertices_view<subpath_vertex> stored;
+  std::uint32_t first;
+  pinhole camera;
+  wfpg::array_view<std::uint32_t> marks;  ///< receives 1 or 0
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const vec3 position = stored[first + static_cast<std::uint32_t>(i)].position();
+    marks[i] = way_to_camera(camera, position).in_view ? 1u : 0u;
+  }
+};
+
+/// Connects stored vertices of light paths to the camera, which has them in view. An index counts from
+/// `first`.
+template <class World>
+struct splat_vertices {
+  static constexpr bool waits_for_memory = true;
+
+  World world;
+  pinhole camera;
+  wfpg::light_vertices_view<subpath_vertex> stored;
+  std::uint32_t first;
+  wfpg::splat_view splats;        ///< by index
+  wfpg::splat_view plain_splats;  ///< without weights; of no places, where nobody asks for them
+
+  WFPG_HD void operator()(std::size_t i) const {
+    const subpath_vertex& vertex = stored[first + static_cast<std::uint32_t>(i)];
+    const way_to_camera to(camera, vertex.at.position);
+    if (!to.in_view) return;  // compilers may round differently here
+    const float pdf = camera.pdf(-to.toward);
+    const vec3 value =
+        vertex.throughput * vertex.scattered_flux(to.toward) * (pdf / (to.distance * to.distance));
+    if (!(wfpg::luminance(value) > 0.0f)) return;
+    const clear_way way = world.way_between(vertex, camera.position(), false);
+    if (way.transmittance == vec3(0.0f)) return;
+    const scatterer f = vertex.seen_from(vertex.at.outgoing);
+    const wfpg::path_edge edge{to.distance, way.pdf.there, way.pdf.back};
+    const vec3 found = value * way.transmittance;
+    splats.add(i, to.pixel,
+               found * vertex.weights.splat(world.techniques, vertex.leave(f, to.toward), pdf, edge));
+    if (plain_splats.size() > 0) plain_splats.add(i, to.pixel, found);
   }
 };
 

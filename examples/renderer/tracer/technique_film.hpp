@@ -32,10 +32,11 @@ struct copy_pixels {
 template <class Exec>
 class technique_film {
  public:
-  technique_film(const Exec& exec, std::size_t pixels, bool is_on)
+  /// `splats`: most at a time.
+  technique_film(const Exec& exec, std::size_t pixels, bool is_on, std::size_t splats)
       : exec_(exec),
         pixels_(pixels),
-        splats_(exec, is_on ? pixels : 0, pixels),
+        splats_(exec, is_on ? splats : 0, pixels),
         weighted_(exec, is_on ? technique_count * pixels : 0),
         plain_(exec, weighted_.size()),
         weighted_sums_(exec, std::vector<glm::dvec3>(weighted_.size(), glm::dvec3(0.0))),
@@ -53,8 +54,9 @@ class technique_film {
 
   /// Splats without weights.
   wfpg::splat_view splats() { return splats_.view(); }
-  void add_splats(float scale) {
-    if (is_on()) splats_.add_to(exec_, of(plain_, technique::splat), scale);
+  /// Adds those of the first n places.
+  void add_splats(float scale, std::size_t n) {
+    if (is_on()) splats_.add_to(exec_, of(plain_, technique::splat), scale, n);
   }
   /// Takes the picture so far for what splats have found.
   void take_splats(const wfpg::buffer<vec3, Exec>& radiance) {

@@ -44,9 +44,11 @@ class technique_set {
     return has(technique::pp3d) || has(technique::pb2d) || has(technique::bb1d);
   }
   constexpr bool merges_at_points() const { return has(technique::surf) || has(technique::pp3d); }
-  constexpr bool needs_light_paths() const {
-    return has(technique::connect) || has(technique::splat) || merges();
-  }
+  /// Whether anything is found behind the first vertex of a camera path, or at it.
+  constexpr bool needs_camera_paths() const { return (on_ & ~bit(technique::splat)) != 0; }
+  /// Whether camera paths are joined with light paths.
+  constexpr bool joins_light_paths() const { return has(technique::connect) || merges(); }
+  constexpr bool needs_light_paths() const { return has(technique::splat) || joins_light_paths(); }
 
  private:
   WFPG_HD static constexpr std::uint32_t bit(technique t) { return 1u << static_cast<int>(t); }
@@ -66,11 +68,13 @@ inline wfpg::bidirectional_options light_options(wfpg::bidirectional_options giv
                                                  std::size_t paths, std::uint32_t max_depth) {
   given.paths = paths;
   given.max_vertices = std::max(max_depth, 2u) - 1;
+  // Splats alone are made after every few depths, and vertices are then forgotten.
+  if (!set.joins_light_paths()) given.max_vertices = std::min(given.max_vertices, 4u);
   given.max_beams = 2 * max_depth;
   given.light_hits = set.has(technique::hits);
   given.next_event = set.has(technique::nee);
   given.connections = set.has(technique::connect);
-  given.splats = set.has(technique::splat);
+  given.splats = given.stored_splats = set.has(technique::splat);
   given.surface_points = set.has(technique::surf);
   given.volume_points = set.has(technique::pp3d);
   given.beam_points = set.has(technique::pb2d);

@@ -47,6 +47,9 @@ struct tracer_settings {
   wave_share share = {};                   ///< this rank's part of a wave; of no paths: all of one sample
   std::uint32_t end = 0xffffffffu;         ///< waves have no samples from this one on
   wfpg::communicator* ranks = nullptr;     ///< that render the picture together, of the policy's memory
+  /// Stored vertices of light paths that are connected to the camera at a time: this many, or one a pixel
+  /// where there are more pixels. A GPU is not filled by few.
+  std::size_t least_splats = std::size_t(1) << 20;
 
   /// The samples of a wave that begins with this one.
   std::uint32_t samples_from(std::uint32_t sample) const { return std::min(part().samples, end - sample); }

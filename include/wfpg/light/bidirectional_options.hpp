@@ -33,6 +33,7 @@ struct bidirectional_options {
   bool next_event = true;      ///< a light sample at each vertex of a camera path
   bool connections = true;     ///< vertices of a light and a camera path are connected
   bool splats = true;          ///< vertices of light paths are connected to the camera
+  bool stored_splats = false;  ///< that is done with stored vertices, which are kept for that alone, too
   bool surface_points = true;  ///< merges on surfaces (P-P2D)
   bool volume_points = false;  ///< merges of points in media (P-P3D)
   bool beam_points = false;    ///< merges of points with camera beams in media (P-B2D)
@@ -53,8 +54,10 @@ struct bidirectional_options {
   /// Light paths whose vertices merge along camera beams, likewise. Unset: all, at most 16384.
   std::optional<std::size_t> beam_point_paths;
 
-  /// Whether camera paths read vertices of light paths.
-  bool reads_vertices() const { return connections || surface_points || volume_points || beam_points; }
+  /// Whether stored vertices of light paths are read.
+  bool reads_vertices() const {
+    return connections || surface_points || volume_points || beam_points || (splats && stored_splats);
+  }
   /// Whether photons are merged.
   bool merges() const { return surface_points || volume_points || beam_points || beams; }
   /// Number of light paths that leave beams. 0 where beams are off.

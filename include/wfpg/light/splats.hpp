@@ -1,11 +1,11 @@
-// Splats: what light paths bring to pixels of their own choice, summed into a picture. Each light path has a
-// place for one splat. Splats are sorted by pixel, so that the sums have the same bits on any policy and with
-// any number of threads.
+// Splats: what light paths bring to pixels of their own choice, summed into a picture. A place has one splat:
+// each light path has a place for its newest vertex, or each stored vertex has one. Splats are sorted by
+// pixel, so that the sums have the same bits on any policy and with any number of threads.
 //
-//   exec.for_each(paths, kernel);         // calls splats.view().add(path, pixel, value), or skip(path)
+//   exec.for_each(places, kernel);        // calls splats.view().add(place, pixel, value), or skip(place)
 //   splats.add_to(exec, pixels, scale);   // pixels[pixel] += scale * value, for all of them
 //
-// Source: light tracing, Veach 1997, section 10.3.4. Sums in the order of paths are wfpg's own.
+// Source: light tracing, Veach 1997, section 10.3.4. Sums in the order of places are wfpg's own.
 // Cost: one stable sort of (pixel, place) pairs and one scan. A pixel's splats are added by one thread.
 // Memory: 32 bytes a place, and about 8 more while it sorts.
 #pragma once
@@ -19,8 +19,7 @@
 
 namespace wfpg {
 
-/// View of splats for kernels. Trivially copyable. Each place belongs to one light path. Calls for one place
-/// come from one thread at a time.
+/// View of splats for kernels. Trivially copyable. Calls for one place come from one thread at a time.
 class splat_view {
  public:
   /// A view of no places.
@@ -78,7 +77,7 @@ class splats {
   /// Has no places.
   splats() = default;
   /// Allocates places, all empty.
-  /// `places`: most splats at a time, one a light path.
+  /// `places`: most splats at a time.
   /// `pixels`: number of the picture's pixels, at least 1.
   /// Throws out_of_memory, and std::invalid_argument where either is 2³² - 1 or more or there are no pixels.
   splats(const Exec& exec, std::size_t places, std::size_t pixels)
@@ -86,7 +85,7 @@ class splats {
         pixels_(exec, checked(places)),
         values_(exec, places),
         by_pixel_(exec, places) {
-    clear(exec);
+    exec.fill_bytes(pixels_.data(), 0xff, pixels_.size() * sizeof(std::uint32_t));
   }
 
   /// View for kernels, valid as long as the owner is not moved.
@@ -97,9 +96,14 @@ class splats {
   /// `picture`: has an element a pixel, as many as the constructor was told.
   /// `scale`: for means over light paths, one over their number.
   void add_to(const Exec& exec, array_view<vec3> picture, float scale) {
-    const partition_view by_pixel = by_pixel_.partition(exec, pixels_.view(), key_bits_);
-    exec.for_each(pixels_.size(), detail::add_splats{by_pixel, values_.view(), picture, scale});
-    clear(exec);
+    add_to(exec, picture, scale, pixels_.size());
+  }
+  /// Likewise those of the first n places. The others must be empty. O(n).
+  void add_to(const Exec& exec, array_view<vec3> picture, float scale, std::size_t n) {
+    const array_view<const std::uint32_t> pixels(pixels_.data(), n);
+    const partition_view by_pixel = by_pixel_.partition(exec, pixels, key_bits_);
+    exec.for_each(n, detail::add_splats{by_pixel, values_.view(), picture, scale});
+    exec.fill_bytes(pixels_.data(), 0xff, n * sizeof(std::uint32_t));
   }
 
   /// Bytes allocated, without the sort's temporaries.
@@ -117,9 +121,6 @@ class splats {
   static std::size_t checked(std::size_t places) {
     require(places < 0xffffffffull, "number of splats", places, "less than 2^32 - 1");
     return places;
-  }
-  void clear(const Exec& exec) {
-    exec.fill_bytes(pixels_.data(), 0xff, pixels_.size() * sizeof(std::uint32_t));
   }
 
   int key_bits_ = 1;  // of pixels, and of the key of empty places
