@@ -17,14 +17,14 @@ FIRST, LAST = 2, 8
 STAGES = ("light paths", "splats", "photon map", "camera", "trace", "connections", "merges", "shade", "film")
 
 
-def a_sample(programs, scene, method):
+def a_sample(programs, scene, options):
     """Milliseconds of one sample, by stage."""
-    first, last = (programs.render(scene, "x", ["--method", method, "--spp", str(n)]) for n in (FIRST, LAST))
+    first, last = (programs.render(scene, "x", [*options, "--spp", str(n)]) for n in (FIRST, LAST))
     return milliseconds_a_sample(first, last, LAST - FIRST, STAGES)
 
 
 def measure(programs, scene, method, runs):
-    lines = [a_sample(programs, scene, method) for _ in range(runs + 1)][1:]
+    lines = [a_sample(programs, scene, ["--method", method]) for _ in range(runs + 1)][1:]
     return {"scene": scene, "method": method, "milliseconds": medians(lines)}
 
 
