@@ -143,17 +143,28 @@ def iteration_ratio(results: Results) -> str:
     return f"{first:.1f} and {second:.1f} times"
 
 
+SAMPLE_STAGES = {"light paths": ("light paths", "splats"), "maps": ("photon map",), "camera paths": ("camera", "trace", "shade"),
+                 "connections": ("lights", "connections"), "merges": ("merges",), "all": ("total",)}
+
+
+def stage_cells(milliseconds: Dict[str, float]) -> List[str]:
+    """A sample's times, by groups of stages."""
+    sums = [sum(milliseconds.get(part, 0.0) for part in parts) for parts in SAMPLE_STAGES.values()]
+    return [three(x) if x > 0 else "" for x in sums]
+
+
 @block
 def light_times(results: Results) -> Rows:
     """Milliseconds of a sample, by stage."""
-    stages = {"light paths": ("light paths", "splats"), "maps": ("photon map",), "camera paths": ("camera", "trace", "shade"),
-              "connections": ("lights", "connections"), "merges": ("merges",), "all": ("total",)}
-    rows = [["scene", "method", *stages]]
-    for sample in results.json(TIMES, "samples"):
-        found = sample["milliseconds"]
-        sums = [sum(found.get(part, 0.0) for part in parts) for parts in stages.values()]
-        rows.append([f"`{sample['scene']}`", sample["method"], *(three(x) if x > 0 else "" for x in sums)])
-    return rows
+    return [["scene", "method", *SAMPLE_STAGES],
+            *([f"`{s['scene']}`", s["method"], *stage_cells(s["milliseconds"])] for s in results.json(TIMES, "samples"))]
+
+
+@block
+def upbp_times(results: Results) -> Rows:
+    """Likewise of upbp in two scenes of the UPBP paper."""
+    return [["scene", "pixels", *SAMPLE_STAGES],
+            *([s["scene"], s["size"], *stage_cells(s["milliseconds"])] for s in results.json("cuda-upbp-times.json", "samples"))]
 
 
 def registers(results: Results) -> List[str]:

@@ -27,13 +27,17 @@ class Place:
         """What a series needs and this machine does not have."""
         has = {"gpu": lambda: bool(gpu_and_driver()), "several GPUs": lambda: "\n" in gpu_and_driver(),
                "scenes": lambda: self.scenes is not None, "Open PGL": self.has_openpgl, "Mitsuba": has_mitsuba,
-               "OptiX": self.has_optix}
+               "OptiX": self.has_optix, "UPBP's scenes": self.has_upbp_scenes}
         return [need for need in series.needs if not (has[need]() if need in has else shutil.which(need))]
 
     def has_optix(self) -> bool:
         """Whether bench_cuda was built with OptiX, whose entry it then looks up by name."""
         program = self.programs / "bench_cuda"
         return program.exists() and b"optixQueryFunctionTable" in program.read_bytes()
+
+    def has_upbp_scenes(self) -> bool:
+        """Whether the scenes of the UPBP paper, which tools/upbp_scenes converts, are beside the others."""
+        return self.scenes is not None and (self.scenes / "mirrorballs.gltf").exists()
 
     def has_openpgl(self) -> bool:
         """Whether the renderer has Open PGL: without it, the program names no such library."""

@@ -102,6 +102,8 @@ ALL: Tuple[Series, ...] = (
            ("both_ends.py bin cuda-both-ends-large.json 3 8 1920x1080 caustic-pool mirror-balls veach-bidir",), ("gpu",), 4,
            "cuda-both-ends-large.json"),
     Series("cuda-light-times.json", ("light_times.py bin cuda-light-times.json",), ("gpu",), 2, "cuda-light-times.json"),
+    Series("cuda-upbp-times.json", ("upbp_times.py bin cuda-upbp-times.json scenes",), ("gpu", "UPBP's scenes"), 1,
+           "cuda-upbp-times.json"),
     Series("rest.json#gpu", ("rests.py bin rest.json gpu scenes",), ("gpu", "scenes"), 5, "rest.json"),
     quality("quality-lights.json", ("gpu", "scenes"), 5,
             '"scenes/veach-mis.glb --size 320x240" "scenes/staircase2.glb --size 240x240" "many-lamps --size 240x180"',
