@@ -1,5 +1,6 @@
 // Compiled, never run. Passes each view of the library to a kernel by value and calls it there. This checks
 // that device code is annotated for the device.
+#include <wfpg/exec/index_list.hpp>
 #include <wfpg/octree/svo_ray_caster.hpp>
 #include <wfpg/testing/check_bsdf.hpp>
 #include <wfpg/testing/check_host.hpp>
