@@ -4,9 +4,10 @@
 usage: bench/both_ends.py DIRECTORY_OF_PROGRAMS OUT.json [SECONDS [REFERENCE_SECONDS [SIZE [SCENE...]]]]
 
 Renders each scene with each method for SECONDS (3), with two seeds. Two references take REFERENCE_SECONDS (8) each, or four
-times as long in bottles, and have other seeds. An error is the mean of both seeds against both references, less half the difference between the references, which
-is their own noise. vcm-all merges all photons where they are dense. upbp-more has beams of more light paths than upbp, and all
-photons along camera beams. Scenes that OUT has stay in it, but for those that are measured. They must have the same settings.
+times as long in bottles, and have other seeds. An error is the mean of both seeds against both references, less half the
+difference between the references, which is their own noise. vcm-all merges all photons where they are dense. upbp-more has beams
+of more light paths than upbp, and all photons along camera beams. Scenes that OUT has stay in it, but for those that are measured
+and those whose references took another time. They must have the same settings.
 """
 import statistics
 import sys
@@ -47,7 +48,8 @@ def measure(programs, scene, methods, seconds, reference_seconds):
             samples.append(render("x", method, seconds, seed)["spp"])
             errors += [programs.compare("x", reference) for reference in REFERENCE_SEEDS]
         lines[name] = {"spp": statistics.mean(samples), **errors_without_noise(errors, noise)}
-    return {"scene": scene, "reference_seconds": reference_seconds, "reference_noise": {kind: noise[kind] for kind in ERRORS}, "methods": lines}
+    return {"scene": scene, "reference_seconds": reference_seconds,
+            "reference_noise": {kind: noise[kind] for kind in ERRORS}, "methods": lines}
 
 
 def main(directory, out, seconds="3", reference_seconds="8", size="480x270", *names):

@@ -23,9 +23,13 @@ def a_sample(programs, scene, options):
     return milliseconds_a_sample(first, last, LAST - FIRST, STAGES)
 
 
+def median_sample(programs, scene, options, runs):
+    """Likewise, medians over runs, after one that warms up."""
+    return medians([a_sample(programs, scene, options) for _ in range(runs + 1)][1:])
+
+
 def measure(programs, scene, method, runs):
-    lines = [a_sample(programs, scene, ["--method", method]) for _ in range(runs + 1)][1:]
-    return {"scene": scene, "method": method, "milliseconds": medians(lines)}
+    return {"scene": scene, "method": method, "milliseconds": median_sample(programs, scene, ["--method", method], runs)}
 
 
 def main(directory, out, runs="3", size="1920x1080"):

@@ -11,8 +11,8 @@ import os
 import sys
 import tempfile
 
-from light_times import a_sample
-from programs import Programs, medians, write_results
+from light_times import median_sample
+from programs import Programs, write_results
 
 RADII = ("--radius", "0.0015", "--volume-radius", "0.001")
 SCENES = {
@@ -25,9 +25,9 @@ def measure(directory, scenes, name, runs):
     scene, size, options = SCENES[name]
     found = [os.path.join(scenes, o) if o.endswith(".exr") else o for o in options]
     with tempfile.TemporaryDirectory() as folder:
-        programs = Programs(directory, size, folder)
-        lines = [a_sample(programs, os.path.join(scenes, scene), ["--method", "upbp", *RADII, *found]) for _ in range(runs + 1)]
-    return {"scene": name, "size": size, "options": " ".join((*RADII, *options)), "milliseconds": medians(lines[1:])}
+        times = median_sample(Programs(directory, size, folder), os.path.join(scenes, scene),
+                              ["--method", "upbp", *RADII, *found], runs)
+    return {"scene": name, "size": size, "options": " ".join((*RADII, *options)), "milliseconds": times}
 
 
 def main(directory, out, scenes, runs="3"):

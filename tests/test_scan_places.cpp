@@ -1,6 +1,5 @@
 // Places of elements, compared with sums that are added in order.
 #include "support/catch.hpp"
-#include "support/evaluate.hpp"
 #include "support/policies.hpp"
 
 #include <wfpg/base/math.hpp>

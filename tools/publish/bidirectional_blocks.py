@@ -144,12 +144,12 @@ def iteration_ratio(results: Results) -> str:
 
 
 SAMPLE_STAGES = {"light paths": ("light paths", "splats"), "maps": ("photon map",), "camera paths": ("camera", "trace", "shade"),
-                 "connections": ("lights", "connections"), "merges": ("merges",), "all": ("total",)}
+                 "connections": ("connections",), "merges": ("merges",), "all": ("total",)}
 
 
 def stage_cells(milliseconds: Dict[str, float]) -> List[str]:
     """A sample's times, by groups of stages."""
-    sums = [sum(milliseconds.get(part, 0.0) for part in parts) for parts in SAMPLE_STAGES.values()]
+    sums = [sum(milliseconds[part] for part in parts) for parts in SAMPLE_STAGES.values()]
     return [three(x) if x > 0 else "" for x in sums]
 
 

@@ -167,7 +167,7 @@ class observed_bidirectional_tracer {
     });
     for (std::uint32_t segments = 1; segments < settings_.max_depth; ++segments) {
       const bool is_last = segments + 1 == settings_.max_depth;
-      clock_.measure("light paths", [&] { follow_segment(segments, is_last); });
+      clock_.measure("light paths", [&] { follow_light_segment(segments, is_last); });
       const bool forgets = !settings_.techniques.joins_light_paths() && segments % depths_in_memory() == 0;
       if (!settings_.techniques.has(technique::splat) || !(is_last || forgets)) continue;
       clock_.measure("splats", [&] { splat_light(camera, segments); });
@@ -182,7 +182,7 @@ class observed_bidirectional_tracer {
     return std::max(static_cast<std::uint32_t>(stored().capacity() / count_), 1u);
   }
 
-  void follow_segment(std::uint32_t segments, bool is_last) {
+  void follow_light_segment(std::uint32_t segments, bool is_last) {
     exec_.fill_bytes(keeps_.data(), 0, keeps_.bytes());
     active_.for_each(exec_, trace_light_paths<world_type>{world_, segments, paths_.view(), vertices_.view(),
                                                           active_.marks(), keeps_.view(),

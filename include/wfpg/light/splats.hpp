@@ -85,7 +85,7 @@ class splats {
         pixels_(exec, checked(places)),
         values_(exec, places),
         by_pixel_(exec, places) {
-    exec.fill_bytes(pixels_.data(), 0xff, pixels_.size() * sizeof(std::uint32_t));
+    clear(exec, places);
   }
 
   /// View for kernels, valid as long as the owner is not moved.
@@ -103,7 +103,7 @@ class splats {
     const array_view<const std::uint32_t> pixels(pixels_.data(), n);
     const partition_view by_pixel = by_pixel_.partition(exec, pixels, key_bits_);
     exec.for_each(n, detail::add_splats{by_pixel, values_.view(), picture, scale});
-    exec.fill_bytes(pixels_.data(), 0xff, n * sizeof(std::uint32_t));
+    clear(exec, n);
   }
 
   /// Bytes allocated, without the sort's temporaries.
@@ -121,6 +121,10 @@ class splats {
   static std::size_t checked(std::size_t places) {
     require(places < 0xffffffffull, "number of splats", places, "less than 2^32 - 1");
     return places;
+  }
+  // Empties the first n places.
+  void clear(const Exec& exec, std::size_t n) {
+    exec.fill_bytes(pixels_.data(), 0xff, n * sizeof(std::uint32_t));
   }
 
   int key_bits_ = 1;  // of pixels, and of the key of empty places
