@@ -6,6 +6,6 @@
 /// Raised by every incompatible change, once it is 1.
 #define WFPG_VERSION_MAJOR 0
 /// Raised by new features. While the major version is 0, incompatible changes raise it too.
-#define WFPG_VERSION_MINOR 1
+#define WFPG_VERSION_MINOR 2
 /// Raised by corrections that change no interface.
 #define WFPG_VERSION_PATCH 0

@@ -20,7 +20,7 @@ std::string content_of(const std::filesystem::path& path);
 /// The output of a shell command, or nothing if it fails.
 std::optional<std::string> output_of(const std::string& command);
 
-/// The library's version, such as 0.1.0.
+/// The library's version, such as 0.2.0.
 std::string version();
 
 /// The hash of this program's own file, or the library's version if it cannot be read. Programs of different
