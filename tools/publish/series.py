@@ -95,7 +95,7 @@ ALL: Tuple[Series, ...] = (
            "cuda-stages.json"),
     Series("cuda-casting.json", ("bench_cuda --benchmark_filter=casting --benchmark_out=cuda-casting.json --benchmark_out_format=json",),
            ("gpu", "OptiX"), 1, "cuda-casting.json"),
-    Series("cuda-equal-time.json", ("equal_time.py bin cuda-equal-time.json 10 60",), ("gpu",), 5, "cuda-equal-time.json"),
+    Series("cuda-equal-time.json", ("equal_time.py bin cuda-equal-time.json 10 40",), ("gpu",), 5, "cuda-equal-time.json"),
     Series("cuda-sample-times.json", ("sample_times.py bin cuda-sample-times.json 20",), ("gpu",), 5, "cuda-sample-times.json"),
     Series("cuda-both-ends.json", ("both_ends.py bin cuda-both-ends.json",), ("gpu",), 8, "cuda-both-ends.json"),
     Series("cuda-both-ends-large.json",
