@@ -21,6 +21,13 @@ def equal_time_gpu(results: Results) -> Rows:
 
 
 @block
+def equal_time_setup(results: Results) -> str:
+    """Seconds of renderings and of their references."""
+    seconds, reference = (results.json(EQUAL_TIME, key) for key in ("seconds", "reference_seconds"))
+    return f"Renderings take {seconds:g} s, and the references {reference:g} s"
+
+
+@block
 def equal_time_gain(results: Results, scene: str, method: str = "wfpg") -> str:
     """A method's gain at equal time on the GPU."""
     methods = next(s["methods"] for s in results.json(EQUAL_TIME, "scenes") if s["scene"] == scene)
@@ -146,3 +153,9 @@ def stages(results: Results) -> Rows:
 def compilers(results: Results) -> Rows:
     """What including the library costs a compiler."""
     return compiler_rows(results.json("compile-time.json", "compilers"))
+
+
+@block
+def compile_ratios(results: Results, source: str) -> str:
+    """A source's compile times over those of Thrust and GLM, by compiler."""
+    return span([sources[source]["ratio"] for sources in results.json("compile-time.json", "compilers").values()])
