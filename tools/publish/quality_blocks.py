@@ -93,14 +93,13 @@ def lights(results: Results) -> Rows:
 
 @block
 def guides(results: Results) -> Rows:
-    """Guides after one second without next-event estimation: gain, and mean absolute error."""
+    """Gains of guides after one second without next-event estimation."""
     scenes = [s for f in ("quality-sarsa.json", "quality-sarsa-more.json") for s in results.json(f, "scenes")]
     rows = [["guide", *map(short, scenes)]]
     names = {"sarsa-hemisphere": "SARSA, hemisphere", "monte-carlo-hemisphere": "Monte Carlo, hemisphere",
              "records": "irradiance records", "wfpg": "octree guide"}
     for method, name in names.items():
-        found = [summary(s, method)["errors"] for s in scenes]
-        rows.append([name, *(f"{three(e['mse_reinhard']['ratio'])} ({e['mae']['mean']:#.3g})" for e in found)])
+        rows.append([name, *(pair(last_errors(s), method) for s in scenes)])
     return rows
 
 
