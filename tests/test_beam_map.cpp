@@ -180,23 +180,24 @@ bool operator==(const found_merges& a, const found_merges& b) {
 
 TEST_CASE("beam maps find the same in one order on each policy", "[beam_map]") {
   const std::vector<path_beam> beams = random_beams(2000, false, 6), cameras = random_beams(200, false, 7);
-  const auto found_on = [&](const auto& exec) {
-    using Exec = std::decay_t<decltype(exec)>;
-    const wfpg::buffer<path_beam, Exec> device_beams(exec, beams), device_cameras(exec, cameras);
-    wfpg::beam_map<Exec> map;
+  const auto found_on = [&](backend chosen) {
+    const backend_choice choice(chosen);
+    const one_policy exec;
+    const wfpg::buffer<path_beam, one_policy> device_beams(exec, beams), device_cameras(exec, cameras);
+    wfpg::beam_map<one_policy> map;
     map.build(exec, device_beams.view(), {0.05f, 9000});
     return evaluate(exec, cameras.size(), query_beams{map.view(), device_cameras.view()});
   };
-  const auto serial = found_on(wfpg::exec::seq());
-  CHECK(found_on(wfpg::exec::omp()) == serial);
-  CHECK(found_on(wfpg::exec::tbb()) == serial);
+  const auto serial = found_on(backend::seq);
+  CHECK(found_on(backend::omp) == serial);
+  CHECK(found_on(backend::tbb) == serial);
 }
 #endif
 
 TEST_CASE("options of beam maps have ranges", "[beam_map]") {
-  const wfpg::exec::seq exec;
-  const wfpg::buffer<path_beam, wfpg::exec::seq> beams(exec, random_beams(3, false, 8));
-  wfpg::beam_map<wfpg::exec::seq> map;
+  const host_policy exec;
+  const wfpg::buffer<path_beam, host_policy> beams(exec, random_beams(3, false, 8));
+  wfpg::beam_map<host_policy> map;
   for (const float radius : {0.0f, -1.0f, std::numeric_limits<float>::quiet_NaN(), 1e20f})
     CHECK_THROWS_AS(map.build(exec, beams.view(), {radius, 10}), std::invalid_argument);
   CHECK_THROWS_AS(map.build(exec, beams.view(), {0.1f, 2}), std::invalid_argument);

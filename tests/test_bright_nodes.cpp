@@ -210,8 +210,9 @@ WFPG_TEST_CASE("bright nodes: threads and forms of casters do not change a bit",
 
 #if defined(WFPG_TEST_SEVERAL_POLICIES)
 TEST_CASE("bright nodes: policies of one warp width give the same bits", "[bright_nodes]") {
-  const std::uint64_t serial = lamp_box<wfpg::exec::seq>({}).bits();
-  CHECK(lamp_box<wfpg::exec::omp>({}).bits() == serial);
-  CHECK(lamp_box<wfpg::exec::tbb>({}).bits() == serial);
+  const auto bits = [] { return lamp_box<one_policy>({}).bits(); };
+  const std::uint64_t serial = with_backend(backend::seq, bits);
+  CHECK(with_backend(backend::omp, bits) == serial);
+  CHECK(with_backend(backend::tbb, bits) == serial);
 }
 #endif

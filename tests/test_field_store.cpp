@@ -385,10 +385,13 @@ WFPG_TEST_CASE("field store: both forms of casters and any buffer size give the 
 
 #if defined(WFPG_TEST_SEVERAL_POLICIES)
 TEST_CASE("field store: policies of one warp width give the same bits", "[field_store]") {
-  const store_history serial = history<wfpg::exec::seq>();
-  CHECK(history<wfpg::exec::omp>() == serial);
-  CHECK(history<wfpg::exec::tbb>() == serial);
-  CHECK(history<wfpg::exec::basic_omp<8>>() == history<wfpg::exec::basic_seq<8>>());
-  CHECK(history<wfpg::exec::basic_tbb<8>>() == history<wfpg::exec::basic_seq<8>>());
+  const auto wide = [] { return history<one_policy>(); };
+  const store_history serial = with_backend(backend::seq, wide);
+  CHECK(with_backend(backend::omp, wide) == serial);
+  CHECK(with_backend(backend::tbb, wide) == serial);
+  const auto narrow = [] { return history<basic_chosen<8>>(); };
+  const store_history narrow_serial = with_backend(backend::seq, narrow);
+  CHECK(with_backend(backend::omp, narrow) == narrow_serial);
+  CHECK(with_backend(backend::tbb, narrow) == narrow_serial);
 }
 #endif

@@ -328,12 +328,14 @@ WFPG_TEST_CASE("path guider: one seed gives the same bits on any number of threa
 TEST_CASE("path guider: policies of one warp width give the same bits", "[path_guider]") {
   for (field_lifetime lifetime : lifetimes) {
     INFO(name_of(lifetime));
-    const std::vector<float> serial = picture<wfpg::exec::seq>(1, lifetime);
-    CHECK(picture<wfpg::exec::omp>(1, lifetime) == serial);
-    CHECK(picture<wfpg::exec::tbb>(1, lifetime) == serial);
-    const std::vector<float> narrow = picture<wfpg::exec::basic_seq<8>>(1, lifetime);
-    CHECK(picture<wfpg::exec::basic_omp<8>>(1, lifetime) == narrow);
-    CHECK(picture<wfpg::exec::basic_tbb<8>>(1, lifetime) == narrow);
+    const auto wide = [&] { return picture<one_policy>(1, lifetime); };
+    const std::vector<float> serial = with_backend(backend::seq, wide);
+    CHECK(with_backend(backend::omp, wide) == serial);
+    CHECK(with_backend(backend::tbb, wide) == serial);
+    const auto narrow = [&] { return picture<basic_chosen<8>>(1, lifetime); };
+    const std::vector<float> narrow_serial = with_backend(backend::seq, narrow);
+    CHECK(with_backend(backend::omp, narrow) == narrow_serial);
+    CHECK(with_backend(backend::tbb, narrow) == narrow_serial);
   }
 }
 

@@ -5,12 +5,10 @@
 #include "support/catch.hpp"
 #include "support/either_guide.hpp"
 #include "support/pictures.hpp"
+#include "support/policies.hpp"
 #include "tracer/unguided.hpp"
 #include "tracer/wavefront.hpp"
 
-#include <wfpg/exec/omp.hpp>
-#include <wfpg/exec/seq.hpp>
-#include <wfpg/exec/tbb.hpp>
 #include <wfpg/guides/octree/kept_guide.hpp>
 #include <wfpg/path_guider.hpp>
 
@@ -24,6 +22,8 @@ namespace {
 
 using namespace render;
 using namespace render_test;
+using wfpg_test::backend;
+using policy = wfpg_test::one_policy;
 
 struct setup {
   int side = 16;
@@ -126,21 +126,21 @@ batch batch_of(const scene& scene, setup with) {
   batch result;
   for (std::uint64_t seed = 0; seed < 24; ++seed) {
     with.seed = seed + (with.nee ? 1000 : 0);
-    result.means.push_back(mean_of(trace<wfpg::exec::tbb>(scene, with)));
+    result.means.push_back(mean_of(trace<policy>(scene, with)));
   }
   return result;
 }
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("the furnace has its known radiance", "[renderer]", wfpg::exec::seq, wfpg::exec::omp,
-                   wfpg::exec::tbb) {
+TEST_CASE("the furnace has its known radiance", "[renderer]") {
+  const wfpg_test::backend_choice choice(GENERATE(backend::seq, backend::omp, backend::tbb));
   const scene furnace = make_builtin_scene("furnace");
   for (const bool nee : {false, true})
     for (const std::uint32_t depth : {1u, 2u, 8u}) {
       INFO("depth " << depth << ", nee " << nee);
       const setup with{112, depth, nee, 3, 8};
-      CHECK(mean_of(trace<TestType>(furnace, with)) ==
+      CHECK(mean_of(trace<policy>(furnace, with)) ==
             Approx(furnace_radiance(static_cast<int>(depth))).epsilon(0.005));
     }
 }
@@ -162,14 +162,12 @@ TEST_CASE("next-event estimation changes the noise, not the mean", "[renderer]")
 }
 
 TEST_CASE("a batch caster gives the pictures of an inline one", "[renderer]") {
-  using exec_policy = wfpg::exec::tbb;
-  using guider = wfpg_test::octree_guider<exec_policy>;
+  using guider = wfpg_test::octree_guider<policy>;
   const scene scene = make_builtin_scene("cornell-enclosed");
-  const device_scene<exec_policy> geometry(exec_policy(), scene);
+  const device_scene<policy> geometry(policy(), scene);
   for (const bool nee : {false, true}) {
     const setup with{32, 6, nee, 5, 6};
-    const traced whole = trace_all<exec_policy>(scene, with),
-                 waves = trace_all<exec_policy, batch_caster>(scene, with);
+    const traced whole = trace_all<policy>(scene, with), waves = trace_all<policy, batch_caster>(scene, with);
     CHECK((whole.has_whole_paths && !waves.has_whole_paths));
     CHECK(same_bits(whole.picture, waves.picture));
     CHECK((whole.segments == waves.segments && whole.light_hits == waves.light_hits));
@@ -184,10 +182,10 @@ TEST_CASE("a batch caster gives the pictures of an inline one", "[renderer]") {
       options.max_depth = 6;
       const auto guided = [&] {
         const wfpg::triangle_mesh_view mesh{geometry.view().positions, geometry.view().triangles};
-        return guider(exec_policy(), mesh, options);
+        return guider(policy(), mesh, options);
       };
-      CHECK(same_bits(trace<exec_policy, embree_caster>(scene, with, guided()),
-                      trace<exec_policy, batch_caster>(scene, with, guided())));
+      CHECK(same_bits(trace<policy, embree_caster>(scene, with, guided()),
+                      trace<policy, batch_caster>(scene, with, guided())));
     }
   }
 }
@@ -208,13 +206,12 @@ class silent_guider : private Guider {
 
 /// Makes guiders of one scene. They never find that guiding pays.
 struct guiders_that_rest {
-  using exec_policy = wfpg::exec::tbb;
-  using guider = wfpg::path_guider<exec_policy, wfpg::kept_guide<exec_policy>>;
+  using guider = wfpg::path_guider<policy, wfpg::kept_guide<policy>>;
   static constexpr int side = 96;
   static constexpr std::uint32_t max_depth = 5;
 
   scene world = make_builtin_scene("cornell-wall");
-  device_scene<exec_policy> geometry{exec_policy(), world};
+  device_scene<policy> geometry{policy(), world};
 
   static setup of_samples(std::uint32_t samples) { return {side, max_depth, true, 5, samples}; }
   guider make() const {
@@ -224,20 +221,19 @@ struct guiders_that_rest {
     options.max_paths = side * side;
     options.max_depth = max_depth;
     options.least_gain = 1e6f;
-    return guider(exec_policy(), {geometry.view().positions, geometry.view().triangles}, options);
+    return guider(policy(), {geometry.view().positions, geometry.view().triangles}, options);
   }
 };
 
 TEST_CASE("while a guide probes, paths that it takes no part in have the bits of their waves", "[renderer]") {
-  using exec_policy = guiders_that_rest::exec_policy;
   using guider = guiders_that_rest::guider;
   const guiders_that_rest guiders;
   // The guide probes in all four samples. The first two are not guided.
   const setup with = guiders_that_rest::of_samples(4);
   guider probes = guiders.make();
-  const traced split = trace_all<exec_policy, embree_caster, guider&>(guiders.world, with, probes);
+  const traced split = trace_all<policy, embree_caster, guider&>(guiders.world, with, probes);
   const traced waves =
-      trace_all<exec_policy, embree_caster>(guiders.world, with, silent_guider<guider>(guiders.make()));
+      trace_all<policy, embree_caster>(guiders.world, with, silent_guider<guider>(guiders.make()));
   REQUIRE(probes.probing());
   CHECK(probes.statistics().gain.paths > 2048);
   CHECK(split.has_whole_paths);
@@ -254,14 +250,13 @@ TEST_CASE("while a guide probes, paths that it takes no part in have the bits of
 }
 
 TEST_CASE("samples in which a guide rests have the bits of their waves", "[renderer]") {
-  using exec_policy = guiders_that_rest::exec_policy;
   using guider = guiders_that_rest::guider;
   const guiders_that_rest guiders;
   const setup with = guiders_that_rest::of_samples(24);
   guider rests = guiders.make();
-  const traced whole = trace_all<exec_policy, embree_caster, guider&>(guiders.world, with, rests);
+  const traced whole = trace_all<policy, embree_caster, guider&>(guiders.world, with, rests);
   // A batch caster's paths wait for each other in all samples.
-  const traced waves = trace_all<exec_policy, batch_caster>(guiders.world, with, guiders.make());
+  const traced waves = trace_all<policy, batch_caster>(guiders.world, with, guiders.make());
   CHECK(rests.resting());
   CHECK(rests.statistics().gain.paths > wfpg::guiding_gain::least_paths);
   CHECK(whole.ends_in_one_kernel);
@@ -274,20 +269,23 @@ TEST_CASE("samples in which a guide rests have the bits of their waves", "[rende
 TEST_CASE("one seed gives one picture on any number of threads", "[renderer]") {
   const scene scene = make_builtin_scene("cornell-enclosed");
   const setup with{32, 6, true, 5, 4};
-  const auto serial = trace<wfpg::exec::seq>(scene, with);
-  CHECK(same_bits(serial, trace<wfpg::exec::seq>(scene, with)));
+  const auto traced_by = [&](backend chosen) {
+    return wfpg_test::with_backend(chosen, [&] { return trace<policy>(scene, with); });
+  };
+  const auto serial = traced_by(backend::seq);
+  CHECK(same_bits(serial, traced_by(backend::seq)));
   for (const int threads : {1, 2, 5}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(threads));
-    CHECK(same_bits(serial, trace<wfpg::exec::tbb>(scene, with)));
+    CHECK(same_bits(serial, traced_by(backend::tbb)));
     const int before = omp_get_max_threads();
     omp_set_num_threads(threads);
-    CHECK(same_bits(serial, trace<wfpg::exec::omp>(scene, with)));
+    CHECK(same_bits(serial, traced_by(backend::omp)));
     omp_set_num_threads(before);
   }
   setup other = with;
   other.seed = 6;
-  CHECK_FALSE(same_bits(serial, trace<wfpg::exec::seq>(scene, other)));
+  CHECK_FALSE(same_bits(serial, trace<policy>(scene, other)));
 }
 
 TEST_CASE("emitters emit on one side, and the environment everywhere", "[renderer]") {
@@ -296,12 +294,12 @@ TEST_CASE("emitters emit on one side, and the environment everywhere", "[rendere
   lamp.emission = {1.0f, 2.0f, 3.0f};
   scene s = square_of(lamp);
   s.environment = vec3(0.25f);
-  CHECK(trace<wfpg::exec::seq>(s, {}).front() == lamp.emission);
+  CHECK(trace<policy>(s, {}).front() == lamp.emission);
   s.view.position.z = -2.0f;
   s.view.forward = {0.0f, 0.0f, 1.0f};
-  CHECK(trace<wfpg::exec::seq>(s, {}).front() == vec3(0.0f));
+  CHECK(trace<policy>(s, {}).front() == vec3(0.0f));
   s.view.forward = {0.0f, 0.0f, -1.0f};
-  CHECK(trace<wfpg::exec::seq>(s, {}).front() == vec3(0.25f));
+  CHECK(trace<policy>(s, {}).front() == vec3(0.25f));
 }
 
 TEST_CASE("a surface under a constant sky returns its albedo", "[renderer]") {
@@ -310,15 +308,15 @@ TEST_CASE("a surface under a constant sky returns its albedo", "[renderer]") {
   scene s = square_of(grey);
   s.environment = vec3(1.0f);
   // The scene has only this square, so every reflected path leaves.
-  CHECK(mean_of(trace<wfpg::exec::tbb>(s, {})) == Approx(0.5).epsilon(1e-4));
+  CHECK(mean_of(trace<policy>(s, {})) == Approx(0.5).epsilon(1e-4));
   s.materials[0].kind = material_kind::mirror;
-  CHECK(mean_of(trace<wfpg::exec::tbb>(s, {})) == Approx(0.5).epsilon(1e-4));
+  CHECK(mean_of(trace<policy>(s, {})) == Approx(0.5).epsilon(1e-4));
   s.materials[0].kind = material_kind::dielectric;
   s.materials[0].base_color = vec3(1.0f);
   setup deep;
   deep.samples = 256;
   // Light from below the boundary has the radiance of its index: 0.04 + 0.96 / 1.5².
-  CHECK(mean_of(trace<wfpg::exec::tbb>(s, deep)) == Approx(0.04 + 0.96 / 2.25).epsilon(0.01));
+  CHECK(mean_of(trace<policy>(s, deep)) == Approx(0.04 + 0.96 / 2.25).epsilon(0.01));
 }
 
 TEST_CASE("a smooth coat under an even sky returns its albedo", "[renderer]") {
@@ -337,17 +335,17 @@ TEST_CASE("a smooth coat under an even sky returns its albedo", "[renderer]") {
   const auto check = [&] {
     for (const bool nee : {false, true}) {
       with.nee = nee;
-      CHECK(mean_of(trace<wfpg::exec::tbb>(s, with)) == Approx(expected).epsilon(0.003));
+      CHECK(mean_of(trace<policy>(s, with)) == Approx(expected).epsilon(0.003));
       wfpg_test::guider_options options;
       options.octree_resolution = 16;
       options.kept.resolution = 16;
       options.include_emission = !nee;
       options.max_paths = 32 * 32;
       options.max_depth = 3;
-      const device_scene<wfpg::exec::tbb> geometry(wfpg::exec::tbb(), s);
-      wfpg_test::octree_guider<wfpg::exec::tbb> guider(
-          wfpg::exec::tbb(), {geometry.view().positions, geometry.view().triangles}, options);
-      const auto guided = trace<wfpg::exec::tbb, embree_caster>(s, with, std::move(guider));
+      const device_scene<policy> geometry(policy(), s);
+      wfpg_test::octree_guider<policy> guider(
+          policy(), {geometry.view().positions, geometry.view().triangles}, options);
+      const auto guided = trace<policy, embree_caster>(s, with, std::move(guider));
       CHECK(mean_of(guided) == Approx(expected).epsilon(0.003));
     }
   };
@@ -361,7 +359,7 @@ TEST_CASE("a smooth coat under an even sky returns its albedo", "[renderer]") {
 TEST_CASE("an empty scene shows its environment", "[renderer]") {
   scene s;
   s.environment = {0.1f, 0.2f, 0.3f};
-  CHECK(trace<wfpg::exec::tbb>(s, {}).back() == s.environment);
+  CHECK(trace<policy>(s, {}).back() == s.environment);
 }
 
 TEST_CASE("light samples follow power, and report the density of a hit", "[renderer]") {
@@ -370,9 +368,9 @@ TEST_CASE("light samples follow power, and report the density of a hit", "[rende
   s.materials[0].emission = vec3(3.0f);
   s.materials[1].emission = vec3(1.0f);
   s.triangle_materials = {0, 1};
-  const wfpg::exec::seq exec;
-  const device_scene<wfpg::exec::seq> geometry(exec, s);
-  const light_distribution<wfpg::exec::seq> lights(exec, s);
+  const policy exec;
+  const device_scene<policy> geometry(exec, s);
+  const light_distribution<policy> lights(exec, s);
   const random_stream random{1, 0};
   const std::uint32_t n = 100000;
   int bright = 0;
@@ -403,7 +401,7 @@ TEST_CASE("lights without extent light surfaces that face them", "[renderer]") {
   const auto radiance = [&](const punctual_light& source) {
     s.punctual_lights = {source};
     s.view.vertical_fov = 0.01f;
-    return trace<wfpg::exec::seq>(s, narrow).front().x;
+    return trace<policy>(s, narrow).front().x;
   };
   // Albedo / pi times irradiance, 32 / 4².
   CHECK(radiance(light) == Approx(0.5f / pi * 2.0f).epsilon(1e-3));
@@ -447,7 +445,7 @@ TEST_CASE("a solid absorbs by Beer's law, and an emitter shows its texture", "[r
   s.view.vertical_fov = 0.01f;
   setup with;
   with.side = 4;
-  const vec3 seen = trace<wfpg::exec::seq>(s, with).front();
+  const vec3 seen = trace<policy>(s, with).front();
   const vec3 expected = vec3(2.0f, 4.0f, 4.0f) * glm::exp(-s.materials[0].absorption);
   CHECK(glm::length(seen - expected) < 1e-3f);
 }
@@ -486,7 +484,7 @@ TEST_CASE("next-event estimation and hits agree on an environment map", "[render
   s.sky.height = 4;
   setup with{8, 3, true, 0, 64};
   s.sky.texels.assign(16, vec3(2.0f));
-  CHECK(mean_of(trace<wfpg::exec::tbb>(s, with)) == Approx(1.0).epsilon(0.02));
+  CHECK(mean_of(trace<policy>(s, with)) == Approx(1.0).epsilon(0.02));
   for (std::size_t i = 0; i < 16; ++i) s.sky.texels[i] = vec3(i % 5 == 0 ? 20.0f : 0.1f);
   const batch on = batch_of(s, with);
   with.nee = false;

@@ -10,10 +10,6 @@
 #include "support/whole_paths.hpp"
 #include "tracer/bidirectional.hpp"
 
-#include <wfpg/exec/omp.hpp>
-#include <wfpg/exec/seq.hpp>
-#include <wfpg/exec/tbb.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -28,6 +24,7 @@ namespace {
 using render::sampling_method;
 using render::subpath_vertex;
 using render::vec3;
+using wfpg_test::backend;
 using wfpg_test::check_precisely;
 using wfpg_test::check_rendering;
 using wfpg_test::compare_weights;
@@ -272,10 +269,13 @@ std::pair<std::vector<vec3>, std::vector<render::technique_picture>> with_splats
 
 TEST_CASE("pictures do not depend on how many splats are added at a time", "[renderer][bidirectional]") {
   for (const render::technique_set& techniques : {render::technique_set(), render::light_tracing()}) {
-    const auto many = with_splats_at_a_time<wfpg::exec::seq>(100000, techniques, 12),
-               few = with_splats_at_a_time<wfpg::exec::seq>(1, techniques, 12);
-    CHECK(few.first == with_splats_at_a_time<wfpg::exec::omp>(1, techniques, 12).first);
-    CHECK(few.first == with_splats_at_a_time<wfpg::exec::tbb>(1, techniques, 12).first);
+    const auto rendered = [&](backend chosen, std::size_t splats) {
+      const wfpg_test::backend_choice choice(chosen);
+      return with_splats_at_a_time<wfpg_test::one_policy>(splats, techniques, 12);
+    };
+    const auto many = rendered(backend::seq, 100000), few = rendered(backend::seq, 1);
+    CHECK(few.first == rendered(backend::omp, 1).first);
+    CHECK(few.first == rendered(backend::tbb, 1).first);
     double light = 0.0;
     for (std::size_t i = 0; i < few.first.size(); ++i) {
       CHECK(glm::length(few.first[i] - many.first[i]) <= 1e-5f * glm::length(many.first[i]));
@@ -305,7 +305,7 @@ TEST_CASE("paths of one segment see lights alone", "[renderer][bidirectional]") 
 }
 
 TEST_CASE("each allocation of points, beams and paths may fail", "[renderer][bidirectional]") {
-  using policy = wfpg::exec::tbb;
+  using policy = wfpg_test::one_policy;
   wfpg_test::failing_resource resource;
   const policy exec = policy().with_resource(&resource);
   const render::scene host = render::make_builtin_scene("fog-spot");

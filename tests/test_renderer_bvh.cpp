@@ -284,16 +284,16 @@ WFPG_TEST_CASE("triangles in one place, and many sizes at each scale, are found"
 WFPG_TEST_CASE("BVHs and hits are equal on all policies", "[renderer][bvh]") {
   const test_mesh mesh = mixed_triangles(2000, 0.005f, 0.2f, 12);
   const std::vector<ray> rays = random_rays(5000, 13);
-  const std::vector<answers> first = cast<wfpg::exec::tbb>(mesh, rays);
+  const std::vector<answers> first = cast<one_policy>(mesh, rays);
   const std::vector<answers> found = cast<Exec>(mesh, rays);
   CHECK(std::memcmp(found.data(), first.data(), found.size() * sizeof(answers)) == 0);
 }
 
 TEST_CASE("numbers of a leaf's triangles out of range are refused", "[renderer][bvh]") {
-  const wfpg::exec::tbb exec;
-  const device_mesh<wfpg::exec::tbb> box(exec, cuboid_mesh());
-  CHECK_THROWS_AS(bvh_scene<wfpg::exec::tbb>(exec, box.view(), 0.0f, 0), std::invalid_argument);
-  CHECK_THROWS_AS(bvh_scene<wfpg::exec::tbb>(exec, box.view(), 0.0f, 8), std::invalid_argument);
+  const one_policy exec;
+  const device_mesh<one_policy> box(exec, cuboid_mesh());
+  CHECK_THROWS_AS(bvh_scene<one_policy>(exec, box.view(), 0.0f, 0), std::invalid_argument);
+  CHECK_THROWS_AS(bvh_scene<one_policy>(exec, box.view(), 0.0f, 8), std::invalid_argument);
 }
 
 }  // namespace

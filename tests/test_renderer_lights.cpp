@@ -4,10 +4,9 @@
 #include "scene/alias_table.hpp"
 #include "scene/builtin_scenes.hpp"
 #include "support/catch.hpp"
+#include "support/policies.hpp"
 #include "tracer/path_kernels.hpp"
 #include "tracer/rng.hpp"
-
-#include <wfpg/exec/seq.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -20,6 +19,7 @@
 namespace {
 
 using namespace render;
+using wfpg_test::one_policy;
 
 /// The probability of each element in pick().
 std::vector<double> probabilities(const std::vector<alias_column>& table) {
@@ -88,9 +88,9 @@ TEST_CASE("emitters are sampled by power, and the density by area matches their 
   s.materials.resize(3);
   s.materials[0].emission = vec3(2.0f);
   s.materials[1].emission = vec3(0.5f);
-  const wfpg::exec::seq exec;
-  const device_scene<wfpg::exec::seq> geometry(exec, s);
-  const light_distribution<wfpg::exec::seq> lights(exec, s);
+  const one_policy exec;
+  const device_scene<one_policy> geometry(exec, s);
+  const light_distribution<one_policy> lights(exec, s);
   const double power = 2.0 * 0.5 + 0.5 * 4.5;
   constexpr std::uint32_t draws = 100000;
   double bright = 0.0;
@@ -107,8 +107,8 @@ TEST_CASE("an environment map is sampled by luminance", "[renderer][lights]") {
   scene s;
   s.sky = {8, 4, std::vector<vec3>(32, vec3(0.0f))};
   for (std::uint32_t i = 0; i < 32; ++i) s.sky.texels[i] = vec3(0.05f + numbers(i, 4).x * numbers(i, 4).x);
-  const wfpg::exec::seq exec;
-  const device_scene<wfpg::exec::seq> geometry(exec, s);
+  const one_policy exec;
+  const device_scene<one_policy> geometry(exec, s);
   const environment_view sky = geometry.view().environment;
   // The mean density of uniform directions is 1 over the sphere's area. The mean inverse density of samples
   // is that area.
@@ -129,7 +129,7 @@ TEST_CASE("an environment map is sampled by luminance", "[renderer][lights]") {
   // The centre is -z, its right +x, the upper edge +y.
   s.sky = {4, 2, std::vector<vec3>(8, vec3(0.0f))};
   s.sky.texels[2] = vec3(1.0f);
-  const device_scene<wfpg::exec::seq> corner(exec, s);
+  const device_scene<one_policy> corner(exec, s);
   CHECK(corner.view().environment.radiance(glm::normalize(vec3(1.0f, 1.414f, -1.0f))).x ==
         Approx(1.0).epsilon(0.01));
 }
@@ -218,12 +218,12 @@ TEST_CASE("choices of groups change the lights' densities, not their radiance", 
     s.materials.back().emission = vec3(std::pow(4.0f, static_cast<float>(lamp)));
     for (const std::size_t half : {2, 3}) s.triangle_materials[2 * lamp + half] = 2 + lamp;
   }
-  const wfpg::exec::seq exec;
-  const device_scene<wfpg::exec::seq> geometry(exec, s);
-  const light_distribution<wfpg::exec::seq> whole(exec, s), parts(exec, s, 32);
+  const one_policy exec;
+  const device_scene<one_policy> geometry(exec, s);
+  const light_distribution<one_policy> whole(exec, s), parts(exec, s, 32);
   REQUIRE(parts.shares().size() == 5);
   const vec3 from(2.0f, 0.3f, 1.0f);
-  const auto irradiance = [&](const light_distribution<wfpg::exec::seq>& lights, const auto& choose) {
+  const auto irradiance = [&](const light_distribution<one_policy>& lights, const auto& choose) {
     double sum = 0.0;
     constexpr std::uint32_t draws = 200000;
     for (std::uint32_t i = 0; i < draws; ++i) {
@@ -234,7 +234,7 @@ TEST_CASE("choices of groups change the lights' densities, not their radiance", 
     }
     return sum / draws;
   };
-  const auto by_power = [&](const light_distribution<wfpg::exec::seq>& lights) {
+  const auto by_power = [&](const light_distribution<one_policy>& lights) {
     const path_lights without_guide{geometry.view(), lights.view()};
     return irradiance(
         lights, [&](std::uint32_t, const auto& draw) { return without_guide.choose(path_vertex{}, draw); });

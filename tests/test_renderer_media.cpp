@@ -8,13 +8,12 @@
 #include "support/command_lines.hpp"
 #include "support/media.hpp"
 #include "support/pictures.hpp"
+#include "support/policies.hpp"
 #include "support/renderings.hpp"
 #include "support/sample_means.hpp"
 #include "support/temporary_folder.hpp"
 #include "support/tiny_gltf.hpp"
 #include "tracer/volume_tracer.hpp"
-
-#include <wfpg/exec/seq.hpp>
 
 #include <cmath>
 #include <cstdint>
@@ -28,6 +27,7 @@ using namespace render;
 using namespace render_test;
 using wfpg::testing::sample_mean;
 using wfpg_test::has_mean;
+using wfpg_test::one_policy;
 
 render_options volume_options(int side, int spp, int max_depth) {
   render_options options;
@@ -97,18 +97,18 @@ TEST_CASE("media: a half-space reflects what Chandrasekhar's H functions say", "
 }
 
 TEST_CASE("media: the mean number of collisions in endless fog is 1/(1 - albedo)", "[renderer][media]") {
-  const wfpg::exec::seq exec;
+  const one_policy exec;
   constexpr std::size_t count = 60000;
   for (const float albedo : {0.3f, 0.8f, 0.95f}) {
     volume_position at{{{7, 0}, 0, 1000}};
     path_lights world;
     world.next_event = false;
     world.scene.fog = {vec3(2.0f * (1.0f - albedo)), vec3(2.0f * albedo), 0.5f};
-    tiled_array<volume_path, wfpg::exec::seq> paths(exec, count);
-    tiled_array<path_vertex, wfpg::exec::seq> vertices(exec, count);
-    wfpg::buffer<std::uint32_t, wfpg::exec::seq> keys(exec, count), counts(exec, count);
-    wfpg::buffer<vec3, wfpg::exec::seq> radiance(exec, count);
-    wfpg::partitioner<wfpg::exec::seq> partitioner(exec, count);
+    tiled_array<volume_path, one_policy> paths(exec, count);
+    tiled_array<path_vertex, one_policy> vertices(exec, count);
+    wfpg::buffer<std::uint32_t, one_policy> keys(exec, count), counts(exec, count);
+    wfpg::buffer<vec3, one_policy> radiance(exec, count);
+    wfpg::partitioner<one_policy> partitioner(exec, count);
     for (std::size_t i = 0; i < count; ++i) paths.view().emplace(i, wfpg::ray(), solid_stack());
     // A collision counts as much as the path's light before it, so that roulette changes no mean.
     std::vector<double> collisions(count, 0.0);

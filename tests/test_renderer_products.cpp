@@ -4,6 +4,7 @@
 #include "materials/materials.hpp"
 #include "scene/builtin_scenes.hpp"
 #include "support/either_guide.hpp"
+#include "support/policies.hpp"
 #include "support/products.hpp"
 #include "tracer/unguided.hpp"
 #include "tracer/wavefront.hpp"
@@ -83,11 +84,11 @@ WFPG_TEST_CASE("products of 50 fields and BSDFs are right at every resolution", 
 
 TEST_CASE("mixtures of products and BSDFs report their densities over the sphere",
           "[renderer][products][thorough]") {
-  const wfpg::exec::seq exec;
+  const one_policy exec;
   for (std::uint64_t seed = 0; seed < 4 * kinds; ++seed) {
     const random_pair pair(seed);
-    const made_product<wfpg::exec::seq, bsdf> made(exec, {32, 8}, field_values(pair.kind, 32, seed),
-                                                   pair.hemisphere, pair.surface, seed, 40000);
+    const made_product<one_policy, bsdf> made(exec, {32, 8}, field_values(pair.kind, 32, seed),
+                                              pair.hemisphere, pair.surface, seed, 40000);
     std::vector<drawn_direction> drawn;
     for (const product_draw& d : made.drawn())
       if (d.mixed.pdf > 0.0f) drawn.push_back({d.mixed.direction, d.mixed.pdf});
@@ -104,13 +105,13 @@ TEST_CASE("mixtures of products and BSDFs report their densities over the sphere
 }
 
 TEST_CASE("a diffuse surface's product is its field, if the field has the cosine", "[renderer][products]") {
-  const wfpg::exec::seq exec;
+  const one_policy exec;
   const auto values = field_values(field_kind::noise, 16, 3);
   const auto is_field = [&](material_kind kind, bool hemisphere, vec3 normal) {
     wfpg::surface<bsdf> s;
     s.normal = s.outgoing = normal;
     s.bsdf = {normal, normal, vec3(0.8f, 0.5f, 0.3f), 0.3f, 1.5f, kind};
-    const made_product<wfpg::exec::seq, bsdf> made(exec, {16, 8}, values, hemisphere, s, 1, 100);
+    const made_product<one_policy, bsdf> made(exec, {16, 8}, values, hemisphere, s, 1, 100);
     REQUIRE(!made.empty());
     for (const product_draw& d : made.drawn())
       if (d.product.pdf != made.field().pdf(d.product.direction)) return false;
@@ -128,8 +129,8 @@ TEST_CASE("narrower glossy parts leave the guide a smaller fraction", "[renderer
   CHECK(wfpg::guided_part(0.25f, 0.5f) == Approx(0.25f + 0.75f / 4.0f));
   CHECK(wfpg::guided_part(0.001f, 0.5f) == Approx(0.25f).epsilon(1e-4));
 
-  const wfpg::exec::seq exec;
-  const built_field<wfpg::exec::seq> built(exec, field_values(field_kind::noise, 16, 3), 16);
+  const one_policy exec;
+  const built_field<one_policy> built(exec, field_values(field_kind::noise, 16, 3), 16);
   const wfpg::guide_mixture mixture{wfpg::directional_field(built.grid(), up), 0.6f};
   const auto fractions = [&](material_kind kind, float alpha) {
     wfpg::surface<bsdf> s;
@@ -169,7 +170,7 @@ struct dark_side {
 /// The fraction of guided rays from there that go below the surface. Plain bins, transient fields, after
 /// `samples` samples of the scene.
 double fraction_below(std::uint32_t product_resolution, int samples) {
-  using exec_policy = wfpg::exec::tbb;
+  using exec_policy = one_policy;
   const exec_policy exec;
   const render::scene scene = render::make_builtin_scene("thin-wall");
   const render::device_scene<exec_policy> geometry(exec, scene);

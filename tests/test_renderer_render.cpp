@@ -6,9 +6,7 @@
 #include "support/catch.hpp"
 #include "support/guided_depths.hpp"
 #include "support/pictures.hpp"
-
-#include <wfpg/exec/omp.hpp>
-#include <wfpg/exec/seq.hpp>
+#include "support/policies.hpp"
 
 #include <tbb/global_control.h>
 
@@ -23,6 +21,7 @@ namespace {
 
 using namespace render;
 using namespace render_test;
+using wfpg_test::one_policy;
 
 /// The message of render() for refused options.
 std::string refusal(const render_options& options) {
@@ -68,13 +67,13 @@ TEST_CASE("policies other than TBB refuse methods that need TBB", "[renderer]") 
 }
 
 TEST_CASE("invalid scenes and options are refused by name", "[renderer]") {
-  const wfpg::exec::seq exec;
+  const one_policy exec;
   scene broken = square_of({});
   broken.triangles[1].y = 4;
-  CHECK_THROWS_AS(device_scene<wfpg::exec::seq>(exec, broken), std::invalid_argument);
+  CHECK_THROWS_AS(device_scene<one_policy>(exec, broken), std::invalid_argument);
   broken = square_of({});
   broken.triangle_materials[0] = 1;
-  CHECK_THROWS_AS(device_scene<wfpg::exec::seq>(exec, broken), std::invalid_argument);
+  CHECK_THROWS_AS(device_scene<one_policy>(exec, broken), std::invalid_argument);
 
   render_options options;
   options.method = sampling_method::pt;

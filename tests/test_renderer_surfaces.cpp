@@ -5,8 +5,7 @@
 #include "scene/texel_pair.hpp"
 #include "support/catch.hpp"
 #include "support/pictures.hpp"
-
-#include <wfpg/exec/seq.hpp>
+#include "support/policies.hpp"
 
 #include <cmath>
 #include <utility>
@@ -15,6 +14,7 @@ namespace {
 
 using namespace render;
 using namespace render_test;
+using wfpg_test::one_policy;
 
 }  // namespace
 
@@ -22,8 +22,8 @@ TEST_CASE("textures are bilinear and repeat", "[renderer]") {
   scene s = square_of({});
   s.uvs = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
   s.textures.push_back({2, 2, {vec4(1, 0, 0, 1), vec4(0, 1, 0, 1), vec4(0, 0, 1, 1), vec4(1)}});
-  const wfpg::exec::seq exec;
-  const device_scene<wfpg::exec::seq> geometry(exec, s);
+  const one_policy exec;
+  const device_scene<one_policy> geometry(exec, s);
   const scene_view view = geometry.view();
   texture_reference whole;
   whole.index = 0;
@@ -83,10 +83,10 @@ TEST_CASE("rays pass through the holes of an alpha mask", "[renderer]") {
   s.textures.push_back({2, 1, {vec4(1, 1, 1, 0), vec4(1)}, texture_wrap::clamp_to_edge});
   s.materials[0].base_texture.index = 0;
   s.materials[0].alpha_cutoff = 0.5f;
-  const wfpg::exec::seq exec;
-  const device_scene<wfpg::exec::seq> geometry(exec, s);
+  const one_policy exec;
+  const device_scene<one_policy> geometry(exec, s);
   const embree_scene embree(exec, s, geometry.view());
-  const bvh_scene<wfpg::exec::seq> bvh(exec, s, geometry.view());
+  const bvh_scene<one_policy> bvh(exec, s, geometry.view());
   const auto check = [](const auto& caster) {
     for (int i = 0; i < 200; ++i) {
       const float x = -0.99f + 0.00995f * static_cast<float>(i);
@@ -110,8 +110,8 @@ TEST_CASE("rays pass through the holes of an alpha mask", "[renderer]") {
 TEST_CASE("a shading normal never hides a surface from its viewer", "[renderer]") {
   scene s = square_of({});
   s.normals.assign(4, glm::normalize(vec3(1.0f, 0.0f, 0.2f)));
-  const wfpg::exec::seq exec;
-  const device_scene<wfpg::exec::seq> geometry(exec, s);
+  const one_policy exec;
+  const device_scene<one_policy> geometry(exec, s);
   for (const float side : {1.0f, -1.0f}) {
     const vec3 outgoing = glm::normalize(vec3(-1.0f, 0.0f, side * 0.1f));
     const hit_surface hit = geometry.view().surface({0, 0.2f, 0.2f}, outgoing);

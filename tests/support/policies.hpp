@@ -1,11 +1,12 @@
-// The execution policies of tests, and a test case for each. WFPG_TEST_CASE defines one test per policy and
-// warp width, named "NAME - tbb32" and tagged [tbb][w32]. A CUDA compiler makes the CUDA policy's tests from
+// The execution policies of tests, and a test case for each. WFPG_TEST_CASE defines one test per backend,
+// named "NAME - tbb32" and tagged [tbb][w32]. A CUDA compiler makes the CUDA policy's tests from
 // the same sources, named "NAME - cuda" and tagged [cuda].
 //
-// Warp code is the same on every policy. Here seq has narrow warps, the others 32 lanes, as users have. Tests
-// of the policies themselves define WFPG_TEST_EACH_WIDTH first. Under slow sanitizers, WFPG_TEST_POLICY and
-// WFPG_TEST_WIDTH choose one policy for all other tests. WFPG_TEST_SEVERAL_POLICIES is defined if seq, omp
-// and tbb are tested side by side.
+// The tests share one type, whose backend each chooses (support/chosen_policy.hpp). Warps have 32 lanes, as
+// users have. Tests of the policies themselves define WFPG_TEST_EACH_WIDTH first, and get a type each.
+// WFPG_TEST_POLICY and WFPG_TEST_WIDTH choose one real policy for all other tests: sanitizers and -ffast-math
+// do so, with narrow warps too. WFPG_TEST_SEVERAL_POLICIES is defined if seq, omp and tbb are tested side by
+// side.
 #pragma once
 
 #include "support/catch.hpp"
@@ -20,9 +21,7 @@
 #if !defined(WFPG_TEST_POLICY)
 #define WFPG_TEST_SEVERAL_POLICIES
 #endif
-#include <wfpg/exec/omp.hpp>
-#include <wfpg/exec/seq.hpp>
-#include <wfpg/exec/tbb.hpp>
+#include "support/chosen_policy.hpp"
 #endif
 #include <wfpg/exec/buffer.hpp>
 
@@ -57,10 +56,15 @@
 #define WFPG_TEST_POLICIES(function, name, tags) \
   WFPG_TEST_ONE(function, name, tags, WFPG_TEST_POLICY, WFPG_TEST_WIDTH)
 #else
+#define WFPG_TEST_CHOSEN(function, name, tags, policy)            \
+  TEST_CASE(name " - " #policy "32", tags "[" #policy "][w32]") { \
+    const backend_choice choice(backend::policy);                 \
+    function<basic_chosen<32>>();                                 \
+  }
 #define WFPG_TEST_POLICIES(function, name, tags) \
-  WFPG_TEST_ONE(function, name, tags, seq, 8)    \
-  WFPG_TEST_ONE(function, name, tags, omp, 32)   \
-  WFPG_TEST_ONE(function, name, tags, tbb, 32)
+  WFPG_TEST_CHOSEN(function, name, tags, seq)    \
+  WFPG_TEST_CHOSEN(function, name, tags, omp)    \
+  WFPG_TEST_CHOSEN(function, name, tags, tbb)
 #endif
 
 #define WFPG_TEST_CASE_(function, name, tags) \
@@ -87,7 +91,7 @@ constexpr bool loops_on_host = false;
 #if defined(WFPG_TEST_POLICY)
 using one_policy = wfpg::exec::WFPG_TEST_JOIN(basic_, WFPG_TEST_POLICY)<WFPG_TEST_WIDTH>;
 #else
-using one_policy = wfpg::exec::tbb;
+using one_policy = basic_chosen<32>;
 #endif
 using host_policy = one_policy;
 constexpr bool loops_on_host = true;

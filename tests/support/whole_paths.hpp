@@ -3,9 +3,8 @@
 
 #include "casters/embree_caster.hpp"
 #include "scene/builtin_scenes.hpp"
+#include "support/policies.hpp"
 #include "tracer/bidirectional.hpp"
-
-#include <wfpg/exec/seq.hpp>
 
 #include <algorithm>
 #include <array>
@@ -22,7 +21,7 @@ using render::subpath;
 using render::subpath_vertex;
 using render::vec3;
 
-using exec_policy = wfpg::exec::seq;
+using exec_policy = one_policy;
 using caster_type = decltype(std::declval<const render::embree_scene&>().caster());
 using world_type = render::bidirectional_world<caster_type>;
 
