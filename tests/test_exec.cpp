@@ -471,6 +471,28 @@ TEST_CASE("three policies work in one program", "[exec]") {
   CHECK(std::is_same_v<wfpg::exec::seq, wfpg::exec::basic_seq<32>>);
   CHECK_FALSE(std::is_same_v<wfpg::exec::omp, wfpg::exec::tbb>);
 }
+
+TEST_CASE("the policy that other tests share has the loops and threads of the backend they choose",
+          "[exec]") {
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(5);
+  tbb::task_arena(3).execute([&] {
+    const words serial = squares_sorted_down(wfpg::exec::seq());
+    for (const auto& [chosen, threads] :
+         {std::pair(backend::seq, 1), std::pair(backend::omp, 5), std::pair(backend::tbb, 3)}) {
+      const backend_choice choice(chosen);
+      const basic_chosen<32> exec;
+      CHECK(exec.concurrency() == threads);
+      std::uint32_t in_regions = 0;
+      exec.for_each(1000, [&](std::size_t) {
+        if (omp_in_parallel()) wfpg::atomic_add(&in_regions, 1u);
+      });
+      CHECK(in_regions == (chosen == backend::omp ? 1000u : 0u));
+      CHECK((squares_sorted_down(exec) == serial));
+    }
+  });
+  omp_set_num_threads(before);
+}
 #endif
 
 }  // namespace
