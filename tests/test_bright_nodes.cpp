@@ -210,9 +210,6 @@ WFPG_TEST_CASE("bright nodes: threads and forms of casters do not change a bit",
 
 #if defined(WFPG_TEST_SEVERAL_POLICIES)
 TEST_CASE("bright nodes: policies of one warp width give the same bits", "[bright_nodes]") {
-  const auto bits = [] { return lamp_box<one_policy>({}).bits(); };
-  const std::uint64_t serial = with_backend(backend::seq, bits);
-  CHECK(with_backend(backend::omp, bits) == serial);
-  CHECK(with_backend(backend::tbb, bits) == serial);
+  check_equal_on_backends([] { return lamp_box<one_policy>({}).bits(); });
 }
 #endif

@@ -385,13 +385,7 @@ WFPG_TEST_CASE("field store: both forms of casters and any buffer size give the 
 
 #if defined(WFPG_TEST_SEVERAL_POLICIES)
 TEST_CASE("field store: policies of one warp width give the same bits", "[field_store]") {
-  const auto wide = [] { return history<one_policy>(); };
-  const store_history serial = with_backend(backend::seq, wide);
-  CHECK(with_backend(backend::omp, wide) == serial);
-  CHECK(with_backend(backend::tbb, wide) == serial);
-  const auto narrow = [] { return history<basic_chosen<8>>(); };
-  const store_history narrow_serial = with_backend(backend::seq, narrow);
-  CHECK(with_backend(backend::omp, narrow) == narrow_serial);
-  CHECK(with_backend(backend::tbb, narrow) == narrow_serial);
+  check_equal_on_backends([] { return history<one_policy>(); });
+  check_equal_on_backends([] { return history<basic_chosen<8>>(); });
 }
 #endif

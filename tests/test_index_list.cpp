@@ -88,8 +88,7 @@ WFPG_TEST_CASE("index lists are empty before marks are collected", "[index_list]
 }
 
 TEST_CASE("index lists have fewer than 2^32 elements", "[index_list]") {
-  CHECK_THROWS_AS(wfpg::index_list<wfpg::exec::seq>(wfpg::exec::seq(), std::size_t(1) << 32),
-                  std::invalid_argument);
+  CHECK_THROWS_AS(wfpg::index_list<host_policy>(host_policy(), std::size_t(1) << 32), std::invalid_argument);
 }
 
 WFPG_TEST_CASE("index lists free what they have where memory runs out", "[index_list]") {

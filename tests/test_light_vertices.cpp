@@ -142,13 +142,13 @@ WFPG_TEST_CASE("light vertices have no more memory than their budget or all path
 }
 
 TEST_CASE("light vertices' options have ranges", "[light_vertices]") {
-  const wfpg::exec::seq exec;
-  using vertices = wfpg::light_vertices<wfpg::exec::seq, test_vertex>;
+  const host_policy exec;
+  using vertices = wfpg::light_vertices<host_policy, test_vertex>;
   CHECK_THROWS_AS(vertices(exec, {0xffffffffull, 1000, 1}), std::invalid_argument);
   CHECK_THROWS_AS(vertices(exec, {1, 1000, 0}), std::invalid_argument);
   CHECK_THROWS_AS(vertices(exec, {1, 11, 1}), std::invalid_argument);
   vertices stored(exec, {2, 1000, 1});
-  const wfpg::buffer<std::uint32_t, wfpg::exec::seq> too_few(exec, 1);
+  const wfpg::buffer<std::uint32_t, host_policy> too_few(exec, 1);
   CHECK_THROWS_AS(stored.reserve(exec, too_few.view()), std::invalid_argument);
 }
 

@@ -328,14 +328,8 @@ WFPG_TEST_CASE("path guider: one seed gives the same bits on any number of threa
 TEST_CASE("path guider: policies of one warp width give the same bits", "[path_guider]") {
   for (field_lifetime lifetime : lifetimes) {
     INFO(name_of(lifetime));
-    const auto wide = [&] { return picture<one_policy>(1, lifetime); };
-    const std::vector<float> serial = with_backend(backend::seq, wide);
-    CHECK(with_backend(backend::omp, wide) == serial);
-    CHECK(with_backend(backend::tbb, wide) == serial);
-    const auto narrow = [&] { return picture<basic_chosen<8>>(1, lifetime); };
-    const std::vector<float> narrow_serial = with_backend(backend::seq, narrow);
-    CHECK(with_backend(backend::omp, narrow) == narrow_serial);
-    CHECK(with_backend(backend::tbb, narrow) == narrow_serial);
+    check_equal_on_backends([&] { return picture<one_policy>(1, lifetime); });
+    check_equal_on_backends([&] { return picture<basic_chosen<8>>(1, lifetime); });
   }
 }
 

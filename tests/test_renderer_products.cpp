@@ -170,14 +170,13 @@ struct dark_side {
 /// The fraction of guided rays from there that go below the surface. Plain bins, transient fields, after
 /// `samples` samples of the scene.
 double fraction_below(std::uint32_t product_resolution, int samples) {
-  using exec_policy = one_policy;
-  const exec_policy exec;
+  const one_policy exec;
   const render::scene scene = render::make_builtin_scene("thin-wall");
-  const render::device_scene<exec_policy> geometry(exec, scene);
-  const render::light_distribution<exec_policy> lights(exec, scene);
+  const render::device_scene<one_policy> geometry(exec, scene);
+  const render::light_distribution<one_policy> lights(exec, scene);
   const render::embree_scene accelerated(scene);
   constexpr int side = 64;
-  render::path_tracer<exec_policy, render::embree_caster> tracer(
+  render::path_tracer<one_policy, render::embree_caster> tracer(
       exec, {side, side, 6, 1}, {geometry.view(), lights.view(), true}, accelerated.caster());
   guider_options options;
   options.mode = wfpg::guiding_mode::plain;
@@ -186,12 +185,12 @@ double fraction_below(std::uint32_t product_resolution, int samples) {
   options.include_emission = false;
   options.max_paths = side * side;
   options.max_depth = 6;
-  octree_guider<exec_policy> guider(exec, {geometry.view().positions, geometry.view().triangles}, options);
+  octree_guider<one_policy> guider(exec, {geometry.view().positions, geometry.view().triangles}, options);
   const render::pinhole camera(scene.view, side, side);
   for (int i = 0; i < samples; ++i) tracer.render_sample(guider, camera, std::uint32_t(i), 1.0f);
 
   const std::size_t n = side * side;
-  const wfpg::buffer<wfpg::sampled_direction, exec_policy> directions(exec, n);
+  const wfpg::buffer<wfpg::sampled_direction, one_policy> directions(exec, n);
   guider.begin_sample();
   guider.sample_directions(wfpg::wave{0u, n, dark_side{7}, hashed_numbers{8}}, accelerated.caster(),
                            directions.view());

@@ -79,12 +79,12 @@ TEST_CASE("pictures guided by fields of octree cones have the mean of unguided o
 TEST_CASE("pictures guided by products have the mean of unguided ones", "[renderer][unbiased]") {
   for (const char* scene : {"ajar", "glossy-room"})
     for (const bool nee : {false, true}) check_rendering({scene, nee, product_method});
+  check_precisely({"", true, product_method});
 }
 
 TEST_CASE("pictures guided by products have that mean in more scenes", "[renderer][unbiased][thorough]") {
   for (const char* scene : {"cornell-box", "cornell-enclosed", "thin-wall"})
     for (const bool nee : {false, true}) check_rendering({scene, nee, product_method});
-  check_precisely({"", true, product_method});
 }
 
 TEST_CASE("pictures guided by products of all fields, materials and maps have that mean, too",

@@ -683,14 +683,13 @@ WFPG_TEST_CASE("rest: a sample weighs as much as the gain that was measured befo
 }
 
 TEST_CASE("rest: a least gain below 1 that is not 0 is refused", "[rest]") {
-  const wfpg::exec::seq exec;
+  const host_policy exec;
   wfpg::kept_guide_options options = rest_options();
   for (const float bad : {-1.0f, 0.99f, 2.0e6f, std::numeric_limits<float>::quiet_NaN()}) {
     options.least_gain = bad;
-    const box_mesh<wfpg::exec::seq> mesh(exec);
-    CHECK(refusal([&] {
-            wfpg::path_guider<wfpg::exec::seq>(exec, mesh.view(), options);
-          }).find("least_gain") != std::string::npos);
+    const box_mesh<host_policy> mesh(exec);
+    CHECK(refusal([&] { wfpg::path_guider<host_policy>(exec, mesh.view(), options); }).find("least_gain") !=
+          std::string::npos);
   }
 }
 

@@ -105,8 +105,8 @@ WFPG_TEST_CASE("splats of the first places are added alone", "[splats]") {
 }
 
 TEST_CASE("splats need a picture", "[splats]") {
-  const wfpg::exec::seq exec;
-  using splats = wfpg::splats<wfpg::exec::seq>;
+  const host_policy exec;
+  using splats = wfpg::splats<host_policy>;
   CHECK_THROWS_AS(splats(exec, 1, 0), std::invalid_argument);
   CHECK_THROWS_AS(splats(exec, 1, 0xffffffffull), std::invalid_argument);
   CHECK_THROWS_AS(splats(exec, 0xffffffffull, 1), std::invalid_argument);

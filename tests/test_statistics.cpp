@@ -1,11 +1,10 @@
 // The statistics kit: correct samplers pass, and each broken one is found and named.
 #include "support/catch.hpp"
 #include "support/fields.hpp"
+#include "support/policies.hpp"
 #include "support/reports.hpp"
 #include "support/scenes.hpp"
 #include "support/statistics.hpp"
-
-#include <wfpg/exec/seq.hpp>
 
 #include <cmath>
 #include <cstdint>
@@ -42,8 +41,8 @@ class open_sampler {
   }
 
  private:
-  wfpg::exec::seq exec_;
-  built_field<wfpg::exec::seq> built_;
+  host_policy exec_;
+  built_field<host_policy> built_;
   directional_field field_;
 };
 

@@ -3,6 +3,8 @@
 // policies.
 #pragma once
 
+#include "support/catch.hpp"
+
 #include <wfpg/exec/cpu_policy.hpp>
 #include <wfpg/exec/omp.hpp>
 #include <wfpg/exec/seq.hpp>
@@ -45,6 +47,14 @@ template <class F>
 auto with_backend(backend chosen, const F& f) {
   const backend_choice choice(chosen);
   return f();
+}
+
+/// Checks that f() is equal whatever backend its policies have.
+template <class F>
+void check_equal_on_backends(const F& f) {
+  const auto serial = with_backend(backend::seq, f);
+  CHECK(with_backend(backend::omp, f) == serial);
+  CHECK(with_backend(backend::tbb, f) == serial);
 }
 
 /// Returns f(policy) of the real policy of a backend.

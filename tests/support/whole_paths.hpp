@@ -21,7 +21,6 @@ using render::subpath;
 using render::subpath_vertex;
 using render::vec3;
 
-using exec_policy = one_policy;
 using caster_type = decltype(std::declval<const render::embree_scene&>().caster());
 using world_type = render::bidirectional_world<caster_type>;
 
@@ -45,9 +44,9 @@ struct test_world {
   }
 
   static constexpr int pixels = 16;
-  exec_policy exec;
-  render::device_scene<exec_policy> geometry;
-  render::light_distribution<exec_policy> lights;
+  one_policy exec;
+  render::device_scene<one_policy> geometry;
+  render::light_distribution<one_policy> lights;
   render::embree_scene accelerated;
   render::pinhole camera;
   render::scene_view view;
