@@ -1,10 +1,13 @@
 // Lists the nodes of the octree that are far brighter than what surrounds them, such as small lamps.
 // Refreshes of kept fields aim cones at them (aimed_cones.hpp).
 //
+// Means count nodes, not children: a lamp that hangs alone has an octant of its own. What surrounds a node
+// has as many nodes as a surface would, and those that are missing are dark.
+//
 // The list is a function of the exitance cache alone. Ranks with equal caches have equal lists, and guide
 // files need not hold it. wfpg's own.
 //
-// Cost: O(nodes of level 5) each time the cache changes. Nothing is read back to the host. Memory: 2.3 KB.
+// Cost: O(nodes of level 6) each time the cache changes. Nothing is read back to the host. Memory: 2.3 KB.
 #pragma once
 
 #include <wfpg/exec/buffer.hpp>
@@ -20,13 +23,15 @@ struct bright_node_constants {
   /// Nodes of this level are compared, or leaves where these are less deep. 6: a 64th of the scene's side.
   static constexpr std::uint32_t level = 6;
   /// A node is compared with its ancestor this many levels up, which has about 64 such nodes of a surface.
+  /// It is one level more where that has no more than 64: then the lamp hangs alone.
   static constexpr std::uint32_t levels_up = 3;
-  /// Radiance of a bright node over that ancestor's, at least.
+  /// Radiance of a bright node over that of its surroundings, at least.
   static constexpr float over_surroundings = 4.0f;
-  /// Radiance of a bright node over the scene's mean, at least. Rooms with one broad lamp then list nothing.
+  /// Radiance of a bright node over the mean of all nodes, at least. Rooms with one broad lamp then list
+  /// nothing.
   static constexpr float over_scene = 32.0f;
-  /// Deposits that a node needs, and 64 times as many its ancestor. With fewer, either may be bright or dark
-  /// by chance.
+  /// Deposits that a node needs, and as many for each node of its surroundings. With fewer, either may be
+  /// bright or dark by chance.
   static constexpr std::uint32_t deposits = 64;
   /// Nodes in the list, at most.
   static constexpr std::uint32_t most = 64;
@@ -48,6 +53,24 @@ struct bright_nodes_view {
   WFPG_HD std::uint32_t size() const { return count ? *count : 0; }
 };
 
+/// Kernel: writes the mean radiance of a level's nodes, each by its brighter side. One block.
+struct average_nodes {
+  exitance_cache_view cache;
+  node_id first;  // of the level
+  int size;       // nodes of the level
+  float* mean;    // output
+
+  template <class Block>
+  WFPG_HD void operator()(Block& block, std::size_t) const {
+    const double sum = block.sum(size, [&](int i) {
+      const node_id node = first + static_cast<node_id>(i);
+      const float radiance = max(max(cache.radiance(node, 0), cache.radiance(node, 1)), 0.0f);
+      return is_finite(radiance) ? double(radiance) : 0.0;
+    });
+    block.for_each(1, [&](int) { *mean = static_cast<float>(sum / size); });
+  }
+};
+
 /// Kernel: offers both sides of a node's children to the list. A side belongs to one of `most` buckets, which
 /// keeps the brightest: the same one in any order of threads.
 struct offer_bright_sides {
@@ -56,11 +79,12 @@ struct offer_bright_sides {
 
   exitance_cache_view cache;
   node_id first;           // of the level above
+  const float* mean;       // of all nodes of the children's level
   std::uint64_t* buckets;  // inverted radiance above the side's id; the least number wins
 
   WFPG_HD void operator()(std::size_t i) const {
     const node_id parent = first + static_cast<node_id>(i);
-    const float least = constants::over_scene * max(max(cache.radiance(0, 0), cache.radiance(0, 1)), 0.0f);
+    const float least = constants::over_scene * *mean;
     // A parent is the mean of at most eight children. Nearly all have no bright one.
     if (!(8.0f * max(cache.radiance(parent, 0), cache.radiance(parent, 1)) > least)) return;
     const node_id child = cache.octree().first_child(parent);
@@ -69,42 +93,66 @@ struct offer_bright_sides {
   }
 
  private:
+  // Nodes of a surface in an ancestor so many levels up.
+  WFPG_HD static constexpr std::uint32_t surface(std::uint32_t levels) { return 1u << 2 * levels; }
+
   WFPG_HD void offer(node_id node, std::uint32_t side, float least) const {
     const float radiance = cache.radiance(node, side);
     if (!(radiance > least) || !is_finite(radiance)) return;
-    const node_side around = surroundings(node, side);
-    const float of_surroundings = max(cache.radiance(around.node, around.side), 0.0f);
-    if (!(radiance > constants::over_surroundings * of_surroundings)) return;
+    const area around = surroundings(node, side);
+    if (!(radiance > constants::over_surroundings * around.radiance)) return;
     if (!has_deposits(node, constants::deposits)) return;
-    if (!has_deposits(around.node, constants::deposits << 2 * constants::levels_up)) return;
+    if (!has_deposits(around.node, constants::deposits * around.nodes)) return;
     const std::uint32_t id = 2 * node + side;
     atomic_min(buckets + hash32(0, id) % constants::most, std::uint64_t(~float_bits(radiance)) << 32 | id);
   }
 
-  struct node_side {
+  struct area {
     node_id node;
-    std::uint32_t side;
+    std::uint32_t nodes;  // of the level that is listed, at most those of a surface
+    float radiance;       // mean over a surface, of which nodes that are missing are dark
   };
 
-  // The ancestor that a node is compared with, and its side that faces as `side` of the node does.
-  WFPG_HD node_side surroundings(node_id node, std::uint32_t side) const {
-    const sparse_voxel_octree_view& tree = cache.octree();
-    for (std::uint32_t i = 0; i < constants::levels_up; ++i) {
-      const node_id up = tree.parent(node);
-      side = cache.matching_side(up, node - tree.first_child(up), side);
-      node = up;
+  // What a node is compared with, on the side that faces as `side` of the node does.
+  WFPG_HD area surroundings(node_id node, std::uint32_t side) const {
+    node_id up = node;
+    for (std::uint32_t i = 0; i < constants::levels_up; ++i) climb(up, side);
+    std::uint32_t all = surface(constants::levels_up), nodes = min(nodes_in(up, node), all);
+    const node_id above = cache.octree().parent(up);
+    if (above != invalid_node && nodes_in(above, node) <= all) {
+      nodes = nodes_in(above, node);
+      all = surface(constants::levels_up + 1);
+      climb(up, side);
     }
-    return {node, side};
+    const float part = static_cast<float>(nodes) / static_cast<float>(all);
+    return {up, nodes, part * max(cache.radiance(up, side), 0.0f)};
+  }
+  // Goes to the parent, and to its side that matches.
+  WFPG_HD void climb(node_id& node, std::uint32_t& side) const {
+    const node_id up = cache.octree().parent(node);
+    side = cache.matching_side(up, node - cache.octree().first_child(up), side);
+    node = up;
+  }
+  // Number of an ancestor's descendants on the level of `node`.
+  WFPG_HD std::uint32_t nodes_in(node_id ancestor, node_id node) const {
+    const sparse_voxel_octree_view& tree = cache.octree();
+    node_id first = ancestor, last = ancestor;
+    for (std::uint32_t level = tree.level_of(ancestor); level < tree.level_of(node); ++level)
+      descend(first, last);
+    return last - first + 1;
+  }
+  // From the first and last node of a range to their first and last child.
+  WFPG_HD void descend(node_id& first, node_id& last) const {
+    const sparse_voxel_octree_view& tree = cache.octree();
+    first = tree.first_child(first);
+    last = tree.first_child(last) + tree.child_count(last) - 1;
   }
   // Whether the leaves of a node have `wanted` deposits, on both sides together. Only bright sides are asked,
   // and most end after a few leaves.
   WFPG_HD bool has_deposits(node_id node, std::uint32_t wanted) const {
     const sparse_voxel_octree_view& tree = cache.octree();
     node_id leaf = node, last = node;
-    while (!tree.is_leaf(leaf)) {
-      leaf = tree.first_child(leaf);
-      last = tree.first_child(last) + tree.child_count(last) - 1;
-    }
+    while (!tree.is_leaf(leaf)) descend(leaf, last);
     std::uint64_t n = 0;
     for (; leaf <= last && n < wanted; ++leaf) n += cache.deposits(leaf);
     return n >= wanted;
@@ -164,7 +212,8 @@ class bright_nodes {
   explicit bright_nodes(const Exec& exec)
       : buckets_(exec, constants::most),
         sides_(exec, constants::most),
-        count_(exec, std::vector<std::uint32_t>(1)) {}
+        count_(exec, std::vector<std::uint32_t>(1)),
+        mean_(exec, 1u) {}
 
   /// Lists the bright nodes of a cache. Stays empty where the octree has fewer than `levels_up` levels below
   /// the root.
@@ -173,18 +222,22 @@ class bright_nodes {
     if (tree.empty() || tree.depth() < constants::levels_up) return;
     const std::uint32_t level = min(tree.depth(), constants::level);
     exec.fill_bytes(buckets_.data(), 0xff, buckets_.bytes());  // offer_bright_sides::none
-    const node_id above = tree.level_begin(level - 1);
-    exec.for_each(tree.level_size(level - 1), offer_bright_sides{cache, above, buckets_.data()});
+    exec.for_each_block(1, 0,
+                        average_nodes{cache, tree.level_begin(level),
+                                      static_cast<int>(tree.level_size(level)), mean_.data()});
+    exec.for_each(tree.level_size(level - 1),
+                  offer_bright_sides{cache, tree.level_begin(level - 1), mean_.data(), buckets_.data()});
     exec.for_each(constants::most, list_bright_sides{cache, buckets_.data(), sides_.data(), count_.data()});
   }
 
   bright_nodes_view view() const { return {sides_.data(), count_.data()}; }
-  std::size_t bytes() const { return buckets_.bytes() + sides_.bytes() + count_.bytes(); }
+  std::size_t bytes() const { return buckets_.bytes() + sides_.bytes() + count_.bytes() + mean_.bytes(); }
 
  private:
   buffer<std::uint64_t, Exec> buckets_;
   buffer<bright_side, Exec> sides_;
   buffer<std::uint32_t, Exec> count_;
+  buffer<float, Exec> mean_;  // of the nodes of the level
 };
 
 }  // namespace wfpg::detail
