@@ -40,7 +40,7 @@ struct sample_ray {
     if constexpr (!std::is_same_v<Queries, no_queries>) {
       // A direction of zero length asks for nothing: next-event estimation chose no light.
       const vec3 d = queries.query(ray);
-      answer(ray, d.x != 0.0f || d.y != 0.0f || d.z != 0.0f ? mixture.pdf(s, d) : 0.0f);
+      answer(ray, is_finite(d) && glm::dot(d, d) > 0.0f ? mixture.pdf(s, d) : 0.0f);
     }
   }
 
