@@ -136,15 +136,15 @@ struct offer_bright_sides {
   // Number of an ancestor's descendants on the level of `node`.
   WFPG_HD std::uint32_t nodes_in(node_id ancestor, node_id node) const {
     const sparse_voxel_octree_view& tree = cache.octree();
-    node_id first = ancestor, last = ancestor;
+    node_id begin = ancestor, last = ancestor;
     for (std::uint32_t level = tree.level_of(ancestor); level < tree.level_of(node); ++level)
-      descend(first, last);
-    return last - first + 1;
+      descend(begin, last);
+    return last - begin + 1;
   }
   // From the first and last node of a range to their first and last child.
-  WFPG_HD void descend(node_id& first, node_id& last) const {
+  WFPG_HD void descend(node_id& begin, node_id& last) const {
     const sparse_voxel_octree_view& tree = cache.octree();
-    first = tree.first_child(first);
+    begin = tree.first_child(begin);
     last = tree.first_child(last) + tree.child_count(last) - 1;
   }
   // Whether the leaves of a node have `wanted` deposits, on both sides together. Only bright sides are asked,
