@@ -4,6 +4,7 @@
 #include "support/kept_fields.hpp"
 #include "support/lit_box.hpp"
 #include "support/policies.hpp"
+#include "support/random_meshes.hpp"
 #include "support/scenes.hpp"
 #include "support/statistics.hpp"
 #include "support/threads.hpp"
@@ -82,15 +83,11 @@ std::vector<bright_side> listed_above_floor(float radiance, int side) {
   constexpr int leaves = 64;
   const float width = float(side) / float(leaves);
   const vec3 corner(0.7f, 0.8f, 0.7f);
-  std::vector<vec3> positions{{0, 0, 0}, {1, 0, 0}, {1, 0, 1}, {0, 0, 1}};
-  std::vector<wfpg::uvec3> triangles{{0, 1, 2}, {0, 2, 3}};
-  for (const vec3 p : box_positions()) positions.push_back(corner + width * p);
-  for (const wfpg::uvec3 t : box_triangles()) triangles.push_back(t + 4u);
+  test_mesh mesh{{{0, 0, 0}, {1, 0, 0}, {1, 0, 1}, {0, 0, 1}}, {{0, 1, 2}, {0, 2, 3}}};
+  for (const vec3 p : box_positions()) mesh.positions.push_back(corner + width * p);
+  for (const wfpg::uvec3 t : box_triangles()) mesh.triangles.push_back(t + 4u);
   const Exec exec;
-  const wfpg::buffer<vec3, Exec> points(exec, positions);
-  const wfpg::buffer<wfpg::uvec3, Exec> corners(exec, triangles);
-  auto fragments = wfpg::voxelize(
-      exec, wfpg::triangle_mesh_view{const_view<vec3>(points), const_view<wfpg::uvec3>(corners)}, leaves);
+  auto fragments = voxelized(exec, mesh, leaves);
   wfpg::sparse_voxel_octree<Exec> tree(exec, fragments);
   std::vector<deposit> light;
   constexpr int n = 4 * leaves;  // points a side of the floor and of each face
