@@ -113,7 +113,7 @@ struct offer_bright_sides {
     float radiance;       // mean over a surface, of which nodes that are missing are dark
   };
 
-  // What a node is compared with, on the side that faces as `side` of the node does.
+  // The area that a node is compared with, on the side that faces as `side` of the node does.
   WFPG_HD area surroundings(node_id node, std::uint32_t side) const {
     node_id up = node;
     for (std::uint32_t i = 0; i < constants::levels_up; ++i) climb(up, side);
